@@ -1,0 +1,2 @@
+//! kmcfit
+pub mod error;
