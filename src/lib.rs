@@ -1,2 +1,7 @@
 //! kmcfit
+pub mod dynamics;
 pub mod error;
+pub mod functions;
+pub mod objective;
+pub mod problem;
+pub mod solvers;

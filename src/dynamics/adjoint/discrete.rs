@@ -1,0 +1,91 @@
+//! The discrete adjoint: the exact transpose of [`Oscillator::tangent`], stage by stage.
+
+use crate::dynamics::stages::{Rhs, Stages};
+use crate::dynamics::tableau::{MIDPOINT, RK4, Tableau};
+use crate::dynamics::{Device, DeviceTangent, Method, Oscillator, State, Trajectory};
+
+/// Gradient of a scalar cost of the motion with respect to the nodal values of all functions and
+/// to the initial state, in the Euclidean inner product of the nodal values.
+///
+/// `source` holds the derivative of the cost with respect to displacement and velocity at every
+/// node; `trajectory` must be the motion of `device` under `force`. The result is the transpose of
+/// [`Oscillator::tangent`] applied to `source`, to rounding.
+///
+/// Per stage, backwards, with `k̄` the multiplier of the stage's increment:
+/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā a/m` go to the
+/// functions. The stages are computed again from the nodes, so memory is two numbers a node.
+pub fn gradient(
+    oscillator: &Oscillator,
+    device: &Device,
+    force: Option<&[f64]>,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+) -> DeviceTangent {
+    let rhs = oscillator.rhs(device, force);
+    match oscillator.method {
+        Method::Midpoint => sweep(&MIDPOINT, rhs, trajectory, source),
+        Method::Rk4 => sweep(&RK4, rhs, trajectory, source),
+    }
+}
+
+fn sweep<const S: usize>(
+    tableau: &Tableau<S>,
+    rhs: Rhs,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+) -> DeviceTangent {
+    let nodes = trajectory.displacement.len();
+    let mut gradient = Device::zeros(nodes, rhs.terms.len());
+    let mut adjoint = State {
+        displacement: source.displacement[nodes - 1],
+        velocity: source.velocity[nodes - 1],
+    };
+    for i in (0..nodes - 1).rev() {
+        let (y, v) = (trajectory.displacement[i], trajectory.velocity[i]);
+        let stages = rhs.stages(tableau, i, y, v);
+        adjoint = step_back(tableau, rhs, i, &stages, adjoint, &mut gradient);
+        adjoint.displacement += source.displacement[i];
+        adjoint.velocity += source.velocity[i];
+    }
+    DeviceTangent {
+        device: gradient,
+        initial: adjoint,
+    }
+}
+
+/// Carries the adjoint from node `i + 1` to node `i` and adds the step's share to the gradient.
+#[inline(always)]
+fn step_back<const S: usize>(
+    tableau: &Tableau<S>,
+    rhs: Rhs,
+    i: usize,
+    stages: &Stages<S>,
+    adjoint: State,
+    gradient: &mut Device,
+) -> State {
+    let mut before = adjoint;
+    let (mut y_bar, mut v_bar) = ([0.0; S], [0.0; S]);
+    for s in (0..S).rev() {
+        let mut k_y = tableau.b[s] * adjoint.displacement;
+        let mut k_v = tableau.b[s] * adjoint.velocity;
+        for r in s + 1..S {
+            k_y += tableau.a[r][s] * y_bar[r];
+            k_v += tableau.a[r][s] * v_bar[r];
+        }
+        let position = tableau.position[s];
+        let (y, v) = (stages.y[s], stages.v[s]);
+        let slopes = rhs.slopes(i, position, y, v);
+        let a_bar = rhs.dt * k_v;
+        y_bar[s] = a_bar * slopes.da_dy;
+        v_bar[s] = rhs.dt * k_y + a_bar * slopes.da_dv;
+        before.displacement += y_bar[s];
+        before.velocity += v_bar[s];
+
+        let push = -a_bar / slopes.mass;
+        position.spread(&mut gradient.mass, i, push * stages.a[s]);
+        for (term, g) in rhs.terms.iter().zip(&mut gradient.coefficients) {
+            position.spread(g, i, push * term.phi(y, v));
+        }
+    }
+    before
+}

@@ -1,0 +1,27 @@
+//! The motion of one device, its linearisation and its adjoints.
+//!
+//! `m(t) y'' + sum_j p_j(t) phi_j(y, y') = f(t)` with `y(0)`, `y'(0)` given, stepped by an explicit
+//! Runge–Kutta method ([`Method`]) on an equally spaced [`Grid`]. Coefficient functions live on the
+//! nodes and are interpolated linearly in between, so a stage at mid-step sees the mean of two nodes.
+//!
+//! * [`Oscillator::forward`]: the motion ([`Trajectory`]), or where it broke down ([`Breakdown`]);
+//! * [`Oscillator::tangent`]: its directional derivative;
+//! * [`adjoint::discrete`]: the exact transpose of the stepper;
+//! * [`adjoint::continuous`]: Eq. 13 of the paper, discretised as the paper does.
+
+pub mod adjoint;
+mod device;
+mod forward;
+mod grid;
+pub mod quadrature;
+mod stages;
+mod tableau;
+mod tangent;
+mod term;
+
+pub use device::{Device, State};
+pub use forward::{Breakdown, Cause, Oscillator, Trajectory};
+pub use grid::Grid;
+pub use tableau::Method;
+pub use tangent::DeviceTangent;
+pub use term::Term;

@@ -1,0 +1,54 @@
+//! Sums and differences on an equally spaced grid, in the paper's order of operations.
+
+/// Trapezoid rule for values at the nodes: `dt/2 (f_0 + f_last)`, then the inner nodes in order.
+pub fn trapezoid(f: &[f64], dt: f64) -> f64 {
+    let Some((&last, _)) = f.split_last() else {
+        return 0.0;
+    };
+    let ends = dt * 0.5 * (f[0] + last);
+    let inner = f.get(1..f.len() - 1).unwrap_or_default();
+    inner.iter().fold(ends, |sum, f| sum + dt * 0.5 * (2.0 * f))
+}
+
+/// The weights of [`trapezoid`] for `nodes` nodes: `dt`, halved at both ends.
+pub fn trapezoid_weights(nodes: usize, dt: f64) -> Vec<f64> {
+    let mut weights = vec![dt; nodes];
+    if let [first, .., last] = weights.as_mut_slice() {
+        *first = 0.5 * dt;
+        *last = 0.5 * dt;
+    }
+    weights
+}
+
+/// Central differences, one-sided at the ends.
+///
+/// # Panics
+/// If there are fewer than two values.
+pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
+    let last = f.len() - 1;
+    let mut d = Vec::with_capacity(f.len());
+    d.push((-f[0] + f[1]) / dt);
+    d.extend(f.windows(3).map(|w| 0.5 * (-w[0] + w[2]) / dt));
+    d.push((f[last] - f[last - 1]) / dt);
+    d
+}
+
+/// Second differences; the ends use the stencil of their neighbours, mirrored.
+///
+/// # Panics
+/// If there are fewer than three values.
+pub fn curvature(f: &[f64], dt: f64) -> Vec<f64> {
+    let second = |a: f64, b: f64, c: f64| (a - 2.0 * b + c) / dt / dt;
+    let last = f.len() - 1;
+    let mut d = Vec::with_capacity(f.len());
+    d.push(second(f[0], f[1], f[2]));
+    d.extend(f.windows(3).map(|w| second(w[0], w[1], w[2])));
+    d.push(second(f[last], f[last - 1], f[last - 2]));
+    d
+}
+
+/// Mean of the nodes `i` and `i + 1`.
+#[inline(always)]
+pub fn midpoint(f: &[f64], i: usize) -> f64 {
+    (f[i + 1] + f[i]) * 0.5
+}

@@ -1,0 +1,104 @@
+//! The stages of one step: the one place where the equation of motion is evaluated.
+
+use super::tableau::{Position, Tableau};
+use super::{Device, Term};
+
+/// The right-hand side of one experiment on one device.
+#[derive(Clone, Copy)]
+pub(super) struct Rhs<'a> {
+    pub terms: &'a [Term],
+    pub device: &'a Device,
+    pub force: Option<&'a [f64]>,
+    pub dt: f64,
+}
+
+/// Displacement, velocity and acceleration at the stages of one step.
+pub(super) struct Stages<const S: usize> {
+    pub y: [f64; S],
+    pub v: [f64; S],
+    pub a: [f64; S],
+}
+
+/// Derivatives of the acceleration at one stage.
+pub(super) struct Slopes {
+    pub mass: f64,
+    pub da_dy: f64,
+    pub da_dv: f64,
+}
+
+impl Rhs<'_> {
+    /// `y'' = f/m - sum_j p_j phi_j / m`.
+    ///
+    /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
+    /// these are the paper's operations in the paper's order, and its run depends on every bit.
+    #[inline(always)]
+    fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
+        let mass = position.of(&self.device.mass, i);
+        let mut a = self.force.map_or(0.0, |f| position.of(f, i) / mass);
+        for (term, p) in self.terms.iter().zip(&self.device.coefficients).rev() {
+            a -= position.of(p, i) * term.phi(y, v) / mass;
+        }
+        a
+    }
+
+    /// Mass and partial derivatives of [`Rhs::acceleration`].
+    #[inline(always)]
+    pub fn slopes(&self, i: usize, position: Position, y: f64, v: f64) -> Slopes {
+        let mass = position.of(&self.device.mass, i);
+        let (mut da_dy, mut da_dv) = (0.0, 0.0);
+        for (term, p) in self.terms.iter().zip(&self.device.coefficients) {
+            let (phi_y, phi_v) = term.partials(y, v);
+            let p = position.of(p, i);
+            da_dy -= p * phi_y / mass;
+            da_dv -= p * phi_v / mass;
+        }
+        Slopes { mass, da_dy, da_dv }
+    }
+
+    /// The stages of step `i` from the state `(y, v)` at its left node.
+    #[inline(always)]
+    pub fn stages<const S: usize>(
+        &self,
+        tableau: &Tableau<S>,
+        i: usize,
+        y: f64,
+        v: f64,
+    ) -> Stages<S> {
+        let mut stages = Stages {
+            y: [y; S],
+            v: [v; S],
+            a: [0.0; S],
+        };
+        for s in 0..S {
+            for r in 0..s {
+                let a = tableau.a[s][r];
+                if a != 0.0 {
+                    stages.y[s] += self.dt * stages.v[r] * a;
+                    stages.v[s] += self.dt * stages.a[r] * a;
+                }
+            }
+            stages.a[s] = self.acceleration(i, tableau.position[s], stages.y[s], stages.v[s]);
+        }
+        stages
+    }
+}
+
+/// The state at the right node: `x + sum_s b_s dt x'_s`.
+#[inline(always)]
+pub(super) fn advance<const S: usize>(
+    tableau: &Tableau<S>,
+    dt: f64,
+    stages: &Stages<S>,
+    y: f64,
+    v: f64,
+) -> (f64, f64) {
+    let (mut y, mut v) = (y, v);
+    for s in 0..S {
+        let b = tableau.b[s];
+        if b != 0.0 {
+            y += dt * stages.v[s] * b;
+            v += dt * stages.a[s] * b;
+        }
+    }
+    (y, v)
+}

@@ -1,0 +1,52 @@
+//! Design matrices: from parameters to values at the nodes.
+
+use nalgebra_sparse::CsrMatrix;
+
+/// A matrix `B` of shape `nodes x parameters`.
+#[derive(Debug, Clone)]
+pub enum Design {
+    /// No parameters.
+    Empty,
+    /// One parameter per node.
+    Identity,
+    /// Anything else, by rows.
+    Sparse(CsrMatrix<f64>),
+}
+
+impl Design {
+    /// `values += B theta`.
+    pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
+        match self {
+            Design::Empty => {}
+            Design::Identity => values.iter_mut().zip(theta).for_each(|(v, t)| *v += t),
+            Design::Sparse(matrix) => {
+                for (row, value) in matrix.row_iter().zip(values) {
+                    let columns = row.col_indices().iter().zip(row.values());
+                    *value += columns.map(|(&j, b)| b * theta[j]).sum::<f64>();
+                }
+            }
+        }
+    }
+
+    /// `B theta`.
+    pub fn multiply(&self, theta: &[f64], nodes: usize) -> Vec<f64> {
+        let mut values = vec![0.0; nodes];
+        self.multiply_add(theta, &mut values);
+        values
+    }
+
+    /// `out += B^T nodal`.
+    pub fn transpose_multiply_add(&self, nodal: &[f64], out: &mut [f64]) {
+        match self {
+            Design::Empty => {}
+            Design::Identity => out.iter_mut().zip(nodal).for_each(|(o, n)| *o += n),
+            Design::Sparse(matrix) => {
+                for (row, value) in matrix.row_iter().zip(nodal) {
+                    for (&j, b) in row.col_indices().iter().zip(row.values()) {
+                        out[j] += b * value;
+                    }
+                }
+            }
+        }
+    }
+}

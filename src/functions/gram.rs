@@ -1,0 +1,75 @@
+//! The L2 inner product in parameters: `G = B^T W B` with trapezoid weights `W`.
+
+use super::Design;
+use nalgebra::DMatrix;
+use nalgebra_sparse::factorization::CscCholesky;
+use nalgebra_sparse::{CscMatrix, CsrMatrix};
+
+/// The Gram matrix of one basis in L2, and its inverse.
+#[derive(Debug, Clone)]
+pub enum Gram {
+    /// One value per node: `G = W`.
+    Diagonal(Vec<f64>),
+    /// Any other basis, with its Cholesky factor.
+    Factored {
+        /// `G`.
+        matrix: CsrMatrix<f64>,
+        /// Its factor.
+        factor: CscCholesky<f64>,
+    },
+}
+
+impl Gram {
+    /// The Gram matrix of `design` under the quadrature `weights` (s) at the nodes; `None` if the
+    /// columns are linearly dependent on the grid.
+    pub fn new(design: &Design, weights: &[f64]) -> Option<Self> {
+        match design {
+            Design::Empty => Some(Gram::Diagonal(Vec::new())),
+            Design::Identity => Some(Gram::Diagonal(weights.to_vec())),
+            Design::Sparse(matrix) => {
+                let mut weighted = matrix.clone();
+                for (i, weight) in weights.iter().enumerate() {
+                    let mut row = weighted.row_mut(i);
+                    row.values_mut().iter_mut().for_each(|b| *b *= weight);
+                }
+                let gram = matrix.transpose() * weighted;
+                let factor = CscCholesky::factor(&CscMatrix::from(&gram)).ok()?;
+                Some(Gram::Factored {
+                    matrix: gram,
+                    factor,
+                })
+            }
+        }
+    }
+
+    /// `out = G theta`.
+    pub fn multiply(&self, theta: &[f64], out: &mut [f64]) {
+        match self {
+            Gram::Diagonal(weights) => {
+                for ((o, w), t) in out.iter_mut().zip(weights).zip(theta) {
+                    *o = w * t;
+                }
+            }
+            Gram::Factored { matrix, .. } => {
+                out.fill(0.0);
+                Design::Sparse(matrix.clone()).multiply_add(theta, out);
+            }
+        }
+    }
+
+    /// `out = G^-1 dual`: from a Euclidean gradient in parameters to the parameters of the L2
+    /// gradient.
+    pub fn solve(&self, dual: &[f64], out: &mut [f64]) {
+        match self {
+            Gram::Diagonal(weights) => {
+                for ((o, w), d) in out.iter_mut().zip(weights).zip(dual) {
+                    *o = d / w;
+                }
+            }
+            Gram::Factored { factor, .. } => {
+                let solution = factor.solve(&DMatrix::from_column_slice(dual.len(), 1, dual));
+                out.copy_from_slice(solution.as_slice());
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Coefficient functions: a sparse design matrix times parameters plus a fixed part.
+//!
+//! `p_j(t_i) = (B_j theta_j)_i + b_j,i` at the nodes `t_i`. So gradients with respect to parameters are
+//! `B_j^T` times gradients with respect to nodal values, and the L2 inner product of two functions
+//! is `theta^T (B^T W B) theta'` with the trapezoid weights `W`.
+
+pub mod basis;
+mod collection;
+mod design;
+mod gram;
+mod quantity;
+
+pub use collection::Functions;
+pub use design::Design;
+pub use gram::Gram;
+pub use quantity::Quantity;
+
+/// One coefficient function and where its search starts.
+#[derive(Debug, Clone)]
+pub struct CoefficientFunction {
+    /// Which function this is.
+    pub quantity: Quantity,
+    /// How parameters become values at the nodes.
+    pub design: Design,
+    /// Fixed part at the nodes, in the unit of the quantity.
+    pub offset: Vec<f64>,
+    /// Start of the parameters, in the unit of the quantity.
+    pub start: Vec<f64>,
+    /// Whether positive parameters make the function positive everywhere (a basis of non-negative
+    /// functions without a fixed part), so that a search may run in their logarithms.
+    pub positive_parameters: bool,
+}
+
+impl CoefficientFunction {
+    /// A function known at all nodes: no parameters.
+    pub fn fixed(quantity: Quantity, values: Vec<f64>) -> Self {
+        Self {
+            quantity,
+            design: Design::Empty,
+            offset: values,
+            start: Vec::new(),
+            positive_parameters: false,
+        }
+    }
+
+    /// One value per node, starting from `start`.
+    pub fn nodal(quantity: Quantity, start: Vec<f64>) -> Self {
+        Self {
+            quantity,
+            design: basis::nodal(),
+            offset: vec![0.0; start.len()],
+            start,
+            positive_parameters: true,
+        }
+    }
+
+    /// One value for all `nodes` nodes, starting from `start`.
+    pub fn constant(quantity: Quantity, start: f64, nodes: usize) -> Self {
+        Self {
+            quantity,
+            design: basis::constant(nodes),
+            offset: vec![0.0; nodes],
+            start: vec![start],
+            positive_parameters: true,
+        }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.start.len()
+    }
+
+    /// Values at the nodes for the parameters `theta`.
+    pub fn values_into(&self, theta: &[f64], values: &mut [f64]) {
+        match &self.design {
+            // One value per node without a fixed part: a copy, so that no bit changes.
+            Design::Identity => values.copy_from_slice(theta),
+            Design::Empty => values.copy_from_slice(&self.offset),
+            Design::Sparse(_) => {
+                values.copy_from_slice(&self.offset);
+                self.design.multiply_add(theta, values);
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The gradient of the cost, by either adjoint.
+
+use super::Evaluation;
+use crate::dynamics::quadrature::trapezoid_weights;
+use crate::dynamics::{Device, Trajectory, adjoint};
+use crate::problem::Problem;
+
+/// Which adjoint computes the gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GradientKind {
+    /// The exact transpose of the stepper.
+    Discrete,
+    /// Eq. 13 of the paper, consistent but not exact.
+    Continuous,
+}
+
+impl GradientKind {
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            GradientKind::Discrete => "discrete",
+            GradientKind::Continuous => "continuous",
+        }
+    }
+}
+
+/// The gradient of `J` in both inner products.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gradient {
+    /// `dJ/dtheta`: the Euclidean gradient in the parameters.
+    pub euclidean: Vec<f64>,
+    /// Parameters of the L2 gradient `g`: `dJ = sum_j integral g_j dp_j dt`. For one value per node
+    /// these are the nodal values of the functions `dI/dm`, `dI/dc`, `dI/dk` of Eqs. 15-17.
+    pub l2: Vec<f64>,
+    /// `G^2 = sum_j integral g_j^2 dt`.
+    pub norm_squared: f64,
+}
+
+impl Problem {
+    /// Gradient at an evaluated point.
+    ///
+    /// # Panics
+    /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
+    pub fn gradient(&self, evaluation: &Evaluation, kind: GradientKind) -> Gradient {
+        match kind {
+            GradientKind::Discrete => {
+                let nodal = self.discrete_gradient(evaluation);
+                let euclidean = self.functions.transpose(&nodal);
+                let l2 = self.functions.gram_solve(&euclidean);
+                self.assemble(euclidean, l2)
+            }
+            GradientKind::Continuous => self.continuous_gradient(evaluation),
+        }
+    }
+
+    fn assemble(&self, euclidean: Vec<f64>, l2: Vec<f64>) -> Gradient {
+        let norm_squared = self.functions.norm_squared(&l2);
+        Gradient {
+            euclidean,
+            l2,
+            norm_squared,
+        }
+    }
+
+    /// Euclidean gradient in nodal values.
+    fn discrete_gradient(&self, evaluation: &Evaluation) -> Device {
+        let mut total = self.functions.empty_device();
+        for (experiment, motion) in self.experiments.iter().zip(&evaluation.trajectories) {
+            let Some(readings) = &experiment.readings else {
+                continue;
+            };
+            let source = Trajectory {
+                displacement: readings.source(&motion.displacement),
+                velocity: vec![0.0; motion.velocity.len()],
+            };
+            let share = adjoint::discrete::gradient(
+                &self.oscillator,
+                &evaluation.device,
+                experiment.force.as_deref(),
+                motion,
+                &source,
+            );
+            add(&mut total, &share.device);
+        }
+        total
+    }
+
+    fn continuous_gradient(&self, evaluation: &Evaluation) -> Gradient {
+        assert!(
+            self.supports_continuous(),
+            "Eq. 13 needs one reading per node and no sigma"
+        );
+        let mut total = self.functions.empty_device();
+        for (experiment, motion) in self.experiments.iter().zip(&evaluation.trajectories) {
+            let Some(readings) = &experiment.readings else {
+                continue;
+            };
+            let share = adjoint::continuous::gradient(
+                &self.oscillator,
+                &evaluation.device,
+                motion,
+                readings.values(),
+            );
+            add(&mut total, &share);
+        }
+        let grid = &self.oscillator.grid;
+        let weights = trapezoid_weights(grid.nodes(), grid.step());
+        let mut weighted = total.clone();
+        for values in weighted.functions_mut() {
+            values.iter_mut().zip(&weights).for_each(|(g, w)| *g *= w);
+        }
+        let euclidean = self.functions.transpose(&weighted);
+        let mut l2 = self.functions.gram_solve(&euclidean);
+        // One value per node: the functions themselves, without a round trip through the weights.
+        let parts = self.functions.iter().zip(self.functions.ranges());
+        for ((function, range), values) in parts.zip(total.functions()) {
+            if matches!(function.design, crate::functions::Design::Identity) {
+                l2[range.clone()].copy_from_slice(values);
+            }
+        }
+        self.assemble(euclidean, l2)
+    }
+}
+
+fn add(total: &mut Device, share: &Device) {
+    for (total, share) in total.functions_mut().zip(share.functions()) {
+        total.iter_mut().zip(share).for_each(|(t, s)| *t += s);
+    }
+}

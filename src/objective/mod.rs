@@ -1,0 +1,70 @@
+//! The cost of a parameter vector and its derivatives, from one trajectory per point.
+
+mod gradient;
+mod readings;
+
+pub use gradient::{Gradient, GradientKind};
+pub use readings::{Readings, Weighting};
+
+use crate::dynamics::{Breakdown, Device, Trajectory};
+use crate::problem::Problem;
+
+/// The cost at one point and everything that it was computed from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// Cost `J`.
+    pub cost: f64,
+    /// The device at this point.
+    pub device: Device,
+    /// The motion in each experiment.
+    pub trajectories: Vec<Trajectory>,
+}
+
+impl Problem {
+    /// Storage for evaluations, used again and again by [`Problem::evaluate_into`].
+    pub fn workspace(&self) -> Evaluation {
+        Evaluation {
+            cost: f64::NAN,
+            device: self.functions.empty_device(),
+            trajectories: vec![Trajectory::default(); self.experiments.len()],
+        }
+    }
+
+    /// Cost, device and motions for the parameters `theta`.
+    ///
+    /// The cost is the sum over the experiments of [`Readings::cost`].
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if a motion does not exist: the mass is not positive, or it overflows.
+    pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, Breakdown> {
+        let mut evaluation = self.workspace();
+        self.evaluate_into(theta, &mut evaluation)?;
+        Ok(evaluation)
+    }
+
+    /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
+    /// error.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    pub fn evaluate_into(
+        &self,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.functions.device_into(theta, &mut evaluation.device);
+        evaluation.cost = 0.0;
+        for (experiment, trajectory) in self.experiments.iter().zip(&mut evaluation.trajectories) {
+            self.oscillator.forward_into(
+                &evaluation.device,
+                experiment.initial,
+                experiment.force.as_deref(),
+                trajectory,
+            )?;
+            if let Some(readings) = &experiment.readings {
+                evaluation.cost += readings.cost(&trajectory.displacement);
+            }
+        }
+        Ok(())
+    }
+}

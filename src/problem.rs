@@ -1,0 +1,40 @@
+//! The validated, immutable problem that everything below the configuration works on.
+
+use crate::dynamics::{Oscillator, State};
+use crate::functions::Functions;
+use crate::objective::{Readings, Weighting};
+
+/// One record of the device's motion.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Name for reports.
+    pub name: String,
+    /// Displacement and velocity at the first node.
+    pub initial: State,
+    /// Force at the nodes, N; `None` is free motion.
+    pub force: Option<Vec<f64>>,
+    /// What was measured; `None` for an experiment that is only simulated.
+    pub readings: Option<Readings>,
+}
+
+/// What is fitted: an oscillator, how its functions are represented, and the records.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Grid, stepper and terms.
+    pub oscillator: Oscillator,
+    /// Mass and one function per term.
+    pub functions: Functions,
+    /// The records.
+    pub experiments: Vec<Experiment>,
+}
+
+impl Problem {
+    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading per node.
+    pub fn supports_continuous(&self) -> bool {
+        let fits =
+            |r: &Readings| r.stride() == 1 && matches!(r.weighting(), Weighting::Integral { .. });
+        self.experiments
+            .iter()
+            .all(|e| e.readings.as_ref().is_some_and(fits))
+    }
+}

@@ -1,0 +1,208 @@
+//! The loop around every solver, run by argmin's executor.
+
+use super::lbfgs::Lbfgs;
+use super::outcome::{Outcome, Status};
+use super::point::{Counts, Point, Work};
+use super::recorder::{Recorder, Row, Snapshot};
+use super::steepest_descent::SteepestDescent;
+use super::{Descend, FitSettings, Solver, Step};
+use crate::dynamics::{Breakdown, Cause};
+use crate::problem::Problem;
+use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// A finished fit: the best point, how it was reached and how it ended.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The point with the lowest cost.
+    pub best: Point,
+    /// Cost at the start.
+    pub initial_cost: f64,
+    /// `G^2` at the start.
+    pub initial_norm_squared: f64,
+    /// One row per iteration.
+    pub history: Vec<Row>,
+    /// Motions on the way.
+    pub snapshots: Vec<Snapshot>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Work done.
+    pub counts: Counts,
+    /// Wall-clock time.
+    pub elapsed: Duration,
+}
+
+/// Fits `problem` from `start`; `observe` is called after every iteration.
+///
+/// Every method accepts only points of lower cost, so the last point is the best one.
+///
+/// # Errors
+/// A [`Breakdown`] if the start itself cannot be evaluated.
+pub fn fit(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<Fit, Breakdown> {
+    let run = Run {
+        method: method(settings.solver),
+        settings,
+        clock: Instant::now(),
+        progress: Err(NOT_STARTED),
+        outcome: None,
+        observe,
+    };
+    let result = Executor::new(problem, run)
+        .configure(|state: SearchState| state.param(start.to_vec()))
+        .ctrlc(false)
+        .timer(false)
+        .run()
+        .expect("Run reports by outcome and never returns an error to the executor");
+    let counts = Counts::of(&result.problem);
+    result.solver.finish(counts)
+}
+
+fn method(solver: Solver) -> Box<dyn Descend> {
+    match solver {
+        Solver::SteepestDescent => Box::<SteepestDescent>::default(),
+        Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
+    }
+}
+
+/// One method at work, seen by argmin as a solver.
+struct Run<'a> {
+    method: Box<dyn Descend>,
+    settings: &'a FitSettings,
+    clock: Instant,
+    progress: Result<Progress, Breakdown>,
+    outcome: Option<Outcome>,
+    observe: &'a mut dyn FnMut(&Row),
+}
+
+struct Progress {
+    point: Point,
+    recorder: Recorder,
+}
+
+/// What `progress` holds until argmin calls `init`.
+const NOT_STARTED: Breakdown = Breakdown {
+    cause: Cause::Overflow,
+    node: 0,
+    time: f64::NAN,
+    value: f64::NAN,
+};
+
+/// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
+type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
+
+impl Run<'_> {
+    fn start(&self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
+        let mut evaluation = work.problem().workspace();
+        work.evaluate_into(&parameters, &mut evaluation)?;
+        let point = work.complete(parameters, evaluation);
+        Ok(Progress {
+            recorder: Recorder::new(&point),
+            point,
+        })
+    }
+
+    fn advance(&mut self, work: &mut Work) {
+        let Ok(progress) = &mut self.progress else {
+            return;
+        };
+        let before = &progress.point;
+        match self.method.step(work, before) {
+            Step::Stuck(reason) => self.outcome = Some(Outcome::new(Status::Stalled, reason)),
+            Step::Moved { point, length } => {
+                progress.recorder.record(before, &point, length);
+                let previous_cost = before.evaluation.cost;
+                progress.point = point;
+                if let Some(row) = progress.recorder.rows.last() {
+                    (self.observe)(row);
+                    self.outcome = self.settings.stopping.after(row, previous_cost);
+                }
+            }
+        }
+        if self.outcome.is_none() {
+            self.outcome = self.ended_from_outside();
+        }
+    }
+
+    fn ended_from_outside(&self) -> Option<Outcome> {
+        let flag = self.settings.interrupt.as_ref();
+        if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            let reason = "interrupted; the best point so far is kept";
+            return Some(Outcome::new(Status::Interrupted, reason));
+        }
+        let limit = self.settings.stopping.limit?;
+        (self.clock.elapsed() >= limit).then(|| {
+            let reason = format!("the limit of {} s is reached", limit.as_secs_f64());
+            Outcome::new(Status::TimeLimit, reason)
+        })
+    }
+
+    fn finish(self, counts: Counts) -> Result<Fit, Breakdown> {
+        let Progress { point, recorder } = self.progress?;
+        Ok(Fit {
+            best: point,
+            initial_cost: recorder.initial_cost,
+            initial_norm_squared: recorder.initial_norm_squared,
+            history: recorder.rows,
+            snapshots: recorder.snapshots,
+            outcome: self
+                .outcome
+                .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
+            counts,
+            elapsed: self.clock.elapsed(),
+        })
+    }
+
+    fn view(&self, state: SearchState) -> SearchState {
+        match &self.progress {
+            Ok(Progress { point, .. }) => state
+                .param(point.parameters.clone())
+                .cost(point.evaluation.cost),
+            Err(_) => state,
+        }
+    }
+}
+
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
+    fn name(&self) -> &str {
+        self.settings.solver.name()
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut argmin::core::Problem<&'p Problem>,
+        mut state: SearchState,
+    ) -> Result<(SearchState, Option<KV>), Error> {
+        let parameters = state.take_param().unwrap_or_default();
+        let mut work = Work::new(problem, self.settings.gradient);
+        self.progress = self.start(&mut work, parameters);
+        self.outcome = self.settings.stopping.out_of_iterations(0);
+        Ok((self.view(state), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut argmin::core::Problem<&'p Problem>,
+        state: SearchState,
+    ) -> Result<(SearchState, Option<KV>), Error> {
+        self.advance(&mut Work::new(problem, self.settings.gradient));
+        Ok((self.view(state), None))
+    }
+
+    fn terminate(&mut self, _state: &SearchState) -> TerminationStatus {
+        match (&self.outcome, &self.progress) {
+            (Some(outcome), _) => {
+                TerminationStatus::Terminated(TerminationReason::SolverExit(outcome.reason.clone()))
+            }
+            (None, Err(breakdown)) => {
+                TerminationStatus::Terminated(TerminationReason::SolverExit(breakdown.to_string()))
+            }
+            (None, Ok(_)) => TerminationStatus::NotTerminated,
+        }
+    }
+}

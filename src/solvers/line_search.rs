@@ -1,0 +1,74 @@
+//! A line search for the weak Wolfe conditions by bracketing and interpolation.
+
+/// Sufficient decrease: `phi(a) <= phi(0) + 1e-4 a phi'(0)`.
+const DECREASE: f64 = 1e-4;
+/// Curvature: `phi'(a) >= 0.9 phi'(0)`.
+const CURVATURE: f64 = 0.9;
+/// Trials before the search gives up: enough to halve a step to 1e-9 of its first length.
+const TRIALS: u32 = 30;
+/// How far a step may grow from one trial to the next.
+const GROWTH: f64 = 4.0;
+
+/// What a line search sees of a trial point.
+pub(super) trait Line {
+    /// Cost at step `a`; `None` if there is no motion at this point.
+    fn cost(&mut self, a: f64) -> Option<f64>;
+    /// Slope at the step last asked for by [`Line::cost`].
+    fn slope(&mut self) -> f64;
+}
+
+/// Finds a step that satisfies the weak Wolfe conditions, from the first trial `a`; `cost` and
+/// `slope < 0` belong to step 0. Where no motion exists the step is too long. Returns the last step
+/// that lowered the cost enough, which is the last one whose slope was asked for; `None` if there
+/// was none.
+///
+/// The slope is only asked for where the cost is low enough, so a rejected trial costs one
+/// forward solve and no adjoint.
+pub(super) fn weak_wolfe(line: &mut dyn Line, cost: f64, slope: f64, first: f64) -> Option<f64> {
+    let (mut low, mut high) = (0.0, f64::INFINITY);
+    let mut low_slope = slope;
+    let mut a = first;
+    let mut accepted = None;
+    for _ in 0..TRIALS {
+        let trial = line.cost(a);
+        let lower = trial.filter(|c| *c <= cost + DECREASE * a * slope);
+        if lower.is_none() {
+            high = a;
+            let fallback = 0.5 * (low + high);
+            a = match trial {
+                Some(trial) if low == 0.0 => parabola(cost, slope, a, trial),
+                _ => fallback,
+            };
+            continue;
+        }
+        let here = line.slope();
+        accepted = Some(a);
+        if here >= CURVATURE * slope {
+            return accepted;
+        }
+        let next = secant(low, low_slope, a, here);
+        (low, low_slope) = (a, here);
+        a = if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            next.clamp(1.5 * a, GROWTH * a)
+        };
+    }
+    accepted
+}
+
+/// Minimiser of the parabola through `phi(0)`, `phi'(0)`, `phi(a)`, kept inside `[0.1 a, 0.5 a]`.
+fn parabola(cost: f64, slope: f64, a: f64, trial: f64) -> f64 {
+    let minimiser = -slope * a * a / (2.0 * (trial - cost - slope * a));
+    if minimiser.is_finite() {
+        minimiser.clamp(0.1 * a, 0.5 * a)
+    } else {
+        0.5 * a
+    }
+}
+
+/// Zero of the slope by the secant through two steps.
+fn secant(a: f64, slope_a: f64, b: f64, slope_b: f64) -> f64 {
+    let zero = b - slope_b * (b - a) / (slope_b - slope_a);
+    if zero.is_finite() { zero } else { GROWTH * b }
+}

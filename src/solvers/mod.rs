@@ -1,0 +1,71 @@
+//! Solvers: each is a direction and a step rule ([`Descend`]); the loop, the stopping test and the
+//! record of what happened are shared.
+
+mod executor;
+mod lbfgs;
+mod line_search;
+mod outcome;
+mod point;
+mod recorder;
+mod steepest_descent;
+mod stopping;
+
+pub use executor::{Fit, fit};
+pub use outcome::{Outcome, Status};
+pub use point::{Counts, Point};
+pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
+pub use stopping::Stopping;
+
+use crate::objective::GradientKind;
+use point::Work;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Which solver, with its own settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Solver {
+    /// The paper's: 50 trial steps `5 sqrt(G^2) / i^4` along the L2 gradient, the best is taken.
+    SteepestDescent,
+    /// Limited-memory BFGS in the L2 inner product, in the logarithm of the mass.
+    Lbfgs {
+        /// Number of pairs kept.
+        memory: usize,
+    },
+}
+
+impl Solver {
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Solver::SteepestDescent => "steepest-descent",
+            Solver::Lbfgs { .. } => "lbfgs",
+        }
+    }
+}
+
+/// How a fit is run.
+#[derive(Debug, Clone)]
+pub struct FitSettings {
+    /// The solver.
+    pub solver: Solver,
+    /// Which adjoint gives its gradients.
+    pub gradient: GradientKind,
+    /// When it ends.
+    pub stopping: Stopping,
+    /// Set from outside (Ctrl-C) to end the run after the current iteration.
+    pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+/// Where one iteration led.
+pub(crate) enum Step {
+    /// To a point with lower cost; `length` is the step along the direction.
+    Moved { point: Point, length: f64 },
+    /// Nowhere: no step lowers the cost, for this reason.
+    Stuck(String),
+}
+
+/// A direction and a step rule.
+pub(crate) trait Descend {
+    /// One iteration from `point`.
+    fn step(&mut self, work: &mut Work, point: &Point) -> Step;
+}

@@ -1,0 +1,89 @@
+//! A point of the search, and the counted work that makes one.
+
+use crate::dynamics::Breakdown;
+use crate::objective::{Evaluation, Gradient, GradientKind};
+use crate::problem::Problem;
+
+/// Parameters with everything known about them.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// Parameters of all functions.
+    pub parameters: Vec<f64>,
+    /// Cost, device and motions.
+    pub evaluation: Evaluation,
+    /// Gradient of the cost.
+    pub gradient: Gradient,
+}
+
+/// How often the equations were solved; one count is one pass over all experiments.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Forward solves.
+    pub forward: u64,
+    /// Adjoint solves.
+    pub adjoint: u64,
+    /// Tangent solves.
+    pub tangent: u64,
+    /// Quadratic programs.
+    pub qp: u64,
+}
+
+/// The problem behind argmin's counters: the one door through which solvers evaluate.
+pub(crate) struct Work<'a, 'p> {
+    problem: &'a mut argmin::core::Problem<&'p Problem>,
+    kind: GradientKind,
+}
+
+const FORWARD: &str = "forward_count";
+const ADJOINT: &str = "adjoint_count";
+
+impl<'a, 'p> Work<'a, 'p> {
+    pub fn new(problem: &'a mut argmin::core::Problem<&'p Problem>, kind: GradientKind) -> Self {
+        Self { problem, kind }
+    }
+
+    /// The problem itself, for what costs no solve.
+    pub fn problem(&self) -> &'p Problem {
+        self.problem
+            .problem
+            .expect("the executor holds the problem")
+    }
+
+    /// One forward solve into `evaluation`.
+    pub fn evaluate_into(
+        &mut self,
+        parameters: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        *self.problem.counts.entry(FORWARD).or_insert(0) += 1;
+        self.problem().evaluate_into(parameters, evaluation)
+    }
+
+    /// One adjoint solve at an evaluated point.
+    pub fn gradient(&mut self, evaluation: &Evaluation) -> Gradient {
+        *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
+        self.problem().gradient(evaluation, self.kind)
+    }
+
+    /// The point that an evaluation belongs to, completed by its gradient.
+    pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
+        let gradient = self.gradient(&evaluation);
+        Point {
+            parameters,
+            evaluation,
+            gradient,
+        }
+    }
+}
+
+impl Counts {
+    pub(crate) fn of(problem: &argmin::core::Problem<&Problem>) -> Self {
+        let count = |key| problem.counts.get(key).copied().unwrap_or(0);
+        Self {
+            forward: count(FORWARD),
+            adjoint: count(ADJOINT),
+            tangent: 0,
+            qp: 0,
+        }
+    }
+}
