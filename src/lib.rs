@@ -1,2 +1,3 @@
 //! kmcfit
 pub mod error;
+pub mod report;
