@@ -2,9 +2,11 @@
 
 mod gradient;
 mod readings;
+mod verify;
 
 pub use gradient::{Gradient, GradientKind};
 pub use readings::{Readings, Weighting};
+pub use verify::GradientError;
 
 use crate::dynamics::{Breakdown, Device, Trajectory};
 use crate::problem::Problem;

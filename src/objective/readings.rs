@@ -79,6 +79,18 @@ impl Readings {
         }
     }
 
+    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
+    /// the difference of two rounded costs would be lost in their rounding.
+    pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
+        let pairs = from.iter().zip(to).step_by(self.stride);
+        let terms = pairs.zip(&self.values).enumerate();
+        terms
+            .map(|(i, ((y, moved), observed))| {
+                self.weight(i) * (moved - y) * ((moved - observed) + (y - observed))
+            })
+            .sum()
+    }
+
     /// Weight `w_i` of reading `i`, so that `J = sum w_i r_i^2`.
     pub fn weight(&self, i: usize) -> f64 {
         match self.weighting {

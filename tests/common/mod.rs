@@ -1,6 +1,9 @@
 //! Problems with known answers, met by the tests of every layer.
 #![allow(dead_code)]
 
+pub mod closed_form;
+pub mod reference;
+
 use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit::objective::{Readings, Weighting};

@@ -1,0 +1,158 @@
+//! The data model of a figure: panels and axes, with nothing of the drawing in it.
+//!
+//! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps.
+//! Where `x` and `y` differ in length, the shorter one counts.
+
+use super::mark::Mark;
+
+/// One figure: a grid of panels with a common legend above them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// File stem, as in `convergence` for `convergence.svg`.
+    pub name: String,
+    /// Title; part of the file, not of the picture, because captions belong to the text around it.
+    pub title: String,
+    /// What the picture shows, for readers who cannot see it.
+    pub description: String,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+    /// Panels side by side in one row, at least 1.
+    pub columns: usize,
+}
+
+impl Figure {
+    /// A figure without panels, in one column.
+    pub fn new(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        description: impl Into<String>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            title: title.into(),
+            description: description.into(),
+            panels: Vec::new(),
+            columns: 1,
+        }
+    }
+
+    /// Sets how many panels stand side by side.
+    #[must_use]
+    pub fn columns(mut self, columns: usize) -> Self {
+        self.columns = columns.max(1);
+        self
+    }
+
+    /// Adds a panel.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+}
+
+/// One pair of axes with its marks; later marks lie on top of earlier ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Heading above the panel; none where empty.
+    pub title: String,
+    /// Horizontal axis. Equal axes in one column share their range and labels.
+    pub x: Axis,
+    /// Vertical axis. Equal axes in one row share their range and labels.
+    pub y: Axis,
+    /// What is drawn.
+    pub marks: Vec<Mark>,
+}
+
+impl Panel {
+    /// An empty panel without a heading.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Self {
+            title: String::new(),
+            x,
+            y,
+            marks: Vec::new(),
+        }
+    }
+
+    /// Sets the heading.
+    #[must_use]
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Adds a mark.
+    #[must_use]
+    pub fn mark(mut self, mark: Mark) -> Self {
+        self.marks.push(mark);
+        self
+    }
+
+    /// Adds a mark where there is one.
+    #[must_use]
+    pub fn maybe(mut self, mark: Option<Mark>) -> Self {
+        self.marks.extend(mark);
+        self
+    }
+}
+
+/// How values map to lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// In proportion to the value.
+    Linear,
+    /// In proportion to its logarithm; values at or below zero leave gaps.
+    Log,
+}
+
+/// An axis: what it shows, in which unit, and how far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Quantity and symbol, as in `time t`.
+    pub label: String,
+    /// Unit, as in `s`; empty for a pure number.
+    pub unit: String,
+    /// Linear or logarithmic.
+    pub scale: Scale,
+    /// Lowest and highest value shown, in the unit of the axis; otherwise as the data need.
+    /// Limits that make no range (not finite, not increasing, not positive on a logarithmic axis)
+    /// are taken as absent.
+    pub limits: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis as wide as its data.
+    pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            unit: unit.into(),
+            scale: Scale::Linear,
+            limits: None,
+        }
+    }
+
+    /// A logarithmic axis over the whole decades that hold its data.
+    pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(label, unit)
+        }
+    }
+
+    /// Sets the lowest and the highest value shown.
+    #[must_use]
+    pub fn limits(mut self, low: f64, high: f64) -> Self {
+        self.limits = Some((low, high));
+        self
+    }
+
+    /// Label and unit as written beside the axis: `time t (s)`.
+    pub fn caption(&self) -> String {
+        match (self.label.as_str(), self.unit.as_str()) {
+            (label, "") => label.to_string(),
+            ("", unit) => unit.to_string(),
+            (label, unit) => format!("{label} ({unit})"),
+        }
+    }
+}

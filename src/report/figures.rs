@@ -1,0 +1,266 @@
+//! The standard figures of a fit, from plain slices.
+
+use super::figure::{Axis, Figure, Panel};
+use super::mark::{Colour, Dash, Mark, Style};
+
+/// Beyond this number of readings the dots are drawn smaller.
+const MANY: usize = 400;
+
+fn time() -> Axis {
+    Axis::linear("time t", "s")
+}
+
+/// One measured channel: what was measured, its unit, the times in s, and the readings.
+pub type Channel<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
+
+/// The measured motion, one panel for each channel.
+pub fn observation(channels: &[Channel]) -> Figure {
+    let figure = Figure::new(
+        "observation",
+        "Observed motion",
+        "The measured channels against time, one panel for each.",
+    );
+    channels.iter().fold(figure, |figure, (label, unit, t, y)| {
+        let width = if t.len() > MANY { 2.0 } else { 3.5 };
+        let mark = Mark::points("", t, y, Style::new(Colour::Blue).width(width));
+        figure.panel(Panel::new(time(), Axis::linear(*label, *unit)).mark(mark))
+    })
+}
+
+/// Cost J/J₀ and squared gradient norm G²/G₀² against the iteration, both relative to the start;
+/// both axes are logarithmic, so iteration 0 is not shown.
+pub fn convergence(
+    iterations: &[f64],
+    cost_ratio: &[f64],
+    gradient_norm_squared_ratio: &[f64],
+) -> Figure {
+    let cost = Style::new(Colour::Blue).width(2.2);
+    // Both solid, told apart by width: dashes vanish where the gradient norm jumps up and down.
+    let gradient = Style::new(Colour::Orange).width(0.9);
+    let squares = gradient_norm_squared_ratio;
+    Figure::new(
+        "convergence",
+        "Convergence",
+        "Cost and squared gradient norm, relative to the start, against the iteration.",
+    )
+    .panel(
+        Panel::new(
+            Axis::log("iteration", ""),
+            Axis::log("relative to the start", ""),
+        )
+        .mark(Mark::line(
+            "gradient norm G²/G₀²",
+            iterations,
+            squares,
+            gradient,
+        ))
+        .mark(Mark::line("cost J/J₀", iterations, cost_ratio, cost)),
+    )
+}
+
+/// The motion at one iteration: the iteration, the times in s, and the displacements in m.
+pub type Snapshot<'a> = (usize, &'a [f64], &'a [f64]);
+
+/// The observed displacement and the motion of the fit at some iterations; times in s,
+/// displacements in m.
+pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
+    let observed = Mark::points(
+        "observed",
+        t_obs,
+        y_obs,
+        Style::new(Colour::Grey).width(4.5),
+    );
+    let panel = Panel::new(time(), Axis::linear("displacement y", "m")).mark(observed);
+    let last = snapshots.len().saturating_sub(1);
+    let panel = snapshots
+        .iter()
+        .enumerate()
+        .fold(panel, |panel, (index, (iteration, t, y))| {
+            let label = format!("iteration {iteration}");
+            // The last one lies on the observation, where only black shows well.
+            let style = match index {
+                0 => Style::nth(0),
+                _ if index == last => Style::new(Colour::Black).dash(Dash::Dashed),
+                _ => Style::nth(index),
+            };
+            panel.mark(Mark::line(label, t, y, style))
+        });
+    Figure::new(
+        "motion",
+        "Motion during the fit",
+        "The observed displacement against time, and the motion of the fit at some iterations.",
+    )
+    .panel(panel)
+}
+
+/// A coefficient function on the time grid, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FunctionCurve<'a> {
+    /// Name and symbol, as in `mass m`.
+    pub name: &'a str,
+    /// Unit, as in `kg`.
+    pub unit: &'a str,
+    /// What the fit found.
+    pub found: &'a [f64],
+    /// Lower and upper edge of its uncertainty.
+    pub band: Option<(&'a [f64], &'a [f64])>,
+    /// Where the fit started.
+    pub start: Option<&'a [f64]>,
+    /// The true function, where known.
+    pub truth: Option<&'a [f64]>,
+}
+
+impl<'a> FunctionCurve<'a> {
+    /// A function that was found, with nothing else known.
+    pub fn new(name: &'a str, unit: &'a str, found: &'a [f64]) -> Self {
+        Self {
+            name,
+            unit,
+            found,
+            band: None,
+            start: None,
+            truth: None,
+        }
+    }
+
+    /// The function against the times `t` in s.
+    fn panel(&self, t: &[f64]) -> Panel {
+        let band = |(low, high)| Mark::band("uncertainty", t, low, high, Colour::Blue);
+        let start = |y| Mark::line("start", t, y, Style::new(Colour::Green).dash(Dash::Dotted));
+        Panel::new(time(), Axis::linear(self.name, self.unit))
+            .maybe(self.band.map(band))
+            .maybe(self.start.map(start))
+            .mark(Mark::line(
+                "found",
+                t,
+                self.found,
+                Style::new(Colour::Blue).width(1.8),
+            ))
+            .maybe(self.truth.map(|y| truth(t, y)))
+    }
+}
+
+fn truth(t: &[f64], y: &[f64]) -> Mark {
+    Mark::line(
+        "truth",
+        t,
+        y,
+        Style::new(Colour::Vermillion).dash(Dash::Dashed),
+    )
+}
+
+/// The coefficient functions against the times `t` in s, one panel each.
+pub fn functions(t: &[f64], curves: &[FunctionCurve]) -> Figure {
+    let figure = Figure::new(
+        "functions",
+        "Coefficient functions",
+        "The coefficient functions that were found, against time, one panel for each.",
+    );
+    curves
+        .iter()
+        .fold(figure, |figure, curve| figure.panel(curve.panel(t)))
+}
+
+/// The error of a gradient against the step of the difference that tests it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GradientCurve<'a> {
+    /// Nodes of the time grid.
+    pub nodes: usize,
+    /// Which adjoint made the gradient: `discrete` or `continuous`.
+    pub adjoint: &'a str,
+    /// Step along the gradient.
+    pub step: &'a [f64],
+    /// |(J(p - a g) - J(p))/a + G²| / G² at each step a.
+    pub error: &'a [f64],
+}
+
+/// The error of the gradient against the step, a panel for each adjoint and a line for each grid.
+pub fn gradient_error(curves: &[GradientCurve]) -> Figure {
+    let mut adjoints: Vec<&str> = Vec::new();
+    let mut nodes: Vec<usize> = curves.iter().map(|curve| curve.nodes).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    for curve in curves {
+        if !adjoints.contains(&curve.adjoint) {
+            adjoints.push(curve.adjoint);
+        }
+    }
+    let figure = Figure::new(
+        "gradient_error",
+        "Error of the gradient",
+        "Relative error of the gradient against the step of the difference that tests it.",
+    );
+    let panels = adjoints
+        .iter()
+        .map(|adjoint| gradient_panel(curves, adjoint, &nodes));
+    panels.fold(figure.columns(adjoints.len()), Figure::panel)
+}
+
+/// The curves of one adjoint, finest grid on top; a grid looks the same in all panels.
+fn gradient_panel(curves: &[GradientCurve], adjoint: &str, nodes: &[usize]) -> Panel {
+    let axes = Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""));
+    let curves = curves.iter().filter(|curve| curve.adjoint == adjoint);
+    curves.fold(axes.title(format!("{adjoint} adjoint")), |panel, curve| {
+        let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
+        let label = format!("N = {}", curve.nodes);
+        panel.mark(Mark::line(
+            label,
+            curve.step,
+            curve.error,
+            Style::nth(index),
+        ))
+    })
+}
+
+/// What a free motion can show, on the time grid. An empty slice stands for something unknown.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RatioCurves<'a> {
+    /// k/m in 1/s².
+    pub k_over_m: &'a [f64],
+    /// c/m in 1/s.
+    pub c_over_m: &'a [f64],
+    /// Natural frequency in Hz.
+    pub frequency: &'a [f64],
+    /// Damping ratio.
+    pub damping_ratio: &'a [f64],
+}
+
+impl<'a> RatioCurves<'a> {
+    fn each(&self) -> [&'a [f64]; 4] {
+        [
+            self.k_over_m,
+            self.c_over_m,
+            self.frequency,
+            self.damping_ratio,
+        ]
+    }
+}
+
+/// The ratios of the coefficient functions against the times `t` in s, and the true ones where
+/// known; a ratio that was not found has no panel.
+pub fn ratios(t: &[f64], found: &RatioCurves, truth: Option<&RatioCurves>) -> Figure {
+    let names = [
+        ("k/m", "s⁻²"),
+        ("c/m", "s⁻¹"),
+        ("natural frequency", "Hz"),
+        ("damping ratio ζ", ""),
+    ];
+    let truth = truth.copied().unwrap_or_default();
+    let mut figure = Figure::new(
+        "ratios",
+        "Ratios of the coefficient functions",
+        "Stiffness and damping over mass, natural frequency and damping ratio against time.",
+    )
+    .columns(2);
+    for ((name, unit), (found, truth)) in names.iter().zip(found.each().iter().zip(truth.each())) {
+        if !found.is_empty() {
+            let truth = (!truth.is_empty()).then_some(truth);
+            let curve = FunctionCurve {
+                truth,
+                ..FunctionCurve::new(name, unit, found)
+            };
+            figure = figure.panel(curve.panel(t));
+        }
+    }
+    figure
+}

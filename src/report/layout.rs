@@ -1,0 +1,205 @@
+//! Places the panels and the legend on the sheet.
+
+use super::axis::{self, Range, Ruler};
+use super::figure::{Figure, Panel};
+use super::legend;
+use super::panel::{Placed, SIZE, label_height, label_width};
+use super::shape::{Frame, Sheet};
+
+/// Width of every figure in pixels: 180 mm, two columns of a journal.
+const WIDTH: f64 = 680.0;
+/// Blank edge around everything.
+const EDGE: f64 = 8.0;
+/// Room right of the last column, for a tick label that reaches beyond its axis.
+const RIGHT: f64 = 10.0;
+/// Gap between neighbouring columns and rows, beside their labels.
+const COLUMN_GAP: f64 = 24.0;
+const ROW_GAP: f64 = 7.0;
+/// Axes keep this width, however many columns there are.
+const NARROWEST: f64 = 60.0;
+const TITLE: f64 = 1.6 * SIZE;
+/// Height of the axes in pixels: alone, side by side, and in a stack.
+const ALONE: f64 = 320.0;
+const BESIDE: f64 = 260.0;
+const STACKED: f64 = 165.0;
+
+/// Draws a figure.
+pub(super) fn sheet(figure: &Figure) -> Sheet {
+    let grid = Grid::new(figure);
+    let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
+    let columns = grid.columns(&rulers);
+    let left = columns.first().map_or(EDGE, |column| column.left);
+    let entries = legend::entries(figure);
+    let (mut shapes, height) = legend::draw(&entries, left, EDGE, WIDTH - RIGHT - EDGE - left);
+    let mut top = EDGE + height + if height > 0.0 { 6.0 } else { 0.0 };
+    for row in 0..grid.rows() {
+        top += grid.title_height(row);
+        for (index, _) in grid.row(row) {
+            let column = &columns[index % grid.columns];
+            let placed = grid.place(index, column, top, rulers[index].clone());
+            shapes.extend(placed.shapes());
+        }
+        top += grid.height() + grid.footer_height(row);
+    }
+    let right = columns
+        .last()
+        .map_or(0.0, |column| column.left + column.width);
+    Sheet {
+        width: (right + RIGHT + EDGE).max(WIDTH).ceil(),
+        height: (top + EDGE).ceil(),
+        shapes,
+    }
+}
+
+/// A column of panels, in pixels.
+struct Column {
+    /// Room for the labels left of the axes.
+    labels: f64,
+    /// Left edge of the axes.
+    left: f64,
+    /// Width of the axes.
+    width: f64,
+}
+
+/// The panels in rows and columns, with their ranges.
+struct Grid<'a> {
+    panels: &'a [Panel],
+    columns: usize,
+    x: Vec<Option<Range>>,
+    y: Vec<Option<Range>>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(figure: &'a Figure) -> Self {
+        let panels = figure.panels.as_slice();
+        let x =
+            |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.x_values()).collect() };
+        let y =
+            |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.y_values()).collect() };
+        Self {
+            panels,
+            columns: figure.columns.clamp(1, panels.len().max(1)),
+            x: panels
+                .iter()
+                .map(|p| axis::extent(p.x.scale, &x(p)))
+                .collect(),
+            y: panels
+                .iter()
+                .map(|p| axis::extent(p.y.scale, &y(p)))
+                .collect(),
+        }
+    }
+
+    fn rows(&self) -> usize {
+        self.panels.len().div_ceil(self.columns)
+    }
+
+    fn row(&self, row: usize) -> impl Iterator<Item = (usize, &'a Panel)> {
+        let panels = self.panels.iter().enumerate();
+        panels.skip(row * self.columns).take(self.columns)
+    }
+
+    fn height(&self) -> f64 {
+        match (self.rows(), self.columns) {
+            (1, 1) => ALONE,
+            (1, _) => BESIDE,
+            _ => STACKED,
+        }
+    }
+
+    /// The common range of the panels in the column that have the same horizontal axis.
+    fn x_range(&self, index: usize) -> Range {
+        let axis = &self.panels[index].x;
+        let column = (index % self.columns..self.panels.len()).step_by(self.columns);
+        let alike = column.filter(|&i| self.panels[i].x == *axis);
+        let extent = alike.filter_map(|i| self.x[i]);
+        axis::range(
+            axis,
+            extent.fold(None, |sum, one| Some(axis::union(sum, one))),
+            false,
+        )
+    }
+
+    /// The common range of the panels in the row that have the same vertical axis.
+    fn y_range(&self, index: usize) -> Range {
+        let axis = &self.panels[index].y;
+        let alike = self
+            .row(index / self.columns)
+            .filter(|(_, panel)| panel.y == *axis);
+        let extent = alike.filter_map(|(i, _)| self.y[i]);
+        axis::range(
+            axis,
+            extent.fold(None, |sum, one| Some(axis::union(sum, one))),
+            true,
+        )
+    }
+
+    fn y_ruler(&self, index: usize) -> Ruler {
+        let most = (self.height() / 33.0) as usize;
+        Ruler::new(self.panels[index].y.scale, self.y_range(index), most)
+    }
+
+    /// Whether the panel below carries the labels of this one's horizontal axis.
+    fn x_labels(&self, index: usize) -> bool {
+        let below = self.panels.get(index + self.columns);
+        below.is_none_or(|below| below.x != self.panels[index].x)
+    }
+
+    /// Whether the panel to the left carries the labels of this one's vertical axis.
+    fn y_labels(&self, index: usize) -> bool {
+        index.is_multiple_of(self.columns) || self.panels[index - 1].y != self.panels[index].y
+    }
+
+    /// The columns of the grid; their axes are equally wide.
+    fn columns(&self, rulers: &[Ruler]) -> Vec<Column> {
+        let mut labels = vec![0.0_f64; self.columns];
+        for (index, ruler) in rulers.iter().enumerate() {
+            let label = &mut labels[index % self.columns];
+            *label = label.max(label_width(ruler, self.y_labels(index)));
+        }
+        let gaps = COLUMN_GAP * (self.columns - 1) as f64;
+        let room = WIDTH - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
+        let width = (room / self.columns as f64).max(NARROWEST);
+        let mut left = EDGE;
+        let mut columns = Vec::new();
+        for labels in labels {
+            left += labels;
+            columns.push(Column {
+                labels,
+                left,
+                width,
+            });
+            left += width + COLUMN_GAP;
+        }
+        columns
+    }
+
+    fn title_height(&self, row: usize) -> f64 {
+        let titled = self.row(row).any(|(_, panel)| !panel.title.is_empty());
+        if titled { TITLE } else { 4.0 }
+    }
+
+    fn footer_height(&self, row: usize) -> f64 {
+        let labels = self.row(row).any(|(index, _)| self.x_labels(index));
+        let last = row + 1 == self.rows();
+        label_height(labels) + if last { 0.0 } else { ROW_GAP }
+    }
+
+    fn place(&self, index: usize, column: &Column, top: f64, y: Ruler) -> Placed<'a> {
+        let panel = &self.panels[index];
+        Placed {
+            panel,
+            frame: Frame {
+                left: column.left,
+                top,
+                width: column.width,
+                height: self.height(),
+            },
+            x: Ruler::across(panel.x.scale, self.x_range(index), column.width, SIZE),
+            y,
+            x_labels: self.x_labels(index),
+            y_labels: self.y_labels(index),
+            label_width: column.labels,
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The legend: one line or more above the panels, where it covers no data.
+
+use super::figure::Figure;
+use super::mark::Mark;
+use super::panel::{BAND_OPACITY, SIZE, SPAN};
+use super::shape::{Anchor, Frame, Ink, Point, Shape, Stroke, Words};
+use super::text;
+
+/// Length of the sample beside a label.
+const SAMPLE: f64 = 28.0;
+const SAMPLE_GAP: f64 = 6.0;
+const ENTRY_GAP: f64 = 18.0;
+const ROW: f64 = 18.0;
+
+/// The marks in the legend: labelled, and each label with the same look once.
+pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
+    let mut entries: Vec<&Mark> = Vec::new();
+    let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
+    for mark in marks.filter(|mark| !mark.label().is_empty()) {
+        if !entries.iter().any(|entry| alike(entry, mark)) {
+            entries.push(mark);
+        }
+    }
+    entries
+}
+
+/// Whether two marks have the same label and the same sample.
+fn alike(one: &Mark, other: &Mark) -> bool {
+    one.label() == other.label() && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
+}
+
+/// Draws the legend from `left`, `top` on, within a width; returns the shapes and their height.
+pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<Shape>, f64) {
+    let places = places(entries, width);
+    let mut shapes = Vec::new();
+    for (mark, (x, row)) in entries.iter().zip(&places) {
+        let (x, y) = (left + x, top + (*row as f64 + 0.5) * ROW);
+        shapes.extend(sample(mark, (x, y)));
+        let room = width - SAMPLE - SAMPLE_GAP;
+        let at = (x + SAMPLE + SAMPLE_GAP, y);
+        let size = text::fit(mark.label(), SIZE, room);
+        let words = Words::new(at, mark.label(), size, Anchor::Start);
+        shapes.push(Shape::Text(words));
+    }
+    let rows = places.last().map_or(0, |(_, row)| row + 1);
+    (shapes, rows as f64 * ROW)
+}
+
+/// Horizontal place and row of each entry: side by side if that fits, or else in even columns.
+fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
+    let need = |mark: &&Mark| SAMPLE + SAMPLE_GAP + text::width(mark.label(), SIZE) + ENTRY_GAP;
+    let needs: Vec<f64> = entries.iter().map(need).collect();
+    if needs.iter().sum::<f64>() <= width + ENTRY_GAP {
+        let starts = needs.iter().scan(0.0, |end, need| {
+            *end += need;
+            Some((*end - need, 0))
+        });
+        return starts.collect();
+    }
+    let widest = needs
+        .iter()
+        .fold(0.0, |widest: f64, &need| widest.max(need));
+    let columns = (((width + ENTRY_GAP) / widest) as usize).max(1);
+    // The same number of rows with the entries spread evenly over them.
+    let columns = entries.len().div_ceil(entries.len().div_ceil(columns));
+    let place = |index| ((index % columns) as f64 * widest, index / columns);
+    (0..entries.len()).map(place).collect()
+}
+
+/// A short piece of a mark, its left end in the middle of the row at `at`.
+fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
+    let line = vec![(x, y), (x + SAMPLE, y)];
+    let block = |ink| {
+        let (left, top) = (x, y - 0.4 * SIZE);
+        let frame = Frame {
+            left,
+            top,
+            width: SAMPLE,
+            height: 0.8 * SIZE,
+        };
+        vec![Shape::Area(frame.corners(), ink)]
+    };
+    match mark {
+        Mark::Line { style, .. }
+        | Mark::HorizontalLine { style, .. }
+        | Mark::VerticalLine { style, .. } => vec![Shape::Path(line, Stroke::of(style))],
+        Mark::Points { style, .. } => {
+            let stroke = Stroke::of(style);
+            let dot = |share| Shape::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
+            vec![dot(0.2), dot(0.5), dot(0.8)]
+        }
+        Mark::Band { colour, .. } => block(Ink::of(*colour).opacity(BAND_OPACITY)),
+        Mark::Span { .. } => block(SPAN),
+    }
+}

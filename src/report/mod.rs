@@ -1,0 +1,33 @@
+//! Figures of a fit: what they show, and their drawing as SVG.
+//!
+//! The way from data to picture runs through the files in this order: [`figures`] states what each
+//! standard figure shows, in the data model of [`figure`] and [`mark`]; `layout`, `panel`,
+//! `legend`, `axis` and `curve` turn it into plain shapes in pixels; [`svg`] writes the shapes.
+//! Only `svg` knows the plotting crate.
+//!
+//! ```
+//! use kmcfit::report::{render, Axis, Colour, Figure, Mark, Panel, Style};
+//!
+//! let t = [0.0, 1.0, 2.0];
+//! let figure = Figure::new("decay", "Free decay", "Displacement against time").panel(
+//!     Panel::new(Axis::linear("time t", "s"), Axis::linear("displacement y", "m"))
+//!         .mark(Mark::line("measured", &t, &[3.3, 2.1, -0.4], Style::new(Colour::Blue))),
+//! );
+//! assert!(render(&figure).contains("time t (s)"));
+//! ```
+
+mod axis;
+mod curve;
+pub mod figure;
+pub mod figures;
+mod layout;
+mod legend;
+pub mod mark;
+mod panel;
+mod shape;
+pub mod svg;
+mod text;
+
+pub use figure::{Axis, Figure, Panel, Scale};
+pub use mark::{Colour, Dash, Mark, Style};
+pub use svg::render;

@@ -1,0 +1,285 @@
+//! Draws one panel: grid, marks, axes.
+
+use super::axis::Ruler;
+use super::curve;
+use super::figure::Panel;
+use super::mark::{Colour, Dash, Mark, Style};
+use super::shape::{Anchor, Frame, Ink, Point, Shape, Stroke, Words};
+use super::text;
+
+/// Font size of labels and ticks, in pixels.
+pub(super) const SIZE: f64 = 12.0;
+const TICK_SIZE: f64 = 11.0;
+const TICK: f64 = 4.5;
+const MINOR_TICK: f64 = 2.5;
+/// Gap between ticks, their labels and the axis label.
+const GAP: f64 = 5.0;
+/// Dots beyond this number cover each other, and are drawn as one thick thinned line.
+const MOST_DOTS: usize = 2000;
+
+const AXIS: Ink = Ink::solid((51, 51, 51));
+const GRID: Ink = Ink::solid((228, 228, 228));
+pub(super) const SPAN: Ink = Ink::solid((238, 238, 238));
+pub(super) const BAND_OPACITY: f64 = 0.25;
+
+/// A panel in its place.
+pub(super) struct Placed<'a> {
+    pub panel: &'a Panel,
+    pub frame: Frame,
+    pub x: Ruler,
+    pub y: Ruler,
+    /// Whether tick labels and axis label are written, or left to the neighbour below.
+    pub x_labels: bool,
+    /// The same for the vertical axis and the neighbour to the left.
+    pub y_labels: bool,
+    /// Room for the labels left of the frame, common to a column so that its axis labels align.
+    pub label_width: f64,
+}
+
+/// Height needed below a frame for the labels of the horizontal axis.
+pub(super) fn label_height(labels: bool) -> f64 {
+    if labels {
+        TICK + 2.0 * GAP + TICK_SIZE + SIZE + 2.0
+    } else {
+        TICK
+    }
+}
+
+/// Width needed left of a frame for the labels of the vertical axis.
+pub(super) fn label_width(ruler: &Ruler, labels: bool) -> f64 {
+    if labels {
+        TICK + 2.0 * GAP + ruler.widest(TICK_SIZE) + SIZE + 2.0
+    } else {
+        TICK
+    }
+}
+
+impl Placed<'_> {
+    /// Everything in the panel, from back to front.
+    pub fn shapes(&self) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        self.spans(&mut shapes);
+        self.grid(&mut shapes);
+        for mark in &self.panel.marks {
+            self.mark(mark, &mut shapes);
+        }
+        self.axes(&mut shapes);
+        self.titles(&mut shapes);
+        shapes
+    }
+
+    fn x_pixel(&self, share: f64) -> f64 {
+        self.frame.left + share * self.frame.width
+    }
+
+    fn y_pixel(&self, share: f64) -> f64 {
+        self.frame.bottom() - share * self.frame.height
+    }
+
+    fn pixel(&self, x: f64, y: f64) -> Point {
+        (self.x_pixel(self.x.share(x)), self.y_pixel(self.y.share(y)))
+    }
+
+    fn pixels<'b>(&'b self, x: &'b [f64], y: &'b [f64]) -> impl Iterator<Item = Point> + 'b {
+        x.iter().zip(y).map(|(&x, &y)| self.pixel(x, y))
+    }
+
+    /// Spans lie behind the grid, whatever their order among the marks.
+    fn spans(&self, shapes: &mut Vec<Shape>) {
+        for mark in &self.panel.marks {
+            if let Mark::Span { from, to, .. } = mark {
+                let (from, to) = (self.x.share(*from), self.x.share(*to));
+                if from.is_nan() || to.is_nan() {
+                    continue;
+                }
+                let left = self.x_pixel(from.min(to).clamp(0.0, 1.0));
+                let width = self.x_pixel(from.max(to).clamp(0.0, 1.0)) - left;
+                let area = Frame {
+                    left,
+                    width,
+                    ..self.frame
+                };
+                shapes.push(Shape::Area(area.corners(), SPAN));
+            }
+        }
+    }
+
+    fn grid(&self, shapes: &mut Vec<Shape>) {
+        let stroke = Stroke::solid(GRID, 0.7);
+        for tick in &self.x.major {
+            shapes.push(self.rule_at_x(tick.share, stroke));
+        }
+        for tick in &self.y.major {
+            shapes.push(self.rule_at_y(tick.share, stroke));
+        }
+    }
+
+    fn rule_at_x(&self, share: f64, stroke: Stroke) -> Shape {
+        let x = self.x_pixel(share);
+        Shape::Path(vec![(x, self.frame.bottom()), (x, self.frame.top)], stroke)
+    }
+
+    fn rule_at_y(&self, share: f64, stroke: Stroke) -> Shape {
+        let y = self.y_pixel(share);
+        Shape::Path(vec![(self.frame.left, y), (self.frame.right(), y)], stroke)
+    }
+
+    fn mark(&self, mark: &Mark, shapes: &mut Vec<Shape>) {
+        match mark {
+            Mark::Line { x, y, style, .. } => self.line(x, y, style, shapes),
+            Mark::Points { x, y, style, .. } => self.points(x, y, style, shapes),
+            Mark::Band {
+                x,
+                low,
+                high,
+                colour,
+                ..
+            } => self.band(x, low, high, *colour, shapes),
+            Mark::Span { .. } => {}
+            Mark::HorizontalLine { y, style, .. } => {
+                let share = self.y.share(*y);
+                if (0.0..=1.0).contains(&share) {
+                    shapes.push(self.rule_at_y(share, Stroke::of(style)));
+                }
+            }
+            Mark::VerticalLine { x, style, .. } => {
+                let share = self.x.share(*x);
+                if (0.0..=1.0).contains(&share) {
+                    shapes.push(self.rule_at_x(share, Stroke::of(style)));
+                }
+            }
+        }
+    }
+
+    fn line(&self, x: &[f64], y: &[f64], style: &Style, shapes: &mut Vec<Shape>) {
+        for run in curve::runs(self.pixels(x, y)) {
+            // A reading between two gaps has no segment to show it.
+            if let [alone] = run[..] {
+                self.dot(alone, &style.width(2.0 * style.width), shapes);
+            }
+            for piece in curve::clip(&curve::thin(&run), &self.frame) {
+                shapes.push(Shape::Path(piece, Stroke::of(style)));
+            }
+        }
+    }
+
+    fn points(&self, x: &[f64], y: &[f64], style: &Style, shapes: &mut Vec<Shape>) {
+        if x.len().min(y.len()) > MOST_DOTS {
+            return self.line(x, y, &style.dash(Dash::Solid), shapes);
+        }
+        for run in curve::runs(self.pixels(x, y)) {
+            for point in run {
+                self.dot(point, style, shapes);
+            }
+        }
+    }
+
+    fn dot(&self, point: Point, style: &Style, shapes: &mut Vec<Shape>) {
+        if curve::inside(point, &self.frame) {
+            let stroke = Stroke::of(style);
+            shapes.push(Shape::Dot(point, stroke.width / 2.0, stroke.ink));
+        }
+    }
+
+    fn band(&self, x: &[f64], low: &[f64], high: &[f64], colour: Colour, shapes: &mut Vec<Shape>) {
+        let ink = Ink::of(colour).opacity(BAND_OPACITY);
+        let edges = self
+            .pixels(x, low)
+            .zip(self.pixels(x, high))
+            .collect::<Vec<_>>();
+        let drawable = |(low, high): &(Point, Point)| (low.0 + low.1 + high.1).is_finite();
+        for run in edges
+            .split(|edge| !drawable(edge))
+            .filter(|run| run.len() > 1)
+        {
+            let edge = |of: fn(&(Point, Point)) -> Point| {
+                let path = run.iter().map(of).collect::<Vec<_>>();
+                let path = curve::thin(&path).into_iter();
+                path.map(|point| curve::clamp(point, &self.frame))
+                    .collect::<Vec<_>>()
+            };
+            let mut outline = edge(|edge| edge.0);
+            outline.extend(edge(|edge| edge.1).into_iter().rev());
+            shapes.push(Shape::Area(outline, ink));
+        }
+    }
+
+    fn axes(&self, shapes: &mut Vec<Shape>) {
+        let mut outline = self.frame.corners();
+        outline.push(outline[0]);
+        shapes.push(Shape::Path(outline, Stroke::solid(AXIS, 0.8)));
+        for tick in &self.x.major {
+            self.x_tick(tick.share, TICK, shapes);
+            if self.x_labels {
+                let y = self.frame.bottom() + TICK + GAP + TICK_SIZE / 2.0;
+                let at = (self.x_pixel(tick.share), y);
+                shapes.push(words(at, &tick.label, TICK_SIZE, Anchor::Middle));
+            }
+        }
+        for tick in &self.y.major {
+            self.y_tick(tick.share, TICK, shapes);
+            if self.y_labels {
+                let at = (self.frame.left - TICK - GAP, self.y_pixel(tick.share));
+                shapes.push(words(at, &tick.label, TICK_SIZE, Anchor::End));
+            }
+        }
+        self.x
+            .minor
+            .iter()
+            .for_each(|&share| self.x_tick(share, MINOR_TICK, shapes));
+        self.y
+            .minor
+            .iter()
+            .for_each(|&share| self.y_tick(share, MINOR_TICK, shapes));
+    }
+
+    fn x_tick(&self, share: f64, length: f64, shapes: &mut Vec<Shape>) {
+        let (x, y) = (self.x_pixel(share), self.frame.bottom());
+        let path = vec![(x, y), (x, y + length)];
+        shapes.push(Shape::Path(path, Stroke::solid(AXIS, 0.8)));
+    }
+
+    fn y_tick(&self, share: f64, length: f64, shapes: &mut Vec<Shape>) {
+        let (x, y) = (self.frame.left, self.y_pixel(share));
+        let path = vec![(x, y), (x - length, y)];
+        shapes.push(Shape::Path(path, Stroke::solid(AXIS, 0.8)));
+    }
+
+    /// Axis labels and heading; smaller where they would run into a neighbour.
+    fn titles(&self, shapes: &mut Vec<Shape>) {
+        let Frame {
+            left,
+            top,
+            width,
+            height,
+        } = self.frame;
+        if self.x_labels {
+            let y = self.frame.bottom() + label_height(true) - SIZE / 2.0;
+            let caption = self.panel.x.caption();
+            let size = text::fit(&caption, SIZE, width);
+            let at = (left + width / 2.0, y);
+            shapes.push(words(at, &caption, size, Anchor::Middle));
+        }
+        if self.y_labels {
+            let caption = self.panel.y.caption();
+            let size = text::fit(&caption, SIZE, height);
+            let at = (left - self.label_width + SIZE / 2.0, top + height / 2.0);
+            let caption = Words::new(at, caption, size, Anchor::Middle);
+            shapes.push(Shape::Text(Words {
+                upward: true,
+                ..caption
+            }));
+        }
+        let size = text::fit(&self.panel.title, SIZE, 0.9 * width);
+        let at = (left, top - 0.5 * SIZE - GAP);
+        let title = Words::new(at, self.panel.title.as_str(), size, Anchor::Start);
+        shapes.push(Shape::Text(Words {
+            bold: true,
+            ..title
+        }));
+    }
+}
+
+fn words(at: Point, text: &str, size: f64, anchor: Anchor) -> Shape {
+    Shape::Text(Words::new(at, text, size, anchor))
+}

@@ -1,0 +1,126 @@
+//! Small helpers for text: widths, superscripts, numbers beside ticks, and what XML allows.
+
+/// Estimated width of `text` in pixels at a font size; on the wide side, since a generic
+/// sans-serif may turn out wide or narrow.
+pub(super) fn width(text: &str, size: f64) -> f64 {
+    text.chars().map(|c| size * em(c)).sum()
+}
+
+/// Estimated advance of one character in units of the font size.
+fn em(c: char) -> f64 {
+    match c {
+        'i' | 'j' | 'l' | '.' | ',' | ':' | ';' | '\'' | '|' | '!' | ' ' => 0.33,
+        '(' | ')' | '[' | ']' | '/' | 'f' | 't' | 'r' | '-' => 0.42,
+        '⁰'..='⁹' | '²' | '³' | '¹' | '⁻' => 0.42,
+        'm' | 'w' | 'M' | 'W' | '×' | '−' => 0.9,
+        'A'..='Z' => 0.7,
+        _ => 0.63,
+    }
+}
+
+/// An integer in superscript characters: -4 gives `⁻⁴`.
+pub(super) fn superscript(exponent: i64) -> String {
+    let raise = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '0' => '⁰',
+        '4'..='9' => char::from_u32('⁴' as u32 + c as u32 - '4' as u32).unwrap_or(c),
+        other => other,
+    };
+    exponent.to_string().chars().map(raise).collect()
+}
+
+/// A power of ten: `10⁻⁴`.
+pub(super) fn decade(exponent: i64) -> String {
+    format!("10{}", superscript(exponent))
+}
+
+/// A number beside a tick, with as many digits as steps of `step` need; `largest` is the largest
+/// magnitude on the axis, which decides for all ticks alike whether a power of ten is split off.
+pub(super) fn tick(value: f64, step: f64, largest: f64) -> String {
+    let order = magnitude(largest);
+    let places = magnitude(step);
+    // Zero comes out of index times step exactly, but may carry a sign.
+    let value = value + 0.0;
+    if (-3..5).contains(&order) {
+        return minus(&format!("{value:.*}", digits(-places)));
+    }
+    if value == 0.0 {
+        return "0".to_string();
+    }
+    let mantissa = value / 10f64.powi(order as i32);
+    let mantissa = minus(&format!("{mantissa:.*}", digits(order - places)));
+    format!("{mantissa}×{}", decade(order))
+}
+
+/// The decimal order of magnitude; the small shift keeps powers of ten from falling below.
+fn magnitude(value: f64) -> i64 {
+    (value.abs().log10() + 1e-9).floor() as i64
+}
+
+fn digits(places: i64) -> usize {
+    places.clamp(0, 15) as usize
+}
+
+/// Writes a true minus sign.
+fn minus(number: &str) -> String {
+    number.replace('-', "−")
+}
+
+/// The font size, at most `size`, at which `text` fits into `room` pixels; never below half.
+pub(super) fn fit(text: &str, size: f64, room: f64) -> f64 {
+    let share = room / width(text, size).max(1.0);
+    size * share.clamp(0.5, 1.0)
+}
+
+/// Leaves out the characters that XML forbids.
+pub(super) fn clean(text: &str) -> String {
+    let allowed = |c: &char| {
+        (!c.is_control() || *c == '\n' || *c == '\t') && !matches!(c, '\u{fffe}' | '\u{ffff}')
+    };
+    text.chars().filter(allowed).collect()
+}
+
+/// Escapes text for XML content and attributes.
+pub(super) fn escape(text: &str) -> String {
+    clean(text)
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&apos;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_are_raised() {
+        assert_eq!(decade(-4), "10⁻⁴");
+        assert_eq!(decade(0), "10⁰");
+        assert_eq!(decade(12), "10¹²");
+        assert_eq!(superscript(1234567890), "¹²³⁴⁵⁶⁷⁸⁹⁰");
+    }
+
+    #[test]
+    fn ticks_have_the_digits_of_their_step() {
+        assert_eq!(tick(-0.5, 0.5, 2.0), "−0.5");
+        assert_eq!(tick(2.0, 0.5, 2.0), "2.0");
+        assert_eq!(tick(15.0, 5.0, 25.0), "15");
+        assert_eq!(tick(-0.0, 0.1, 1.0), "0.0");
+        assert_eq!(tick(0.0, 1e6, 5e6), "0");
+        assert_eq!(tick(1.5e6, 5e5, 2e6), "1.5×10⁶");
+        assert_eq!(tick(-2e-5, 1e-5, 3e-5), "−2×10⁻⁵");
+    }
+
+    #[test]
+    fn text_is_fit_for_xml() {
+        assert_eq!(
+            escape("a<b & \"c\"\u{0}\u{1b}"),
+            "a&lt;b &amp; &quot;c&quot;"
+        );
+    }
+}

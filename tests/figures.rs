@@ -1,0 +1,167 @@
+//! The standard figures as SVG documents: well-formed, stable, small, and safe with any data.
+
+use kmcfit::report::figures::{
+    FunctionCurve, GradientCurve, RatioCurves, convergence, functions, gradient_error, motion,
+    observation, ratios,
+};
+use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
+
+/// All standard figures from one series, used as values of everything.
+fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
+    let curve = FunctionCurve {
+        band: Some((y, t)),
+        start: Some(t),
+        truth: Some(y),
+        ..FunctionCurve::new("mass m", "kg", y)
+    };
+    let gradient = |nodes, adjoint| GradientCurve {
+        nodes,
+        adjoint,
+        step: t,
+        error: y,
+    };
+    let found = RatioCurves {
+        k_over_m: y,
+        c_over_m: t,
+        frequency: y,
+        damping_ratio: y,
+    };
+    vec![
+        observation(&[("displacement y", "m", t, y), ("velocity v", "m/s", t, t)]),
+        convergence(t, y, t),
+        motion(t, y, &[(0, t, y), (10, t, t)]),
+        functions(t, &[curve, curve, curve]),
+        gradient_error(&[gradient(1000, "discrete"), gradient(2000, "continuous")]),
+        ratios(t, &found, Some(&found)),
+    ]
+}
+
+fn wave(count: usize) -> (Vec<f64>, Vec<f64>) {
+    let t: Vec<f64> = (0..count).map(|i| 25.0 * i as f64 / count as f64).collect();
+    let y = t.iter().map(|t| 3.3 * t.cos()).collect();
+    (t, y)
+}
+
+/// Parses the document, and checks that nothing of it has lost its number.
+fn check(svg: &str) {
+    let document = roxmltree::Document::parse(svg).expect("well-formed");
+    let root = document.root_element();
+    assert_eq!(root.attribute("role"), Some("img"));
+    assert!(root.attribute("viewBox").is_some());
+    let children: Vec<_> = root.children().filter(|node| node.is_element()).collect();
+    assert_eq!(children[0].tag_name().name(), "title");
+    assert_eq!(children[1].tag_name().name(), "desc");
+    for node in document.descendants() {
+        for attribute in node.attributes() {
+            let value = attribute.value();
+            assert!(!value.contains("NaN") && !value.contains("inf"), "{value}");
+        }
+    }
+}
+
+#[test]
+fn standard_figures_are_well_formed_and_stable() {
+    let (t, y) = wave(500);
+    let again = standard(&t, &y);
+    for (figure, again) in standard(&t, &y).iter().zip(&again) {
+        let svg = render(figure);
+        check(&svg);
+        assert_eq!(svg, render(again), "{} differs from itself", figure.name);
+    }
+}
+
+#[test]
+fn any_data_give_a_figure() {
+    let ugly = [
+        vec![],
+        vec![1.0],
+        vec![0.0; 5],
+        vec![1.0; 5],
+        vec![-1.0; 5],
+        vec![f64::NAN; 5],
+        vec![f64::INFINITY, 1.0, f64::NEG_INFINITY, f64::NAN, 2.0],
+        vec![f64::MAX, f64::MIN, 1.0],
+        vec![1e300, -1e300, 0.0],
+        vec![5e-324, 1e-310, 0.0],
+        vec![1e15, 1e15 + 1.0],
+    ];
+    for x in &ugly {
+        for y in &ugly {
+            standard(x, y)
+                .iter()
+                .for_each(|figure| check(&render(figure)));
+        }
+    }
+}
+
+#[test]
+fn figures_without_content_are_documents_too() {
+    check(&render(&Figure::new("", "", "")));
+    check(&render(&observation(&[])));
+    check(&render(&gradient_error(&[])));
+    check(&render(&functions(&[], &[])));
+    check(&render(&ratios(&[], &RatioCurves::default(), None)));
+    check(&render(&Figure::new("", "", "").columns(0).panel(
+        Panel::new(
+            Axis::linear("", "").limits(1.0, 1.0),
+            Axis::log("", "").limits(-1.0, f64::NAN),
+        ),
+    )));
+}
+
+#[test]
+fn text_is_escaped_everywhere() {
+    let text = "a<b & \"c\" 'd' \u{1}";
+    let t = [0.0, 1.0];
+    let panel = Panel::new(Axis::linear(text, text), Axis::linear(text, text))
+        .title(text)
+        .mark(Mark::line(text, &t, &t, Style::new(Colour::Blue)))
+        .mark(Mark::span(text, 0.2, f64::INFINITY))
+        .mark(Mark::horizontal(text, 0.5, Style::nth(1)))
+        .mark(Mark::vertical(text, f64::NAN, Style::nth(2)))
+        .mark(Mark::band(text, &t, &t, &t, Colour::Green));
+    let svg = render(&Figure::new("name", text, text).panel(panel));
+    check(&svg);
+    let document = roxmltree::Document::parse(&svg).expect("well-formed");
+    let texts = document.descendants().filter(|node| node.is_text());
+    let found = texts.filter(|node| node.text().is_some_and(|s| s.contains("a<b & \"c\" 'd'")));
+    assert_eq!(found.count(), 2 + 5 + 3);
+}
+
+#[test]
+fn decades_are_labelled_in_superscripts() {
+    let iterations: Vec<f64> = (1..=1000).map(f64::from).collect();
+    let cost: Vec<f64> = iterations.iter().map(|i| 0.8 * i.powf(-1.3)).collect();
+    let svg = render(&convergence(&iterations, &cost, &cost));
+    for label in ["10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰", "10¹", "10²", "10³"] {
+        assert!(
+            svg.contains(&format!(">\n{label}\n<")),
+            "{label} is missing"
+        );
+    }
+    assert!(!svg.contains(">\n10⁴\n<") && !svg.contains(">\n10⁻⁵\n<"));
+}
+
+#[test]
+fn long_series_make_small_files_and_keep_their_spikes() {
+    let (t, mut y) = wave(128_000);
+    let dull = render(&motion(&t, &y, &[(0, &t, &y)]));
+    y[100_001] = 3.35;
+    let spiked = render(&motion(&t, &y, &[(0, &t, &y)]));
+    assert_ne!(dull, spiked);
+    let (t, y) = wave(2000);
+    let snapshots = [0, 10, 30, 100, 300, 1000].map(|i| (i, t.as_slice(), y.as_slice()));
+    for svg in [dull, spiked, render(&motion(&t, &y, &snapshots))] {
+        assert!(svg.len() < 200_000, "{} bytes", svg.len());
+    }
+}
+
+#[test]
+fn equal_axes_share_their_labels() {
+    let (t, y) = wave(50);
+    let curve = FunctionCurve::new("mass m", "kg", &y);
+    let svg = render(&functions(&t, &[curve, curve]));
+    assert_eq!(svg.matches("time t (s)").count(), 1);
+    assert_eq!(svg.matches("mass m (kg)").count(), 2);
+    assert_eq!(svg.matches(">\nfound\n<").count(), 1);
+}
