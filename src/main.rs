@@ -1,1 +1,7 @@
-fn main() {}
+//! The `kmcfit` program: arguments in, exit code out.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    kmcfit::cli::main()
+}

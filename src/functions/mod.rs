@@ -9,11 +9,13 @@ mod collection;
 mod design;
 mod gram;
 mod quantity;
+mod ratios;
 
 pub use collection::Functions;
 pub use design::Design;
 pub use gram::Gram;
 pub use quantity::Quantity;
+pub use ratios::Ratios;
 
 /// One coefficient function and where its search starts.
 #[derive(Debug, Clone)]

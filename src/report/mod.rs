@@ -1,4 +1,4 @@
-//! Figures of a fit: what they show, and their drawing as SVG.
+//! What a run leaves behind: tables, figures, and the result document; imported by the cli alone.
 //!
 //! The way from data to picture runs through the files in this order: [`figures`] states what each
 //! standard figure shows, in the data model of [`figure`] and [`mark`]; `layout`, `panel`,
@@ -17,17 +17,26 @@
 //! ```
 
 mod axis;
+mod csv;
 mod curve;
+pub mod document;
 pub mod figure;
 pub mod figures;
+mod files;
 mod layout;
 mod legend;
 pub mod mark;
 mod panel;
+mod predict;
+mod run;
 mod shape;
 pub mod svg;
 mod text;
 
+pub use csv::CsvTable;
+pub use files::{OutputFolder, write_whole};
+pub use predict::{PredictedMotion, predict};
+pub use run::{Run, json};
 pub use figure::{Axis, Figure, Panel, Scale};
 pub use mark::{Colour, Dash, Mark, Style};
 pub use svg::render;

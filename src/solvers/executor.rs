@@ -3,7 +3,7 @@
 use super::lbfgs::Lbfgs;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
-use super::recorder::{Recorder, Row, Snapshot};
+use super::recorder::{Recorder, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Solver, Step};
 use crate::dynamics::{Breakdown, Cause};
@@ -31,6 +31,13 @@ pub struct Fit {
     pub counts: Counts,
     /// Wall-clock time.
     pub elapsed: Duration,
+}
+
+impl Fit {
+    /// `J / J0`.
+    pub fn cost_ratio(&self) -> f64 {
+        ratio(self.best.evaluation.cost, self.initial_cost)
+    }
 }
 
 /// Fits `problem` from `start`; `observe` is called after every iteration.

@@ -1,0 +1,172 @@
+//! `kmcfit check`
+
+use super::{Failure, NOT_CONVERGED, OK, print, unwritable};
+use crate::config::{Model, ModelFile, Purpose, build};
+use crate::objective::GradientKind;
+use crate::report::figures::{self, GradientCurve};
+use crate::report::{CsvTable, OutputFolder, render};
+use std::path::PathBuf;
+
+/// Read and validate a model, then test its gradient against differences.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Model file (YAML).
+    model: PathBuf,
+    /// Numbers of nodes to check at, separated by commas [default: the model's].
+    #[arg(long, value_delimiter = ',', value_name = "N,N,...")]
+    nodes: Vec<usize>,
+    /// Only read and validate.
+    #[arg(long)]
+    no_gradient: bool,
+    /// Folder for the errors as a table and a figure.
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// Step sizes of the check: two per decade from 1 to 1e-10.
+fn steps() -> Vec<f64> {
+    (0..=20).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect()
+}
+
+/// The discrete gradient passes if its error falls below this at some step. An error in the
+/// gradient is a floor; an exact gradient is only limited by truncation and rounding, which leave
+/// 1e-7 or less at N = 128,000.
+const PASS: f64 = 1e-6;
+
+/// The errors of one gradient on one grid.
+struct Curve {
+    nodes: usize,
+    kind: GradientKind,
+    step: Vec<f64>,
+    error: Vec<f64>,
+}
+
+impl Curve {
+    fn best(&self) -> (f64, f64) {
+        let pairs = self.step.iter().copied().zip(self.error.iter().copied());
+        pairs.fold((f64::NAN, f64::INFINITY), |best, pair| {
+            if pair.1 < best.1 { pair } else { best }
+        })
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let file = ModelFile::read(&arguments.model)?;
+    let model = build(&file, Purpose::Fit)?;
+    for warning in &model.warnings {
+        eprintln!("warning: {warning}");
+    }
+    print(&describe(&model));
+    if arguments.no_gradient || model.problem.functions.parameters() == 0 {
+        return Ok(OK);
+    }
+    let folder = arguments.out.as_deref().map(OutputFolder::prepare).transpose()?;
+    let mut curves = Vec::new();
+    print(&format!(
+        "{:>8}  {:<10}  {:>12}  {:>9}\n",
+        "nodes", "adjoint", "least error", "at step"
+    ));
+    for nodes in node_counts(arguments) {
+        let model = build(&file, Purpose::Check { nodes })?;
+        for curve in check(&model)? {
+            let (step, error) = curve.best();
+            print(&format!(
+                "{:>8}  {:<10}  {error:>12.1e}  {step:>9.1e}\n",
+                curve.nodes,
+                curve.kind.name()
+            ));
+            curves.push(curve);
+        }
+    }
+    if let Some(folder) = folder {
+        write(&folder, &curves).map_err(|error| unwritable(folder.path(), &error))?;
+        print(&format!("results in {}\n", folder.path().display()));
+    }
+    Ok(verdict(&curves))
+}
+
+fn node_counts(arguments: &Arguments) -> Vec<Option<usize>> {
+    match arguments.nodes.is_empty() {
+        true => vec![None],
+        false => arguments.nodes.iter().copied().map(Some).collect(),
+    }
+}
+
+fn describe(model: &Model) -> String {
+    let grid = &model.problem.oscillator.grid;
+    format!(
+        "{}: {} nodes over {} s ({}), {} parameters, {}\n",
+        model.title,
+        grid.nodes(),
+        grid.duration(),
+        model.problem.oscillator.method.name(),
+        model.problem.functions.parameters(),
+        model.settings.solver.name(),
+    )
+}
+
+fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
+    let problem = &model.problem;
+    let mut kinds = vec![GradientKind::Discrete];
+    if problem.supports_continuous() {
+        kinds.push(GradientKind::Continuous);
+    }
+    let theta = problem.functions.start();
+    kinds
+        .into_iter()
+        .map(|kind| {
+            let errors = problem
+                .gradient_error(&theta, kind, &steps())
+                .map_err(|b| Failure::Numerical(format!("the start has no motion: {b}")))?;
+            Ok(Curve {
+                nodes: problem.oscillator.grid.nodes(),
+                kind,
+                step: errors.iter().map(|e| e.step).collect(),
+                error: errors.iter().map(|e| e.error).collect(),
+            })
+        })
+        .collect()
+}
+
+fn verdict(curves: &[Curve]) -> u8 {
+    let failed: Vec<&Curve> = (curves.iter())
+        .filter(|c| c.kind == GradientKind::Discrete && !(c.best().1 <= PASS))
+        .collect();
+    if failed.is_empty() {
+        print(&format!("the discrete gradient is exact: least error below {PASS:.0e}\n"));
+        return OK;
+    }
+    for curve in failed {
+        eprintln!(
+            "failed: the discrete gradient on {} nodes has an error of {:.1e} at best",
+            curve.nodes,
+            curve.best().1
+        );
+    }
+    NOT_CONVERGED
+}
+
+fn write(folder: &OutputFolder, curves: &[Curve]) -> std::io::Result<()> {
+    let drawn: Vec<GradientCurve> = (curves.iter())
+        .map(|c| GradientCurve {
+            nodes: c.nodes,
+            adjoint: c.kind.name(),
+            step: &c.step,
+            error: &c.error,
+        })
+        .collect();
+    folder.write("figures/gradient.svg", &render(&figures::gradient_error(&drawn)))?;
+    let mut table = CsvTable::new().column("step", steps());
+    for curve in curves {
+        // Steps that broke down are missing from a curve.
+        let error_at = |step: &f64| {
+            let i = curve.step.iter().position(|s| s == step);
+            i.map_or(f64::NAN, |i| curve.error[i])
+        };
+        table = table.column(
+            format!("error_{}_{}", curve.kind.name(), curve.nodes),
+            steps().iter().map(error_at).collect(),
+        );
+    }
+    folder.write("gradient.csv", &table.to_csv())
+}

@@ -1,0 +1,83 @@
+//! `kmcfit fit`
+
+use super::progress::Progress;
+use super::{Failure, exit_code, interrupt, print, unwritable};
+use crate::config::{Model, ModelFile, Purpose, build};
+use crate::report::{OutputFolder, Run, json, predict, summary};
+use crate::solvers::{Fit, fit};
+use std::path::{Path, PathBuf};
+
+/// Fit the functions of a model to its data; write result, tables and figures.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Model file (YAML).
+    model: PathBuf,
+    /// Folder for the results [default: runs/NAME].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Print the result document instead of the summary.
+    #[arg(long)]
+    json: bool,
+    /// Write no figures.
+    #[arg(long)]
+    no_report: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let file = ModelFile::read(&arguments.model)?;
+    let mut model = build(&file, Purpose::Fit)?;
+    let folder = OutputFolder::prepare(&output_path(arguments))?;
+    for warning in &model.warnings {
+        eprintln!("warning: {warning}");
+    }
+    model.settings.interrupt = Some(interrupt::flag());
+    let found = search(&model)?;
+    let predictions = predictions(&model, &found)?;
+    let run = Run {
+        model: &model,
+        fit: &found,
+        predictions: &predictions,
+    };
+    let document = run.document();
+    run.write(&folder, !arguments.no_report)
+        .map_err(|error| unwritable(folder.path(), &error))?;
+    if arguments.json {
+        print(&json(&document));
+    } else {
+        print(&summary(&document));
+        print(&format!("results in {}\n", folder.path().display()));
+    }
+    Ok(exit_code(found.outcome.status))
+}
+
+fn search(model: &Model) -> Result<Fit, Failure> {
+    let progress = Progress::new(model.settings.stopping.iterations);
+    let start = model.problem.functions.start();
+    let result = fit(&model.problem, &start, &model.settings, &mut |row| progress.show(row));
+    progress.clear();
+    result.map_err(|breakdown| {
+        Failure::Numerical(format!("the start has no motion: {breakdown}"))
+    })
+}
+
+fn predictions(
+    model: &Model,
+    found: &Fit,
+) -> Result<Vec<crate::report::document::Prediction>, Failure> {
+    let motions = predict(
+        &model.problem.oscillator,
+        &found.best.evaluation.device,
+        model.truth.as_ref(),
+        &model.predictions,
+    )
+    .map_err(|breakdown| Failure::Numerical(format!("a prediction has no motion: {breakdown}")))?;
+    Ok(motions.into_iter().map(|m| m.summary).collect())
+}
+
+/// `runs/NAME` with the name of the model file.
+fn output_path(arguments: &Arguments) -> PathBuf {
+    arguments.out.clone().unwrap_or_else(|| {
+        let name = arguments.model.file_stem().unwrap_or_default();
+        Path::new("runs").join(name)
+    })
+}

@@ -1,0 +1,102 @@
+//! The command line: one file per command, no numerics.
+
+mod check;
+mod fit;
+mod interrupt;
+mod predict;
+mod progress;
+mod simulate;
+
+use crate::error::{InputError, Place};
+use crate::solvers::Status;
+use clap::{Parser, Subcommand};
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Finds the time-varying mass, damping and stiffness of an oscillator from its measured motion.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Fit(fit::Arguments),
+    Simulate(simulate::Arguments),
+    Check(check::Arguments),
+    Predict(predict::Arguments),
+}
+
+/// Everything is as asked for.
+const OK: u8 = 0;
+/// The input cannot be used.
+const BAD_INPUT: u8 = 2;
+/// Ended otherwise than asked for; results are written.
+const NOT_CONVERGED: u8 = 3;
+/// Interrupted by Ctrl-C; the best so far is written.
+const INTERRUPTED: u8 = 130;
+
+/// Why a command did not come to its end.
+#[derive(Debug)]
+enum Failure {
+    /// The input cannot be used.
+    Input(InputError),
+    /// Numerical trouble before there was a result, in one sentence.
+    Numerical(String),
+}
+
+impl From<InputError> for Failure {
+    fn from(error: InputError) -> Self {
+        Failure::Input(error)
+    }
+}
+
+/// Runs the program on the arguments of the process.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match arguments.command {
+        Command::Fit(arguments) => fit::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Predict(arguments) => predict::run(&arguments),
+    };
+    ExitCode::from(match result {
+        Ok(code) => code,
+        Err(Failure::Input(error)) => {
+            eprintln!("error: {error}");
+            BAD_INPUT
+        }
+        Err(Failure::Numerical(reason)) => {
+            eprintln!("failed: {reason}");
+            NOT_CONVERGED
+        }
+    })
+}
+
+fn exit_code(status: Status) -> u8 {
+    match status {
+        Status::Converged | Status::Completed => OK,
+        Status::Interrupted => INTERRUPTED,
+        Status::MaxIterations
+        | Status::TimeLimit
+        | Status::Stalled
+        | Status::Infeasible
+        | Status::Failed => NOT_CONVERGED,
+    }
+}
+
+/// A failure to write, as an input error about where the output should go.
+fn unwritable(path: &Path, error: &io::Error) -> InputError {
+    InputError::new(Place::Argument("--out".into()), "the results cannot be written")
+        .found(format!("{}: {error}", path.display()))
+        .expected("a place that can be written to")
+}
+
+/// Prints results; a reader that has gone away (`| head`) is no error.
+fn print(text: &str) {
+    use io::Write;
+    let _ = io::stdout().write_all(text.as_bytes());
+}

@@ -1,0 +1,85 @@
+//! `kmcfit predict`
+
+use super::{Failure, OK, print, unwritable};
+use crate::dynamics::State;
+use crate::error::{InputError, Place};
+use crate::report::{
+    CsvTable, FinishedRun, OutputFolder, PredictedMotion, figures, json, predict, prediction_table,
+    render,
+};
+use std::path::PathBuf;
+
+/// Predict the free motion of a found device from other initial states.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of a finished run.
+    run: PathBuf,
+    /// Initial displacement (m) and velocity (m/s); may be given again.
+    #[arg(long, value_name = "Y,V", required = true, allow_hyphen_values = true)]
+    initial: Vec<String>,
+    /// Folder for the motions as a table and a figure.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Print the predictions as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let states: Vec<State> = arguments
+        .initial
+        .iter()
+        .map(|text| state(text))
+        .collect::<Result<_, _>>()?;
+    let run = FinishedRun::open(&arguments.run)?;
+    let folder = arguments.out.as_deref().map(OutputFolder::prepare).transpose()?;
+    let motions = predict(&run.oscillator, &run.device, run.truth.as_ref(), &states)
+        .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
+    if let Some(folder) = folder {
+        write(&folder, &run.oscillator.grid.times(), &motions)
+            .map_err(|error| unwritable(folder.path(), &error))?;
+    }
+    let summaries: Vec<_> = motions.into_iter().map(|m| m.summary).collect();
+    match arguments.json {
+        true => print(&json(&summaries)),
+        false => print(&prediction_table(&summaries)),
+    }
+    Ok(OK)
+}
+
+fn state(text: &str) -> Result<State, InputError> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|part| part.trim().parse().ok())
+        .filter(|x: &f64| x.is_finite())
+        .collect();
+    match numbers.as_slice() {
+        &[displacement, velocity] if text.split(',').count() == 2 => Ok(State {
+            displacement,
+            velocity,
+        }),
+        _ => Err(InputError::new(
+            Place::Argument("--initial".into()),
+            "this is no initial state",
+        )
+        .found(format!("`{text}`"))
+        .expected("two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1")),
+    }
+}
+
+fn write(
+    folder: &OutputFolder,
+    times: &[f64],
+    motions: &[PredictedMotion],
+) -> std::io::Result<()> {
+    let mut table = CsvTable::new().column("t_s", times.to_vec());
+    for (i, motion) in motions.iter().enumerate() {
+        table = table.column(format!("y_m_{}", i + 1), motion.motion.displacement.clone());
+        if let Some(truth) = &motion.truth {
+            table = table.column(format!("true_y_m_{}", i + 1), truth.displacement.clone());
+        }
+    }
+    folder.write("predictions.csv", &table.to_csv())?;
+    let figure = figures::predictions(times, motions);
+    folder.write("figures/predictions.svg", &render(&figure))
+}

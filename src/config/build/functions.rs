@@ -1,0 +1,143 @@
+//! Functions: basis, start, fixed part; and the truth.
+
+use super::QUANTITIES;
+use super::on_grid::column_on_grid;
+use crate::config::ModelFile;
+use crate::config::NumberOrColumn;
+use crate::config::spec::{Basis, FunctionSpec};
+use crate::dynamics::{Device, Grid};
+use crate::error::InputError;
+use crate::functions::{CoefficientFunction, Quantity};
+
+/// All functions on the grid, mass first.
+pub(super) fn build(
+    file: &ModelFile,
+    grid: &Grid,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<CoefficientFunction>, InputError> {
+    let list: Vec<CoefficientFunction> = QUANTITIES
+        .into_iter()
+        .map(|quantity| function(file, grid, quantity))
+        .collect::<Result<_, _>>()?;
+    if list.iter().all(|f| f.parameters() == 0) {
+        warnings.push("every function is fixed, so there is nothing to fit".into());
+    }
+    Ok(list)
+}
+
+fn spec(file: &ModelFile, quantity: Quantity) -> &FunctionSpec {
+    match quantity {
+        Quantity::Mass => &file.spec.functions.mass,
+        Quantity::Damping => &file.spec.functions.damping,
+        Quantity::Stiffness => &file.spec.functions.stiffness,
+    }
+}
+
+fn function(
+    file: &ModelFile,
+    grid: &Grid,
+    quantity: Quantity,
+) -> Result<CoefficientFunction, InputError> {
+    let key = format!("functions.{}", quantity.name());
+    let spec = spec(file, quantity);
+    match (&spec.fixed, &spec.start, spec.basis) {
+        (Some(_), Some(_), _) => Err(file
+            .error_at(&format!("{key}.start"), "a fixed function has no start")
+            .expected("either `fixed` or `start`")),
+        (Some(fixed), None, _) => {
+            let values = values(file, grid, &format!("{key}.fixed"), fixed)?;
+            positive_mass(file, quantity, &format!("{key}.fixed"), &values)?;
+            Ok(CoefficientFunction::fixed(quantity, values))
+        }
+        (None, None, _) => Err(file
+            .error_at(&key, "this function has neither a start nor a fixed value")
+            .expected("`start` for a function to be fitted, `fixed` for a known one")),
+        (None, Some(_), None) => Err(file
+            .error_at(&key, "a function to be fitted needs a basis")
+            .expected(format!("`basis`, one of {}", basis_names()))),
+        (None, Some(start), Some(basis)) => free(file, grid, quantity, start, basis),
+    }
+}
+
+fn free(
+    file: &ModelFile,
+    grid: &Grid,
+    quantity: Quantity,
+    start: &NumberOrColumn,
+    basis: Basis,
+) -> Result<CoefficientFunction, InputError> {
+    let key = format!("functions.{}.start", quantity.name());
+    match (basis, start) {
+        (Basis::Nodal, _) => {
+            let values = values(file, grid, &key, start)?;
+            positive_mass(file, quantity, &key, &values)?;
+            Ok(CoefficientFunction::nodal(quantity, values))
+        }
+        (Basis::Constant, NumberOrColumn::Number(value)) => {
+            positive_mass(file, quantity, &key, &[value.0])?;
+            Ok(CoefficientFunction::constant(quantity, value.0, grid.nodes()))
+        }
+        (Basis::Constant, NumberOrColumn::Column(_)) => Err(file
+            .error_at(&key, "the basis `constant` has one value, not a column of them")
+            .found("a column of a file")
+            .expected("a number")),
+    }
+}
+
+fn values(
+    file: &ModelFile,
+    grid: &Grid,
+    key: &str,
+    given: &NumberOrColumn,
+) -> Result<Vec<f64>, InputError> {
+    match given {
+        NumberOrColumn::Number(value) => Ok(vec![value.0; grid.nodes()]),
+        NumberOrColumn::Column(c) => column_on_grid(file, &c.data.0, &c.column.0, grid)
+            .map_err(|error| error.hint(format!("asked for by {key} of the model"))),
+    }
+}
+
+/// The equation of motion needs a positive mass everywhere.
+fn positive_mass(
+    file: &ModelFile,
+    quantity: Quantity,
+    key: &str,
+    values: &[f64],
+) -> Result<(), InputError> {
+    let broken = values.iter().position(|m| *m <= 0.0);
+    match broken {
+        Some(i) if quantity == Quantity::Mass => Err(file
+            .error_at(key, "the mass must be positive at all times")
+            .found(match values.len() {
+                1 => values[i].to_string(),
+                _ => format!("{} at node {i}", values[i]),
+            })
+            .expected("a number greater than 0, in kg")),
+        _ => Ok(()),
+    }
+}
+
+fn basis_names() -> String {
+    let names: Vec<&str> = Basis::ALL.iter().map(|(name, _)| *name).collect();
+    names.join(", ")
+}
+
+/// The true device on the grid, where the model names it.
+pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, InputError> {
+    let Some(spec) = &file.spec.truth else {
+        return Ok(None);
+    };
+    let column = |quantity: Quantity| {
+        let named = spec.columns.as_ref().and_then(|c| match quantity {
+            Quantity::Mass => c.mass.as_ref(),
+            Quantity::Damping => c.damping.as_ref(),
+            Quantity::Stiffness => c.stiffness.as_ref(),
+        });
+        let name = named.map_or(quantity.column(), |name| name.0.as_str());
+        column_on_grid(file, &spec.data.0, name, grid)
+    };
+    Ok(Some(Device {
+        mass: column(Quantity::Mass)?,
+        coefficients: vec![column(Quantity::Damping)?, column(Quantity::Stiffness)?],
+    }))
+}

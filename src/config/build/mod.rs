@@ -1,0 +1,108 @@
+//! From what was written to what is meant: a [`ModelFile`] becomes a [`Model`].
+
+mod experiments;
+mod fit;
+mod functions;
+mod grid;
+mod on_grid;
+
+use super::ModelFile;
+use crate::dynamics::{Device, Oscillator, State, Term};
+use crate::error::InputError;
+use crate::functions::{Functions, Quantity};
+use crate::problem::Problem;
+use crate::solvers::FitSettings;
+
+/// Everything that a model file means.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Title for reports.
+    pub title: String,
+    /// What is fitted.
+    pub problem: Problem,
+    /// How it is fitted.
+    pub settings: FitSettings,
+    /// The true device on the grid, where it is known.
+    pub truth: Option<Device>,
+    /// Initial states to predict the motion from.
+    pub predictions: Vec<State>,
+    /// What the user should know although it is no error.
+    pub warnings: Vec<String>,
+}
+
+/// What a model is built for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// To be fitted: readings are needed, at nodes.
+    Fit,
+    /// To be simulated: readings are not looked at.
+    Simulate {
+        /// Number of nodes instead of the model's.
+        nodes: Option<usize>,
+    },
+    /// To have its gradient checked: readings are needed, and interpolated where a node has none.
+    Check {
+        /// Number of nodes instead of the model's.
+        nodes: Option<usize>,
+    },
+}
+
+impl Purpose {
+    fn nodes(self) -> Option<usize> {
+        match self {
+            Purpose::Fit => None,
+            Purpose::Simulate { nodes } | Purpose::Check { nodes } => nodes,
+        }
+    }
+}
+
+/// Builds the model of a file for a purpose.
+///
+/// # Errors
+/// At the first thing that cannot be meant, with its line.
+pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
+    let spec = &file.spec;
+    let records = experiments::read(file, purpose)?;
+    let grid = grid::build(file, purpose, &records)?;
+    let mut warnings = Vec::new();
+    let list = functions::build(file, &grid, &mut warnings)?;
+    let functions = Functions::new(list, grid.nodes(), grid.step()).ok_or_else(|| {
+        file.error_at("functions", "a basis has functions that the grid cannot tell apart")
+    })?;
+    let problem = Problem {
+        oscillator: Oscillator {
+            grid,
+            method: grid::method(file),
+            terms: vec![Term::Damping, Term::Stiffness],
+        },
+        functions,
+        experiments: experiments::build(file, purpose, &grid, records)?,
+    };
+    let settings = fit::build(file, &problem)?;
+    let truth = functions::truth(file, &grid)?;
+    let state = |s: &super::spec::StateSpec| State {
+        displacement: s.displacement.0,
+        velocity: s.velocity.0,
+    };
+    Ok(Model {
+        title: title(file),
+        problem,
+        settings,
+        truth,
+        predictions: spec.predict.iter().flatten().map(state).collect(),
+        warnings,
+    })
+}
+
+/// The functions of the model, in the order of the problem.
+const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+
+fn title(file: &ModelFile) -> String {
+    match &file.spec.title {
+        Some(title) => title.0.clone(),
+        None => file
+            .path
+            .file_stem()
+            .map_or_else(|| "untitled".into(), |stem| stem.to_string_lossy().into_owned()),
+    }
+}

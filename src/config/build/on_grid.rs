@@ -1,0 +1,58 @@
+//! A function given as a CSV column, read at the nodes.
+
+use crate::config::ModelFile;
+use crate::dynamics::Grid;
+use crate::error::InputError;
+use crate::observations::{Table, increasing};
+
+/// Column of times in files of functions.
+const TIME_COLUMN: &str = "t_s";
+/// How near a row must be to a node, in steps, to be taken as it stands.
+const SAME_TIME: f64 = 1e-6;
+
+/// The column `column` of `data` at the nodes: as it stands where its rows are the nodes, linear
+/// in between otherwise.
+pub(super) fn column_on_grid(
+    file: &ModelFile,
+    data: &str,
+    column: &str,
+    grid: &Grid,
+) -> Result<Vec<f64>, InputError> {
+    let table = Table::read(file.resolve(data))?;
+    let times = increasing(&table, TIME_COLUMN)?;
+    let values = table.column(column)?;
+    let same = |(i, t): (usize, &f64)| (t - grid.time(i)).abs() <= SAME_TIME * grid.step();
+    if times.len() == grid.nodes() && times.iter().enumerate().all(same) {
+        return Ok(values.to_vec());
+    }
+    let (first, last) = (grid.time(0), grid.time(grid.nodes() - 1));
+    let slack = SAME_TIME * grid.step();
+    let covered = times.first().is_some_and(|t| *t <= first + slack)
+        && times.last().is_some_and(|t| *t >= last - slack);
+    if !covered {
+        let span = |a: Option<&f64>, b: Option<&f64>| match (a, b) {
+            (Some(a), Some(b)) => format!("{a} s to {b} s"),
+            _ => "no rows".into(),
+        };
+        return Err(
+            InputError::file(table.path(), "the times do not cover the record")
+                .found(span(times.first(), times.last()))
+                .expected(format!("at least {first} s to {last} s")),
+        );
+    }
+    Ok(grid.times().iter().map(|t| linear(times, values, *t)).collect())
+}
+
+/// Linear interpolation, constant beyond the ends.
+fn linear(times: &[f64], values: &[f64], t: f64) -> f64 {
+    let after = times.partition_point(|x| *x < t);
+    if after == 0 {
+        return values[0];
+    }
+    if after == times.len() {
+        return values[after - 1];
+    }
+    let (a, b) = (times[after - 1], times[after]);
+    let share = (t - a) / (b - a);
+    values[after - 1] * (1.0 - share) + values[after] * share
+}

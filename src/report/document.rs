@@ -1,0 +1,160 @@
+//! `result.json`: the document that a run leaves behind. Its keys are stable.
+
+use crate::dynamics::Grid;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the document's format.
+pub const FORMAT: u32 = 1;
+
+/// The whole document.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResultDocument {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// Title of the model.
+    pub title: String,
+    /// Version of kmcfit.
+    pub version: String,
+    /// What was run.
+    pub model: ModelSummary,
+    /// How it ended.
+    pub outcome: OutcomeSummary,
+    /// The cost and its parts.
+    pub cost: CostSummary,
+    /// The gradient at the start and at the end.
+    pub gradient: GradientSummary,
+    /// Work done; one count is one pass over all experiments.
+    pub counts: CountsSummary,
+    /// Wall-clock time, s: the only key that differs between two runs of one model.
+    pub seconds: f64,
+    /// The functions found, by name.
+    pub functions: BTreeMap<String, FunctionSummary>,
+    /// How well each experiment is matched.
+    pub experiments: Vec<ExperimentSummary>,
+    /// The motion of the found device from other initial states.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predictions: Vec<Prediction>,
+    /// What the user should know.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// What was run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelSummary {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// First time, s.
+    pub start: f64,
+    /// Length of the record, s.
+    pub duration: f64,
+    /// Step `duration / (nodes - 1)`, s.
+    pub step: f64,
+    /// Stepper.
+    pub stepper: String,
+    /// Solver.
+    pub method: String,
+    /// Which adjoint gave the gradient.
+    pub gradient: String,
+    /// Number of free parameters.
+    pub parameters: usize,
+    /// What J is, in one sentence with its factors.
+    pub cost_definition: String,
+}
+
+impl ModelSummary {
+    /// The grid of the run; `None` if the numbers make no grid.
+    pub fn grid(&self) -> Option<Grid> {
+        Grid::new(self.start, self.duration, self.nodes)
+    }
+}
+
+/// How the run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OutcomeSummary {
+    /// One of the words of [`crate::solvers::Status`].
+    pub status: String,
+    /// In one sentence.
+    pub reason: String,
+}
+
+/// The cost `J` and its parts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CostSummary {
+    /// At the start.
+    pub initial: f64,
+    /// At the best point.
+    pub r#final: f64,
+    /// `final / initial`.
+    pub ratio: f64,
+    /// Part of `final` from the readings.
+    pub misfit: f64,
+    /// Part of `final` from the regularisation.
+    pub regularisation: f64,
+}
+
+/// The squared L2 norm `G^2` of the gradient.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GradientSummary {
+    /// At the start.
+    pub initial_norm_squared: f64,
+    /// At the best point.
+    pub final_norm_squared: f64,
+}
+
+/// Work done.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CountsSummary {
+    /// Iterations of the solver.
+    pub iterations: u64,
+    /// Forward solves.
+    pub forward: u64,
+    /// Adjoint solves.
+    pub adjoint: u64,
+    /// Tangent solves.
+    pub tangent: u64,
+    /// Quadratic programs.
+    pub qp: u64,
+}
+
+/// One function at the best point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FunctionSummary {
+    /// Smallest value at a node.
+    pub min: f64,
+    /// Largest value at a node.
+    pub max: f64,
+    /// Largest distance from the truth at a node, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth_max_error: Option<f64>,
+    /// Root-mean-square distance from the truth over the nodes, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth_rms_error: Option<f64>,
+}
+
+/// One experiment at the best point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExperimentSummary {
+    /// Name.
+    pub name: String,
+    /// Number of readings.
+    pub readings: usize,
+    /// Root-mean-square residual, m.
+    pub rms_residual: f64,
+}
+
+/// The motion of the found device from one initial state, against the true device's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Initial displacement, m.
+    pub displacement: f64,
+    /// Initial velocity, m/s.
+    pub velocity: f64,
+    /// `integral (y - y_true)^2 dt`, m^2 s, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<f64>,
+    /// `integral y_true^2 dt`, m^2 s, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub energy: Option<f64>,
+}

@@ -1,0 +1,319 @@
+//! What a fit leaves behind: tables, figures and the result document.
+
+use super::csv::CsvTable;
+use super::document::{
+    CostSummary, CountsSummary, ExperimentSummary, FORMAT, FunctionSummary, GradientSummary,
+    ModelSummary, OutcomeSummary, Prediction, ResultDocument,
+};
+use super::figure::Figure;
+use super::figures::{self, FunctionCurve, RatioCurves};
+use super::files::OutputFolder;
+use super::render;
+use crate::config::Model;
+use crate::dynamics::Device;
+use crate::functions::{Quantity, Ratios};
+use crate::objective::Weighting;
+use crate::solvers::{Fit, Row};
+use std::collections::BTreeMap;
+use std::io;
+
+/// A fitted model and what it predicts.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// What was fitted.
+    pub model: &'a Model,
+    /// What was found.
+    pub fit: &'a Fit,
+    /// The motion of the found device from other initial states.
+    pub predictions: &'a [Prediction],
+}
+
+impl Run<'_> {
+    /// Writes tables and figures, the result document last, so that a folder with a result is
+    /// complete.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
+        folder.write("history.csv", &self.history().to_csv())?;
+        folder.write("functions.csv", &self.functions_table().to_csv())?;
+        folder.write("trajectory.csv", &self.trajectories().to_csv())?;
+        for figure in self.figures() {
+            folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+        }
+        folder.write("result.json", &json(&self.document()))
+    }
+
+    /// The result document.
+    pub fn document(&self) -> ResultDocument {
+        let (model, fit) = (self.model, self.fit);
+        ResultDocument {
+            format: FORMAT,
+            title: model.title.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            model: self.model_summary(),
+            outcome: OutcomeSummary {
+                status: fit.outcome.status.name().into(),
+                reason: fit.outcome.reason.clone(),
+            },
+            cost: CostSummary {
+                initial: fit.initial_cost,
+                r#final: fit.best.evaluation.cost,
+                ratio: fit.cost_ratio(),
+                misfit: fit.best.evaluation.cost,
+                regularisation: 0.0,
+            },
+            gradient: GradientSummary {
+                initial_norm_squared: fit.initial_norm_squared,
+                final_norm_squared: fit.best.gradient.norm_squared,
+            },
+            counts: CountsSummary {
+                iterations: fit.history.len() as u64,
+                forward: fit.counts.forward,
+                adjoint: fit.counts.adjoint,
+                tangent: fit.counts.tangent,
+                qp: fit.counts.qp,
+            },
+            seconds: fit.elapsed.as_secs_f64(),
+            functions: self.function_summaries(),
+            experiments: self.experiment_summaries(),
+            predictions: self.predictions.to_vec(),
+            warnings: model.warnings.clone(),
+        }
+    }
+
+    fn model_summary(&self) -> ModelSummary {
+        let problem = &self.model.problem;
+        let grid = &problem.oscillator.grid;
+        ModelSummary {
+            nodes: grid.nodes(),
+            start: grid.start(),
+            duration: grid.duration(),
+            step: grid.step(),
+            stepper: problem.oscillator.method.name().into(),
+            method: self.model.settings.solver.name().into(),
+            gradient: self.model.settings.gradient.name().into(),
+            parameters: problem.functions.parameters(),
+            cost_definition: self.cost_definition().into(),
+        }
+    }
+
+    fn cost_definition(&self) -> &'static str {
+        let readings = self.model.problem.experiments.iter();
+        let weightings = || readings.clone().filter_map(|e| e.readings.as_ref());
+        let integral = |w: Weighting| matches!(w, Weighting::Integral { .. });
+        match (
+            weightings().any(|r| integral(r.weighting())),
+            weightings().any(|r| !integral(r.weighting())),
+        ) {
+            (true, false) => "J = integral (y - y_obs)^2 dt by the trapezoid rule, m^2 s",
+            (false, true) => "J = sum over readings of ((y - y_obs)/sigma)^2 (chi-square)",
+            _ => {
+                "J = integral (y - y_obs)^2 dt over records without sigma + chi-square over the others"
+            }
+        }
+    }
+
+    fn named_functions(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
+        let quantities = self.model.problem.functions.iter().map(|f| f.quantity);
+        quantities.zip(self.fit.best.evaluation.device.functions())
+    }
+
+    fn true_function(&self, index: usize) -> Option<&[f64]> {
+        self.model.truth.as_ref()?.functions().nth(index)
+    }
+
+    fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
+        let summary = |(i, (quantity, values)): (usize, (Quantity, &[f64]))| {
+            let truth = self.true_function(i);
+            (quantity.name().to_string(), summarise(values, truth))
+        };
+        self.named_functions().enumerate().map(summary).collect()
+    }
+
+    fn experiment_summaries(&self) -> Vec<ExperimentSummary> {
+        let motions = &self.fit.best.evaluation.trajectories;
+        let pairs = self.model.problem.experiments.iter().zip(motions);
+        pairs
+            .filter_map(|(experiment, motion)| {
+                let readings = experiment.readings.as_ref()?;
+                let count = readings.values().len();
+                let squares = readings.residuals(&motion.displacement).map(|r| r * r);
+                Some(ExperimentSummary {
+                    name: experiment.name.clone(),
+                    readings: count,
+                    rms_residual: (squares.sum::<f64>() / count as f64).sqrt(),
+                })
+            })
+            .collect()
+    }
+
+    fn history(&self) -> CsvTable {
+        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect();
+        CsvTable::new()
+            .column("iteration", column(|r| r.iteration as f64))
+            .column("cost", column(|r| r.cost))
+            .column("cost_ratio", column(|r| r.cost_ratio))
+            .column(
+                "gradient_norm_squared_ratio",
+                column(|r| r.gradient_norm_squared_ratio),
+            )
+            .column("step", column(|r| r.step))
+            .column("relative_change", column(|r| r.relative_change))
+    }
+
+    fn functions_table(&self) -> CsvTable {
+        let device = &self.fit.best.evaluation.device;
+        let times = self.model.problem.oscillator.grid.times();
+        let mut table = CsvTable::new().column("t_s", times);
+        for (quantity, values) in self.named_functions() {
+            table = table.column(quantity.column(), values.to_vec());
+        }
+        let ratios = Ratios::of(device);
+        table = table
+            .column("k_over_m_per_s2", ratios.k_over_m)
+            .column("c_over_m_per_s", ratios.c_over_m)
+            .column("natural_frequency_Hz", ratios.frequency)
+            .column("damping_ratio", ratios.damping_ratio);
+        if let Some(truth) = &self.model.truth {
+            for ((quantity, _), values) in self.named_functions().zip(truth.functions()) {
+                table = table.column(format!("true_{}", quantity.column()), values.to_vec());
+            }
+        }
+        table
+    }
+
+    fn trajectories(&self) -> CsvTable {
+        let problem = &self.model.problem;
+        let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
+        let several = problem.experiments.len() > 1;
+        let motions = problem.experiments.iter().zip(&self.fit.best.evaluation.trajectories);
+        for (i, (experiment, motion)) in motions.enumerate() {
+            let name = |column: &str| match several {
+                true => format!("{column}_{}", i + 1),
+                false => column.to_string(),
+            };
+            table = table
+                .column(name("y_m"), motion.displacement.clone())
+                .column(name("v_m_per_s"), motion.velocity.clone());
+            if let Some(readings) = &experiment.readings {
+                let mut observed = vec![f64::NAN; motion.displacement.len()];
+                for (i, value) in readings.values().iter().enumerate() {
+                    observed[i * readings.stride()] = *value;
+                }
+                table = table.column(name("observed_y_m"), observed);
+            }
+        }
+        table
+    }
+
+    /// The figures of a fit.
+    pub fn figures(&self) -> Vec<Figure> {
+        let mut figures = vec![self.convergence(), self.functions_figure(), self.ratios_figure()];
+        let problem = &self.model.problem;
+        let several = problem.experiments.len() > 1;
+        for (i, experiment) in problem.experiments.iter().enumerate() {
+            let Some(readings) = &experiment.readings else {
+                continue;
+            };
+            let times: Vec<f64> = (0..readings.values().len())
+                .map(|j| problem.oscillator.grid.time(j * readings.stride()))
+                .collect();
+            let channel = ("displacement y", "m", times.as_slice(), readings.values());
+            for mut figure in [
+                figures::observation(&[channel]),
+                self.motion(i, &times, readings.values()),
+            ] {
+                if several {
+                    figure.name = format!("{}-{}", figure.name, i + 1);
+                }
+                figures.push(figure);
+            }
+        }
+        figures
+    }
+
+    fn convergence(&self) -> Figure {
+        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
+        figures::convergence(
+            &column(|r| r.iteration as f64),
+            &column(|r| r.cost_ratio),
+            &column(|r| r.gradient_norm_squared_ratio),
+        )
+    }
+
+    fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+        let grid_times = self.model.problem.oscillator.grid.times();
+        let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
+            .map(|s| {
+                let motion = &s.trajectories[experiment];
+                (s.iteration as usize, grid_times.as_slice(), motion.displacement.as_slice())
+            })
+            .collect();
+        let last = self.fit.history.len();
+        if snapshots.last().is_none_or(|s| s.0 != last) {
+            let motion = &self.fit.best.evaluation.trajectories[experiment];
+            snapshots.push((last, &grid_times, &motion.displacement));
+        }
+        figures::motion(times, observed, &snapshots)
+    }
+
+    fn functions_figure(&self) -> Figure {
+        let problem = &self.model.problem;
+        let start: Device = problem.functions.device(&problem.functions.start());
+        let names: Vec<String> = self
+            .named_functions()
+            .map(|(q, _)| format!("{} {}", q.name(), q.symbol()))
+            .collect();
+        let starts: Vec<&[f64]> = start.functions().collect();
+        let curves: Vec<FunctionCurve> = (self.named_functions().enumerate())
+            .map(|(i, (quantity, found))| FunctionCurve {
+                start: Some(starts[i]),
+                truth: self.true_function(i),
+                ..FunctionCurve::new(&names[i], quantity.unit(), found)
+            })
+            .collect();
+        figures::functions(&problem.oscillator.grid.times(), &curves)
+    }
+
+    fn ratios_figure(&self) -> Figure {
+        let found = Ratios::of(&self.fit.best.evaluation.device);
+        let truth = self.model.truth.as_ref().map(Ratios::of);
+        figures::ratios(
+            &self.model.problem.oscillator.grid.times(),
+            &curves(&found),
+            truth.as_ref().map(curves).as_ref(),
+        )
+    }
+}
+
+fn curves(ratios: &Ratios) -> RatioCurves<'_> {
+    RatioCurves {
+        k_over_m: &ratios.k_over_m,
+        c_over_m: &ratios.c_over_m,
+        frequency: &ratios.frequency,
+        damping_ratio: &ratios.damping_ratio,
+    }
+}
+
+fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
+    let errors = |truth: &[f64]| -> Vec<f64> {
+        values.iter().zip(truth).map(|(a, b)| (a - b).abs()).collect()
+    };
+    let errors = truth.map(errors);
+    FunctionSummary {
+        min: values.iter().copied().fold(f64::INFINITY, f64::min),
+        max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        truth_max_error: errors.as_ref().map(|e| e.iter().copied().fold(0.0, f64::max)),
+        truth_rms_error: errors
+            .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
+    }
+}
+
+/// Pretty JSON with a final newline. Numbers that JSON cannot hold become `null`.
+pub fn json<T: serde::Serialize>(document: &T) -> String {
+    // The documents are plain structs with text keys, which always serialise.
+    let mut text = serde_json::to_string_pretty(document).unwrap_or_default();
+    text.push('\n');
+    text
+}
