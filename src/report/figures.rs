@@ -1,5 +1,7 @@
 //! The standard figures of a fit, from plain slices.
 
+use super::predict::PredictedMotion;
+use crate::dynamics::Trajectory;
 use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
 
@@ -263,4 +265,26 @@ pub fn ratios(t: &[f64], found: &RatioCurves, truth: Option<&RatioCurves>) -> Fi
         }
     }
     figure
+}
+
+/// The motion from other initial states, one panel each, and the true one where known; times in s,
+/// displacements in m.
+pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
+    let figure = Figure::new(
+        "predictions",
+        "Predictions",
+        "The free motion of the device that was found from other initial states, against time.",
+    );
+    motions.iter().fold(figure, |figure, predicted| {
+        let found = Style::new(Colour::Blue).width(1.8);
+        let state = &predicted.summary;
+        let title = format!("from y = {} m, v = {} m/s", state.displacement, state.velocity);
+        let true_motion = |motion: &Trajectory| truth(t, &motion.displacement);
+        figure.panel(
+            Panel::new(time(), Axis::linear("displacement y", "m"))
+                .title(title)
+                .mark(Mark::line("predicted", t, &predicted.motion.displacement, found))
+                .maybe(predicted.truth.as_ref().map(true_motion)),
+        )
+    })
 }

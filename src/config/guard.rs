@@ -1,0 +1,97 @@
+//! What is refused before the YAML crate sees it, because the crate does not cope with it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::locate::Position;
+use super::model_file::place;
+use crate::error::InputError;
+use crate::input::quote;
+
+/// Longest model file that is read, in bytes.
+///
+/// A model file is written by hand and takes a few kilobytes; readings belong into CSV files. The
+/// limit keeps a data file given by mistake from being taken apart as YAML.
+pub(super) const LONGEST_MODEL: u64 = 1 << 18;
+
+/// Most brackets that may be open at once.
+///
+/// A model needs four. The YAML crate takes time quadratic in the number of open brackets, minutes
+/// for a file full of them.
+const MOST_OPEN_BRACKETS: usize = 200;
+
+/// Refuses a text that is too long, nested too deeply, or gives an anchor twice.
+pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
+    if text.len() as u64 > LONGEST_MODEL {
+        return Err(InputError::file(
+            file,
+            format!("the file is longer than {LONGEST_MODEL} bytes"),
+        )
+        .hint("put readings into CSV files"));
+    }
+    check_brackets(file, text)?;
+    check_anchors(file, text)
+}
+
+fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
+    let mut open = 0_usize;
+    for (index, c) in text.char_indices() {
+        match c {
+            '[' | '{' => open += 1,
+            ']' | '}' => open = open.saturating_sub(1),
+            _ => {}
+        }
+        if open > MOST_OPEN_BRACKETS {
+            let at = place(file, Position::of(text, index));
+            return Err(InputError::new(at, "too many open brackets")
+                .found(format!(
+                    "more than {MOST_OPEN_BRACKETS} brackets not closed"
+                ))
+                .expected("every `[` and `{` closed"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an anchor (`&name`) that is given twice in a text with aliases (`*name`).
+///
+/// YAML allows it, but yaml_serde 0.10 then gives wrong values to aliases: after `&a`, `&a`, `&b`
+/// the alias `*a` has the value of `&b`. Quotes are not looked at: a text such as `'x &a'` counts.
+fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
+    if names(text, '*').next().is_none() {
+        return Ok(());
+    }
+    let mut seen = BTreeMap::new();
+    for (index, name) in names(text, '&') {
+        let here = Position::of(text, index);
+        if let Some(first) = seen.insert(name, here) {
+            return Err(
+                InputError::new(place(file, here), "an anchor is given twice")
+                    .found(format!(
+                        "{} again; it is first given in line {}",
+                        quote(&format!("&{name}")),
+                        first.line
+                    ))
+                    .expected("every anchor once")
+                    .hint("rename one of them"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The words that begin with `mark` where a value can begin, outside comment lines.
+fn names(text: &str, mark: char) -> impl Iterator<Item = (usize, &str)> {
+    text.match_indices(mark).filter_map(move |(index, _)| {
+        let before = &text[..index];
+        let line = before.rsplit('\n').next().unwrap_or_default();
+        let begins = before
+            .chars()
+            .next_back()
+            .is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
+        let name = text[index + 1..]
+            .split(|c: char| c.is_whitespace() || "[]{},".contains(c))
+            .next()?;
+        (begins && !name.is_empty() && !line.trim_start().starts_with('#')).then_some((index, name))
+    })
+}

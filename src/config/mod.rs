@@ -1,0 +1,20 @@
+//! The model file: the only place that knows YAML.
+//!
+//! [`ModelFile::read`] turns a file into a [`ModelSpec`](spec::ModelSpec), which says what was
+//! written, key by key. Mistakes of spelling, type and syntax end here, with file, line, column and
+//! key; what the values mean together is checked later, through [`ModelFile::error_at`], which
+//! finds the line of a key again.
+
+mod build;
+mod complaint;
+mod failure;
+mod guard;
+pub mod locate;
+mod model_file;
+pub mod scalar;
+pub mod spec;
+mod syntax;
+
+pub use build::{Model, Purpose, build};
+pub use model_file::ModelFile;
+pub use scalar::{Number, NumberOrColumn, Text};

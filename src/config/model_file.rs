@@ -1,0 +1,123 @@
+//! A model file: where it is, its text, and what it says.
+
+use std::path::{Path, PathBuf};
+
+use super::failure;
+use super::guard::{self, LONGEST_MODEL};
+use super::locate::{Position, key_path, locate};
+use super::spec::ModelSpec;
+use crate::error::{InputError, Place};
+use crate::input::read_text;
+
+/// What a model file should be, in messages.
+const MODEL_FILE: &str = "a model file (YAML)";
+
+/// A model file that was read: where it is, its text, and what it says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelFile {
+    /// The file, as it was given.
+    pub path: PathBuf,
+    /// Its text, without a byte order mark.
+    pub text: String,
+    /// What it says.
+    pub spec: ModelSpec,
+}
+
+impl ModelFile {
+    /// Reads a model file.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        let text = read_text(path, MODEL_FILE, LONGEST_MODEL)?;
+        Self::parse(path, text)
+    }
+
+    /// Takes the text of a model file apart; `path` is what messages call it and what relative
+    /// paths in it start from.
+    ///
+    /// ```
+    /// use kmcfit::config::ModelFile;
+    /// let model = ModelFile::parse("free.yaml", "
+    /// format: 1
+    /// experiments:
+    ///   - initial: {displacement: 3.3, velocity: 1}
+    /// functions:
+    ///   mass: {basis: nodal, start: 2.0}
+    ///   damping: {basis: constant, start: 1.0}
+    ///   stiffness: {basis: constant, fixed: 1.0}
+    /// ")?;
+    /// assert_eq!(model.spec.experiments[0].initial.velocity.0, 1.0);
+    /// let error = model.error_at("functions.mass.start", "the mass must be smaller");
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "free.yaml:6:31: functions.mass.start: the mass must be smaller"
+    /// );
+    /// # Ok::<(), kmcfit::error::InputError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// When the text is not YAML, or has unknown, missing or repeated keys, or values of the wrong
+    /// kind.
+    pub fn parse(path: impl AsRef<Path>, text: impl Into<String>) -> Result<Self, InputError> {
+        let path = path.as_ref().to_path_buf();
+        let text = text.into();
+        if is_blank(&text) {
+            return Err(InputError::file(path, "the file is empty")
+                .expected(MODEL_FILE)
+                .hint("begin with `format: 1`"));
+        }
+        guard::check(&path, &text)?;
+        let spec = serde_yaml::from_str(&text)
+            .map_err(|error| failure::input_error(&path, &text, &error))?;
+        let model = Self { path, text, spec };
+        if model.spec.experiments.is_empty() {
+            return Err(model
+                .error_at("experiments", "there is no experiment")
+                .found("an empty list")
+                .expected("at least one experiment"));
+        }
+        Ok(model)
+    }
+
+    /// An error about the value at a key such as `experiments[0].initial.velocity`.
+    ///
+    /// The place is the line and column of the value; where the file does not say it, those of the
+    /// nearest enclosing key. An aliased value (`*name`) is found where it is written (`&name`).
+    pub fn error_at(&self, key: &str, problem: impl Into<String>) -> InputError {
+        let path = key_path(key);
+        let found = locate(&self.text, &path);
+        let position = match found.key {
+            Some(key) if found.depth < path.len() => key,
+            _ => found.value,
+        };
+        InputError::new(place(&self.path, position), problem).key(key)
+    }
+
+    /// A path in the model file, relative to its folder.
+    pub fn resolve(&self, relative: impl AsRef<Path>) -> PathBuf {
+        match self.path.parent() {
+            Some(folder) => folder.join(relative),
+            None => relative.as_ref().to_path_buf(),
+        }
+    }
+}
+
+/// A position in a file as the place of an error.
+pub(super) fn place(file: &Path, position: Position) -> Place {
+    Place::Line {
+        file: file.to_path_buf(),
+        line: position.line,
+        column: position.column,
+    }
+}
+
+/// Whether a text has nothing but blank lines, comments and document markers.
+fn is_blank(text: &str) -> bool {
+    text.lines()
+        .map(|line| line.split('#').next().unwrap_or_default().trim())
+        .all(|line| matches!(line, "" | "---" | "..."))
+}

@@ -1,0 +1,250 @@
+//! What a model file says, key by key: these structs mirror the YAML one to one.
+//!
+//! A new key is a new field; an optional one is an `Option`. What the keys mean together is decided
+//! where the problem is built, not here.
+
+use serde::Deserialize;
+use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
+use std::fmt;
+
+use super::scalar::{Count, Format, Number, NumberOrColumn, Scalar, Text};
+use super::scalar::{choice, deserialize_scalar, scalar_visits};
+
+/// A whole model file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map with the keys format, experiments, functions, fit, …"
+)]
+pub struct ModelSpec {
+    /// Version of the file format.
+    pub format: Format,
+    /// What reports call the run.
+    pub title: Option<Text>,
+    /// Measured (or to be simulated) motions; at least one.
+    pub experiments: Vec<ExperimentSpec>,
+    /// Time grid and stepper.
+    pub grid: Option<GridSpec>,
+    /// Mass, damping and stiffness over time.
+    pub functions: FunctionsSpec,
+    /// How to fit.
+    pub fit: Option<FitSpec>,
+    /// True functions, where they are known; used for reporting only.
+    pub truth: Option<TruthSpec>,
+    /// Initial states to predict the motion from.
+    pub predict: Option<Vec<StateSpec>>,
+}
+
+/// One measured motion.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}"
+)]
+pub struct ExperimentSpec {
+    /// What reports call it.
+    pub name: Option<Text>,
+    /// CSV file of the readings, relative to the model file; a simulation needs none.
+    pub data: Option<Text>,
+    /// Names of the columns in `data`.
+    pub columns: Option<ColumnsSpec>,
+    /// Standard deviation of the readings.
+    pub sigma: Option<SigmaSpec>,
+    /// State at the beginning.
+    pub initial: StateSpec,
+}
+
+/// Names of the columns of a file of readings.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {time: t_s, displacement: y_m}"
+)]
+pub struct ColumnsSpec {
+    /// Column of the times, in s.
+    pub time: Option<Text>,
+    /// Column of the displacement, in m.
+    pub displacement: Option<Text>,
+}
+
+/// Standard deviation of the readings, per channel.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a map such as {displacement: 0.1}")]
+pub struct SigmaSpec {
+    /// Of the displacement, in m.
+    pub displacement: Option<Number>,
+}
+
+/// A state of the oscillator.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {displacement: 3.3, velocity: 1.0}"
+)]
+pub struct StateSpec {
+    /// Displacement, in m.
+    pub displacement: Number,
+    /// Velocity, in m/s.
+    pub velocity: Number,
+}
+
+/// Time grid and stepper.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {nodes: 2000, method: midpoint}"
+)]
+pub struct GridSpec {
+    /// Number of nodes N; the step is T/(N-1).
+    pub nodes: Option<Count>,
+    /// Stepper.
+    pub method: Option<StepMethod>,
+    /// Duration T, in s.
+    pub duration: Option<Number>,
+}
+
+choice! {
+    /// How the motion is stepped through time.
+    pub enum StepMethod {
+        /// The midpoint rule of the paper.
+        Midpoint = "midpoint",
+        /// The classical Runge-Kutta method of order four.
+        Rk4 = "rk4",
+    }
+}
+
+/// The three coefficient functions.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map with the keys mass, damping, stiffness"
+)]
+pub struct FunctionsSpec {
+    /// Mass m(t), in kg.
+    pub mass: FunctionSpec,
+    /// Damping c(t), in N s/m.
+    pub damping: FunctionSpec,
+    /// Stiffness k(t), in N/m.
+    pub stiffness: FunctionSpec,
+}
+
+/// One coefficient function.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {basis: nodal, start: 2.0}"
+)]
+pub struct FunctionSpec {
+    /// Shape of the function.
+    pub basis: Option<Basis>,
+    /// Values to start the fit from.
+    pub start: Option<NumberOrColumn>,
+    /// Values that are known and not fitted.
+    pub fixed: Option<NumberOrColumn>,
+}
+
+choice! {
+    /// Shape of a coefficient function.
+    pub enum Basis {
+        /// A free value at every node of the grid.
+        Nodal = "nodal",
+        /// One value for all times.
+        Constant = "constant",
+    }
+}
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {data: file.csv, column: mass_kg}"
+)]
+pub struct ColumnSpec {
+    /// CSV file, relative to the model file.
+    pub data: Text,
+    /// Name of the column.
+    pub column: Text,
+}
+
+/// How to fit.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {method: lbfgs, gradient: discrete}"
+)]
+pub struct FitSpec {
+    /// Solver.
+    pub method: Option<FitMethod>,
+    /// Which gradient the solver follows.
+    pub gradient: Option<Gradient>,
+    /// Number of steps that L-BFGS remembers.
+    pub memory: Option<Count>,
+    /// When to stop.
+    pub stop: Option<StopSpec>,
+}
+
+choice! {
+    /// Solver.
+    pub enum FitMethod {
+        /// Along the negative gradient.
+        SteepestDescent = "steepest-descent",
+        /// Limited-memory BFGS.
+        Lbfgs = "lbfgs",
+    }
+}
+
+choice! {
+    /// How the gradient is computed.
+    pub enum Gradient {
+        /// The exact gradient of the discretised cost.
+        Discrete = "discrete",
+        /// The adjoint differential equation, discretised afterwards.
+        Continuous = "continuous",
+    }
+}
+
+/// When to stop; whichever comes first.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {iterations: 1000, cost_ratio: 1e-4}"
+)]
+pub struct StopSpec {
+    /// After this many iterations.
+    pub iterations: Option<Count>,
+    /// When the cost has fallen to this part of its first value.
+    pub cost_ratio: Option<Number>,
+    /// When the squared norm of the gradient has fallen to this part of its first value.
+    pub gradient_ratio: Option<Number>,
+    /// When an iteration lowers the cost by less than this part of it.
+    pub tolerance: Option<Number>,
+    /// When the step becomes shorter than this.
+    pub step: Option<Number>,
+    /// After this time, in s.
+    pub seconds: Option<Number>,
+}
+
+/// True functions, used for reporting only.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a map such as {data: truth.csv}")]
+pub struct TruthSpec {
+    /// CSV file, relative to the model file.
+    pub data: Text,
+    /// Names of its columns.
+    pub columns: Option<TruthColumnsSpec>,
+}
+
+/// Names of the columns of a file of true functions.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {mass: mass_kg, damping: damping_N_s_per_m, stiffness: stiffness_N_per_m}"
+)]
+pub struct TruthColumnsSpec {
+    /// Column of the mass, in kg.
+    pub mass: Option<Text>,
+    /// Column of the damping, in N s/m.
+    pub damping: Option<Text>,
+    /// Column of the stiffness, in N/m.
+    pub stiffness: Option<Text>,
+}

@@ -1,0 +1,153 @@
+//! Reading text files, with errors that say what is wrong with the file.
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use crate::error::{InputError, Place};
+use crate::near::did_you_mean;
+
+/// Longest piece of somebody's text that is repeated in a message, in characters.
+const LONGEST_QUOTE: usize = 40;
+
+/// Most names that are listed in a message.
+const MOST_NAMES: usize = 30;
+
+/// Reads a text file of at most `limit` bytes; a byte order mark is dropped.
+///
+/// `what` says what the file should be, for instance `a model file (YAML)`.
+///
+/// # Errors
+///
+/// When there is no such file, it is a folder, it cannot be read, it is longer than `limit`, or it
+/// is not UTF-8 text.
+pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputError> {
+    if path.is_dir() {
+        return Err(InputError::file(path, "this is a folder, not a file").expected(what));
+    }
+    let file = File::open(path).map_err(|error| unreadable(path, what, &error))?;
+    read_text_from(path, file, limit).map_err(|error| error.expected_if_none(what))
+}
+
+/// Reads text of at most `limit` bytes from a reader; `path` is what messages call it.
+///
+/// # Errors
+///
+/// When reading fails, there is more than `limit`, or it is not UTF-8 text.
+pub fn read_text_from(path: &Path, reader: impl Read, limit: u64) -> Result<String, InputError> {
+    let mut bytes = Vec::new();
+    reader
+        .take(limit.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|error| InputError::file(path, format!("the file cannot be read: {error}")))?;
+    if bytes.len() as u64 > limit {
+        return Err(InputError::file(
+            path,
+            format!("the file is longer than {limit} bytes"),
+        ));
+    }
+    utf8(path, bytes)
+}
+
+/// A short quotation of somebody's text for a message: one line, cut where it is long.
+pub fn quote(text: &str) -> String {
+    let mut quoted = String::from("`");
+    for (count, c) in text.chars().enumerate() {
+        if count == LONGEST_QUOTE {
+            quoted.push('…');
+            break;
+        }
+        match c {
+            c if c.is_control() => quoted.extend(c.escape_default()),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('`');
+    quoted
+}
+
+/// Names in a row: `a, b, c`; the first of them where there are many.
+pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    match names.len().checked_sub(MOST_NAMES) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..MOST_NAMES].join(", ")),
+    }
+}
+
+/// What is expected where only some names will do: `one of: a, b, c`.
+pub fn one_of<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut names = names.into_iter().peekable();
+    match (names.next(), names.peek()) {
+        (Some(only), None) => format!("`{only}`"),
+        (first, _) => format!("one of: {}", listed(first.into_iter().chain(names))),
+    }
+}
+
+/// The error for a file that could not be opened.
+fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
+    if error.kind() != ErrorKind::NotFound {
+        return InputError::file(path, format!("the file cannot be read: {error}")).expected(what);
+    }
+    let missing = InputError::file(path, "there is no such file").expected(what);
+    match neighbour(path) {
+        Some(hint) => missing.hint(hint),
+        None => missing,
+    }
+}
+
+/// What may have been meant by a path that leads nowhere: a missing folder or a near file name.
+fn neighbour(path: &Path) -> Option<String> {
+    let folder = match path.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) => folder,
+        None => return None,
+    };
+    if !folder.is_dir() {
+        return Some(format!("the folder {} does not exist", folder.display()));
+    }
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .ok()?
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    names.sort();
+    let wanted = path.file_name().and_then(OsStr::to_str)?;
+    did_you_mean(wanted, names.iter().map(String::as_str))
+}
+
+/// The bytes as text, without a byte order mark.
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    let utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(match text.strip_prefix('\u{feff}') {
+            Some(rest) => rest.to_owned(),
+            None => text,
+        }),
+        Err(error) => {
+            let good = error.utf8_error().valid_up_to();
+            let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
+            let byte = error.as_bytes().get(good).copied().unwrap_or_default();
+            let place = Place::Line {
+                file: path.to_path_buf(),
+                line: 1 + before.matches('\n').count(),
+                column: 1 + before.chars().rev().take_while(|&c| c != '\n').count(),
+            };
+            Err(InputError::new(place, "the file is not UTF-8 text")
+                .found(format!("the byte 0x{byte:02x}"))
+                .hint(if utf16 {
+                    "it looks like UTF-16: save it as UTF-8"
+                } else {
+                    "save it as UTF-8, or write only plain letters there"
+                }))
+        }
+    }
+}
+
+impl InputError {
+    /// Adds what was expected where nothing is said about it yet.
+    fn expected_if_none(mut self, expected: &str) -> Self {
+        self.expected.get_or_insert_with(|| expected.to_owned());
+        self
+    }
+}

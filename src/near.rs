@@ -1,0 +1,95 @@
+//! Near spellings: what the writer of an unknown word probably meant.
+
+/// Longest word that is compared; longer ones are no slip of the finger.
+const LONGEST_WORD: usize = 64;
+
+/// Shortest word that is taken for the beginning of a longer one.
+const SHORTEST_STEM: usize = 3;
+
+/// The candidate that `word` is probably a misspelling of.
+///
+/// Capitals, `-`, `_` and spaces do not count. A candidate is near when at most one letter in
+/// three was dropped, added, changed or swapped with its neighbour, when one word begins with
+/// the other, or when the candidate is the word and a unit (`y_m` for `y`).
+///
+/// ```
+/// use kmcfit::near::nearest;
+/// assert_eq!(nearest("displacment", ["velocity", "displacement"]), Some("displacement"));
+/// assert_eq!(nearest("Time", ["time", "mass"]), Some("time"));
+/// assert_eq!(nearest("temperature", ["time", "mass"]), None);
+/// ```
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let word = plain(word);
+    if word.is_empty() || word.chars().count() > LONGEST_WORD {
+        return None;
+    }
+    candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            let near = distance(&word, &plain(candidate));
+            // `y` for `y_m`: a name without its unit.
+            let bare = candidate
+                .split_once('_')
+                .is_some_and(|(name, _)| plain(name) == word);
+            let distance = near.or_else(|| bare.then_some(LONGEST_WORD))?;
+            Some((distance, candidate))
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// `did you mean` with the nearest candidate, if there is one.
+pub fn did_you_mean<'a>(
+    word: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    nearest(word, candidates).map(|near| format!("did you mean `{near}`?"))
+}
+
+/// The word without what people vary: capitals and separators.
+fn plain(word: &str) -> String {
+    word.chars()
+        .filter(|c| !matches!(c, '-' | '_' | ' '))
+        .flat_map(char::to_lowercase)
+        .collect()
+}
+
+/// Edits between two plain words, or `None` where they are too far apart to be the same word.
+fn distance(word: &str, candidate: &str) -> Option<usize> {
+    let lengths = (word.chars().count(), candidate.chars().count());
+    let (shorter, longer) = (lengths.0.min(lengths.1), lengths.0.max(lengths.1));
+    if longer > LONGEST_WORD {
+        return None;
+    }
+    let edits = strsim::osa_distance(word, candidate);
+    if edits <= longer / 3 {
+        return Some(edits);
+    }
+    let stem =
+        shorter >= SHORTEST_STEM && (candidate.starts_with(word) || word.starts_with(candidate));
+    stem.then_some(edits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slips_are_found_and_other_words_are_not() {
+        let keys = ["mass", "damping", "stiffness", "steepest-descent", "rk4"];
+        for (word, near) in [
+            ("mas", Some("mass")),
+            ("Mass", Some("mass")),
+            ("dampnig", Some("damping")),
+            ("stiff", Some("stiffness")),
+            ("steepest_descent", Some("steepest-descent")),
+            ("rk45", Some("rk4")),
+            ("friction", None),
+            ("", None),
+            ("k", None),
+        ] {
+            assert_eq!(nearest(word, keys), near, "{word}");
+        }
+        assert_eq!(nearest(&"m".repeat(10_000), keys), None);
+    }
+}

@@ -1,0 +1,88 @@
+//! What the times of readings must be like: increasing, and for some purposes equally spaced.
+
+use super::Table;
+use crate::error::InputError;
+
+/// How far a spacing may be from the step, as a part of the step.
+///
+/// Times that were computed as i·dt in double precision differ from equal spacing by some 1e-16 T,
+/// which is below 1e-10 of a step for up to a million readings; this leaves room for times
+/// printed with nine or more digits, and is far below what moves a reading noticeably.
+pub const SPACING_TOLERANCE: f64 = 1e-6;
+
+/// The times in a column, strictly increasing.
+///
+/// # Errors
+///
+/// When the column cannot be read, or a time is not after the one before.
+pub fn increasing<'a>(table: &'a Table, column: &str) -> Result<&'a [f64], InputError> {
+    let times = table.column(column)?;
+    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        None => Ok(times),
+        Some(row) => Err(not_increasing(table, column, times, row + 1)),
+    }
+}
+
+/// The step dt, in the unit of the column, of times t_i = t_0 + i dt.
+///
+/// The step is the mean spacing, (t_last - t_0)/(rows - 1). The rows are compared with the median
+/// spacing, so that a single gap is reported where it is.
+///
+/// # Errors
+///
+/// When the times are not [`increasing`], there is only one, or a spacing differs from the median by
+/// more than [`SPACING_TOLERANCE`].
+pub fn equally_spaced(table: &Table, column: &str) -> Result<f64, InputError> {
+    let times = increasing(table, column)?;
+    let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
+        return Err(
+            InputError::new(table.place(0, Some(column)), "there is only one time")
+                .found("1 row")
+                .expected("at least 2 rows, to have a spacing"),
+        );
+    };
+    let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let expected = median(&spacings);
+    let off = |spacing: &f64| (spacing - expected).abs() > SPACING_TOLERANCE * expected;
+    match spacings.iter().position(off) {
+        None => Ok((last - first) / intervals as f64),
+        Some(row) => Err(InputError::new(
+            table.place(row + 1, Some(column)),
+            "the times are not equally spaced",
+        )
+        .found(format!(
+            "{} after {}, a spacing of {}",
+            times[row + 1],
+            times[row],
+            spacing(spacings[row])
+        ))
+        .expected(format!(
+            "a spacing of {}, as between most rows",
+            spacing(expected)
+        ))),
+    }
+}
+
+fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> InputError {
+    let (before, here) = (times[row - 1], times[row]);
+    let problem = match before == here {
+        true => "two rows with the same time",
+        false => "the times do not increase",
+    };
+    let line = table.lines().get(row - 1).copied().unwrap_or_default();
+    InputError::new(table.place(row, Some(column)), problem)
+        .found(format!("{here} after {before} in line {line}"))
+        .expected(format!("a time greater than {before}"))
+}
+
+/// The median of values that are not empty.
+fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A spacing without the last digits, which are rounding of the difference.
+fn spacing(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}

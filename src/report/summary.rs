@@ -1,0 +1,83 @@
+//! What a person reads in ten seconds.
+
+use super::document::{Prediction, ResultDocument};
+use std::fmt::Write;
+
+/// The outcome, the misfit and the functions, as text.
+pub fn summary(document: &ResultDocument) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_summary(&mut text, document);
+    text
+}
+
+fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let cost = &document.cost;
+    writeln!(text, "{}", document.title)?;
+    writeln!(text, "{}: {}", document.outcome.status, document.outcome.reason)?;
+    writeln!(
+        text,
+        "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {} iterations, {} forward and {} adjoint solves, {:.2} s",
+        cost.initial,
+        cost.r#final,
+        cost.ratio,
+        document.counts.iterations,
+        document.counts.forward,
+        document.counts.adjoint,
+        document.seconds
+    )?;
+    for experiment in &document.experiments {
+        writeln!(
+            text,
+            "{}: rms residual {:.4e} m over {} readings",
+            experiment.name, experiment.rms_residual, experiment.readings
+        )?;
+    }
+    writeln!(text)?;
+    write_functions(text, document)?;
+    if !document.predictions.is_empty() {
+        write!(text, "\n{}", prediction_table(&document.predictions))?;
+    }
+    Ok(())
+}
+
+fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let has_truth = document.functions.values().any(|f| f.truth_max_error.is_some());
+    write!(text, "{:<10} {:>12} {:>12}", "function", "min", "max")?;
+    if has_truth {
+        write!(text, " {:>14} {:>14}", "largest error", "rms error")?;
+    }
+    writeln!(text)?;
+    for name in ["mass", "damping", "stiffness"] {
+        let Some(function) = document.functions.get(name) else {
+            continue;
+        };
+        write!(text, "{name:<10} {:>12.5} {:>12.5}", function.min, function.max)?;
+        if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
+            write!(text, " {most:>14.3e} {rms:>14.3e}")?;
+        }
+        writeln!(text)?;
+    }
+    Ok(())
+}
+
+/// Predictions as a table: the initial state, the cost against the truth, the energy of the true
+/// motion.
+pub fn prediction_table(predictions: &[Prediction]) -> String {
+    let mut text = format!(
+        "{:>12} {:>12} {:>14} {:>14}\n",
+        "y(0) m", "v(0) m/s", "cost m^2 s", "energy m^2 s"
+    );
+    for p in predictions {
+        let known = |x: Option<f64>| x.map_or("unknown".into(), |x| format!("{x:.5e}"));
+        let _ = writeln!(
+            text,
+            "{:>12} {:>12} {:>14} {:>14}",
+            p.displacement,
+            p.velocity,
+            known(p.cost),
+            known(p.energy)
+        );
+    }
+    text
+}

@@ -1,0 +1,141 @@
+//! No input makes the readers panic.
+
+use kmcfit::config::ModelFile;
+use kmcfit::config::locate::{key_path, locate};
+use kmcfit::observations::{Table, times};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use crate::model::FULL;
+
+const CSV: &str = "# made by hand\nt,\"y\",note\r\n0,1,a\n\n0.1, 2 ,\"b, c\"\n0.2,3,\n";
+
+/// A piece of syntax, put in to break a text.
+const PIECES: &[&str] = &[
+    "{",
+    "}",
+    "[",
+    "]",
+    ":",
+    ": ",
+    "- ",
+    ",",
+    "\n",
+    "\t",
+    "  ",
+    "\"",
+    "'",
+    "&a ",
+    "*a",
+    "!t ",
+    "!!float ",
+    "!!null ",
+    "#",
+    " #",
+    "---\n",
+    "...\n",
+    "|\n",
+    ">\n",
+    "? ",
+    "<<: ",
+    "~",
+    "null",
+    ".nan",
+    "1e999",
+    "é",
+    "\u{feff}",
+    "\r",
+    "\0",
+    "%",
+    "@",
+    "\\",
+    "\"\\x02\"",
+    "`",
+    "99999999999999999999999",
+    "mass",
+    "format: 1\n",
+];
+
+/// Puts pieces into a text, or takes some of it out.
+fn mutate(text: &str, changes: &[(usize, usize, usize)]) -> String {
+    let mut chars: Vec<char> = text.chars().collect();
+    for &(at, length, piece) in changes {
+        let begin = at % (chars.len() + 1);
+        let end = (begin + length).min(chars.len());
+        let piece = PIECES[piece % PIECES.len()].chars();
+        chars.splice(begin..end, piece);
+    }
+    chars.into_iter().collect()
+}
+
+fn changes() -> impl Strategy<Value = Vec<(usize, usize, usize)>> {
+    vec((0..4000usize, 0..12usize, 0..PIECES.len()), 1..6)
+}
+
+/// Reads a model; the message about it must be of text, and later errors must find a place.
+fn read_model(text: &str) {
+    match ModelFile::parse("m.yaml", text) {
+        Ok(model) => {
+            let error = model.error_at("functions.mass.start", "wrong").to_string();
+            assert!(error.starts_with("m.yaml:"), "{error}");
+        }
+        Err(error) => {
+            let error = error.to_string();
+            assert!(error.starts_with("m.yaml"), "{error}");
+            assert!(!error.contains(['\u{2}', '\u{1f}']), "{error:?}");
+        }
+    }
+    for path in [
+        "",
+        "experiments[0].initial",
+        "functions.mass.start",
+        "a[1][2]",
+    ] {
+        locate(text, &key_path(path));
+    }
+}
+
+fn read_table(bytes: &[u8]) {
+    if let Ok(table) = Table::parse("t.csv", bytes) {
+        assert_eq!(table.rows(), table.lines().len());
+        assert!(table.lines().is_sorted());
+        for name in table.headers() {
+            if let Ok(values) = table.column(name) {
+                assert_eq!(values.len(), table.rows());
+            }
+            let _ = times::equally_spaced(&table, name);
+        }
+        let _ = table.column("no such column");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn models_with_mistakes(changes in changes()) {
+        read_model(&mutate(FULL, &changes));
+    }
+
+    #[test]
+    fn pieces_of_yaml(pieces in vec(0..PIECES.len(), 0..40)) {
+        read_model(&pieces.into_iter().map(|piece| PIECES[piece]).collect::<String>());
+    }
+
+    #[test]
+    fn any_text(text in any::<String>()) {
+        read_model(&text);
+        read_table(text.as_bytes());
+        locate(FULL, &key_path(&text));
+    }
+
+    #[test]
+    fn tables_with_mistakes(changes in changes()) {
+        read_table(mutate(CSV, &changes).as_bytes());
+    }
+
+    #[test]
+    fn any_bytes(bytes in vec(any::<u8>(), 0..200)) {
+        read_table(&bytes);
+    }
+}

@@ -1,0 +1,8 @@
+//! Reading model files and tables: what is understood, and every message about what is not.
+#![allow(clippy::result_large_err, reason = "as in the library")]
+
+mod arbitrary;
+mod model;
+mod model_errors;
+mod table;
+mod table_errors;

@@ -1,0 +1,169 @@
+//! Model files that are understood.
+
+use std::path::{Path, PathBuf};
+
+use kmcfit::config::ModelFile;
+use kmcfit::config::scalar::{Count, Number, NumberOrColumn};
+use kmcfit::config::spec::{Basis, FitMethod, Gradient, StepMethod};
+
+pub const FULL: &str = "\
+format: 1
+title: Linear mass decay
+experiments:
+  - name: free decay
+    data: ../data/noisy.csv
+    columns: {time: t_s, displacement: y_m}
+    sigma: {displacement: 0.1}
+    initial: {displacement: 3.3, velocity: 1}
+  - initial:
+      displacement: -2e-3
+      velocity: +0.5
+grid: {nodes: 2000, method: midpoint, duration: 25.0}
+functions:
+  mass: {basis: nodal, start: 2.0}
+  damping:
+    basis: nodal
+    start: {data: start.csv, column: damping_N_s_per_m}
+  stiffness: {basis: constant, fixed: 1}
+fit:
+  method: lbfgs
+  gradient: continuous
+  memory: 10
+  stop: {iterations: 1000, cost_ratio: 1e-4, gradient_ratio: 1e-4, tolerance: 1e-10, step: 1e-12, seconds: 60}
+truth:
+  data: ../data/paper_truth.csv
+  columns: {mass: mass_kg, damping: damping_N_s_per_m, stiffness: stiffness_N_per_m}
+predict:
+  - {displacement: 3.301, velocity: 1.001}
+";
+
+pub const SHORT: &str = "\
+format: 1
+experiments:
+  - initial: {displacement: 3.3, velocity: 1.0}
+functions:
+  mass: {basis: nodal}
+  damping: {basis: nodal}
+  stiffness: {basis: nodal}
+";
+
+#[test]
+fn every_key_is_read() {
+    let spec = ModelFile::parse("m.yaml", FULL).unwrap().spec;
+    assert_eq!(spec.title.as_deref(), Some("Linear mass decay"));
+    let [first, second] = spec.experiments.as_slice() else {
+        panic!("two experiments")
+    };
+    assert_eq!(first.name.as_deref(), Some("free decay"));
+    assert_eq!(first.data.as_deref(), Some("../data/noisy.csv"));
+    let columns = first.columns.as_ref().unwrap();
+    assert_eq!(columns.time.as_deref(), Some("t_s"));
+    assert_eq!(columns.displacement.as_deref(), Some("y_m"));
+    let sigma = first.sigma.as_ref().unwrap().displacement;
+    assert_eq!(sigma, Some(Number(0.1)));
+    assert_eq!(first.initial.velocity, Number(1.0));
+    assert_eq!(second.name, None);
+    assert_eq!(second.initial.displacement, Number(-2e-3));
+    assert_eq!(second.initial.velocity, Number(0.5));
+
+    let grid = spec.grid.unwrap();
+    assert_eq!(grid.nodes, Some(Count(2000)));
+    assert_eq!(grid.method, Some(StepMethod::Midpoint));
+    assert_eq!(grid.duration.map(f64::from), Some(25.0));
+
+    let functions = spec.functions;
+    assert_eq!(functions.mass.basis, Basis::Nodal);
+    assert_eq!(
+        functions.mass.start,
+        Some(NumberOrColumn::Number(Number(2.0)))
+    );
+    let Some(NumberOrColumn::Column(start)) = functions.damping.start else {
+        panic!("a column")
+    };
+    assert_eq!(
+        (&*start.data, &*start.column),
+        ("start.csv", "damping_N_s_per_m")
+    );
+    assert_eq!(
+        functions.stiffness.fixed,
+        Some(NumberOrColumn::Number(Number(1.0)))
+    );
+
+    let fit = spec.fit.unwrap();
+    assert_eq!(fit.method, Some(FitMethod::Lbfgs));
+    assert_eq!(fit.gradient, Some(Gradient::Continuous));
+    assert_eq!(fit.memory.map(usize::from), Some(10));
+    let stop = fit.stop.unwrap();
+    assert_eq!(stop.iterations, Some(Count(1000)));
+    assert_eq!(stop.cost_ratio, Some(Number(1e-4)));
+    assert_eq!(stop.gradient_ratio, Some(Number(1e-4)));
+    assert_eq!(stop.tolerance, Some(Number(1e-10)));
+    assert_eq!(stop.step, Some(Number(1e-12)));
+    assert_eq!(stop.seconds, Some(Number(60.0)));
+
+    let truth = spec.truth.unwrap();
+    assert_eq!(&*truth.data, "../data/paper_truth.csv");
+    let columns = truth.columns.unwrap();
+    assert_eq!(columns.mass.as_deref(), Some("mass_kg"));
+    assert_eq!(columns.damping.as_deref(), Some("damping_N_s_per_m"));
+    assert_eq!(columns.stiffness.as_deref(), Some("stiffness_N_per_m"));
+    assert_eq!(spec.predict.unwrap()[0].velocity, Number(1.001));
+}
+
+#[test]
+fn optional_keys_may_be_missing_or_empty() {
+    let short = ModelFile::parse("m.yaml", SHORT).unwrap().spec;
+    assert_eq!(short.title, None);
+    assert_eq!(short.grid, None);
+    assert_eq!(short.fit, None);
+    let blank = format!("{SHORT}grid:\nfit: ~\ntitle: null\n");
+    assert_eq!(ModelFile::parse("m.yaml", blank).unwrap().spec, short);
+}
+
+#[test]
+fn names_keep_their_spelling() {
+    let text = format!("{SHORT}title: 1.50\n");
+    let spec = ModelFile::parse("m.yaml", text).unwrap().spec;
+    assert_eq!(spec.title.as_deref(), Some("1.50"));
+}
+
+#[test]
+fn order_quotes_anchors_and_line_ends_do_not_matter() {
+    let short = ModelFile::parse("m.yaml", SHORT).unwrap().spec;
+    for text in [
+        SHORT.replace('\n', "\r\n"),
+        format!("---\n# comment\n{SHORT}...\n"),
+        SHORT
+            .replace("format", "\"format\"")
+            .replace("mass", "'mass'"),
+        SHORT
+            .replace("mass: {basis: nodal}", "mass: &f {basis: nodal}")
+            .replace("damping: {basis: nodal}", "damping: *f"),
+    ] {
+        assert_eq!(ModelFile::parse("m.yaml", text).unwrap().spec, short);
+    }
+}
+
+#[test]
+fn a_file_is_read_and_paths_start_from_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.yaml");
+    std::fs::write(&path, format!("\u{feff}{FULL}")).unwrap();
+    let model = ModelFile::read(&path).unwrap();
+    assert_eq!(model.path, path);
+    assert_eq!(model.text, FULL);
+    let data = model.spec.experiments[0].data.as_ref().unwrap();
+    assert_eq!(model.resolve(data), folder.path().join("../data/noisy.csv"));
+    let absolute = folder.path().join("x.csv");
+    assert_eq!(model.resolve(&absolute), absolute);
+    let bare = ModelFile::parse("model.yaml", SHORT).unwrap();
+    assert_eq!(bare.resolve(Path::new("x.csv")), PathBuf::from("x.csv"));
+}
+
+#[test]
+fn choices_say_their_names() {
+    for (name, method) in FitMethod::ALL {
+        assert_eq!(method.to_string(), *name);
+    }
+    assert_eq!(StepMethod::Rk4.name(), "rk4");
+}

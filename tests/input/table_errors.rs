@@ -1,0 +1,247 @@
+//! Every message about a table that is not understood.
+
+use insta::assert_snapshot;
+use kmcfit::error::InputError;
+use kmcfit::observations::{Table, times};
+
+/// The message about a text as a whole.
+fn message(text: impl AsRef<[u8]>) -> String {
+    shown(Table::parse("t.csv", text.as_ref()))
+}
+
+/// The message about a column of a text.
+fn column(text: &str, name: &str) -> String {
+    shown(Table::parse("t.csv", text.as_bytes()).unwrap().column(name))
+}
+
+fn shown<T>(result: Result<T, InputError>) -> String {
+    match result {
+        Ok(_) => "no error".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn files() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("noisy.csv"), "t\n0\n").unwrap();
+    let read = |name: &str| {
+        shown(Table::read(folder.path().join(name)))
+            .replace(&folder.path().display().to_string(), "DIR")
+    };
+    assert_snapshot!(read("nosy.csv"), @"
+    DIR/nosy.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+      hint: did you mean `noisy.csv`?
+    ");
+    assert_snapshot!(read("data/noisy.csv"), @"
+    DIR/data/noisy.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+      hint: the folder DIR/data does not exist
+    ");
+    assert_snapshot!(read("."), @"
+    DIR/.: this is a folder, not a file
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+}
+
+#[test]
+fn empty_and_foreign() {
+    assert_snapshot!(message(""), @"
+    t.csv: the file is empty
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(message("\n# only a comment\n\n"), @"
+    t.csv: the file is empty
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(message("t,y\n# nothing\n"), @"
+    t.csv: the file has no data
+      found: a row of column names only
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(message(b"t,y\n0,1\n1,\xb0\n"), @"
+    t.csv:3:3: the file is not UTF-8 text
+      found: the byte 0xb0
+      hint: save it as UTF-8, or write only plain letters there
+    ");
+    assert_snapshot!(message(b"\xfe\xff\0t\0,"), @"
+    t.csv:1:1: the file is not UTF-8 text
+      found: the byte 0xfe
+      hint: it looks like UTF-16: save it as UTF-8
+    ");
+    assert_snapshot!(message("t;y\n0,5;1,5\n"), @"
+    t.csv:1:1: the fields are separated by semicolons
+      found: `t;y`
+      expected: fields separated by commas, and decimal points
+    ");
+    assert_snapshot!(message("t\ty\n0\t1\n"), @r"
+    t.csv:1:1: the fields are separated by tabs
+      found: `t\ty`
+      expected: fields separated by commas, and decimal points
+    ");
+    assert_snapshot!(message("# t,y\n0.0,3.3\n0.1,3.2\n"), @"
+    t.csv:2:1: the column names are missing
+      found: the numbers `0.0, 3.3`
+      expected: one row of column names before the data
+      hint: a line that begins with `#` is a comment: remove the `#` before the names
+    ");
+}
+
+#[test]
+fn headers() {
+    assert_snapshot!(message("note\nt,y,t\n0,1,2\n").replace("note", ""), @"
+    t.csv:2: row 1: the row does not fit the column names
+      found: 3 fields
+      expected: 1 field, one per column
+    ");
+    assert_snapshot!(message("t,y,t\n0,1,2\n"), @"
+    t.csv:1:1: two columns have the name `t`
+      found: columns 1 and 3
+      expected: every column name once
+    ");
+    assert_snapshot!(column("t_s,y_m\n0,1\n", "y"), @"
+    t.csv: there is no such column
+      found: `y`
+      expected: one of: t_s, y_m
+      hint: did you mean `y_m`?
+    ");
+    assert_snapshot!(column("t_s,y_m\n0,1\n", "Y_M"), @"
+    t.csv: there is no such column
+      found: `Y_M`
+      expected: one of: t_s, y_m
+      hint: did you mean `y_m`?
+    ");
+    assert_snapshot!(column("t_s,y_m\n0,1\n", "acceleration"), @"
+    t.csv: there is no such column
+      found: `acceleration`
+      expected: one of: t_s, y_m
+    ");
+}
+
+#[test]
+fn fields() {
+    let mut text = "t,y\n# comment\n".to_owned();
+    for row in 1..20 {
+        text.push_str(&format!("{row},{}\n", if row == 17 { "off" } else { "1" }));
+    }
+    assert_snapshot!(column(&text, "y"), @"
+    t.csv:19: row 17, column `y`: not a number
+      found: `off`
+      expected: a finite number
+    ");
+    assert_snapshot!(column("t,y\n0,\n", "y"), @"
+    t.csv:2: row 1, column `y`: a number is missing
+      found: nothing
+      expected: a finite number
+    ");
+    assert_snapshot!(column("t,y\n0,NaN\n", "y"), @"
+    t.csv:2: row 1, column `y`: not a finite number
+      found: `NaN`
+      expected: a finite number
+    ");
+    assert_snapshot!(column("t,y\n0,1e999\n", "y"), @"
+    t.csv:2: row 1, column `y`: not a finite number
+      found: `1e999`
+      expected: a finite number
+    ");
+    assert_snapshot!(column("t,y\n0,\"3,5\"\n", "y"), @"
+    t.csv:2: row 1, column `y`: not a number
+      found: `3,5`
+      expected: a finite number
+      hint: write numbers with a decimal point, not a comma
+    ");
+    assert_snapshot!(column("t,y\n0,3.5 m\n", "y"), @"
+    t.csv:2: row 1, column `y`: not a number
+      found: `3.5 m`
+      expected: a finite number
+    ");
+    assert_snapshot!(column("t,y\n0,\"3.5\n1,2\n", "y"), @r"
+    t.csv:2: row 1, column `y`: not a number
+      found: `3.5\n1,2`
+      expected: a finite number
+      hint: a quote that is opened in this row is not closed in it
+    ");
+}
+
+#[test]
+fn ragged_rows() {
+    assert_snapshot!(message("t,y\n0,1\n1\n"), @"
+    t.csv:3: row 2: the row does not fit the column names
+      found: 1 field
+      expected: 2 fields, one per column
+    ");
+    assert_snapshot!(message("t,y\n0,1\n\n1,2,3\n"), @"
+    t.csv:4: row 2: the row does not fit the column names
+      found: 3 fields
+      expected: 2 fields, one per column
+    ");
+    assert_snapshot!(message("t,y\n0,5,1,5\n"), @"
+    t.csv:2: row 1: the row does not fit the column names
+      found: 4 fields
+      expected: 2 fields, one per column
+      hint: write numbers with a decimal point, not a comma
+    ");
+    assert_snapshot!(message("t,y\n\"0,1\n1,2\n"), @"
+    t.csv:2: row 1: the row does not fit the column names
+      found: 1 field
+      expected: 2 fields, one per column
+      hint: a quote that is opened in this row is not closed in it
+    ");
+}
+
+#[test]
+fn spacing() {
+    let increasing = |text: &str| {
+        shown(times::increasing(
+            &Table::parse("t.csv", text.as_bytes()).unwrap(),
+            "t",
+        ))
+    };
+    let equal = |text: &str| {
+        shown(times::equally_spaced(
+            &Table::parse("t.csv", text.as_bytes()).unwrap(),
+            "t",
+        ))
+    };
+    assert_snapshot!(increasing("t\n0\n1\n1\n2\n"), @"
+    t.csv:4: row 3, column `t`: two rows with the same time
+      found: 1 after 1 in line 3
+      expected: a time greater than 1
+    ");
+    assert_snapshot!(increasing("t\n0\n1\n# again\n0.5\n2\n"), @"
+    t.csv:5: row 3, column `t`: the times do not increase
+      found: 0.5 after 1 in line 3
+      expected: a time greater than 1
+    ");
+    assert_snapshot!(increasing("t\n0\nx\n"), @"
+    t.csv:3: row 2, column `t`: not a number
+      found: `x`
+      expected: a finite number
+    ");
+    assert_snapshot!(increasing("u\n0\n1\n"), @"
+    t.csv: there is no such column
+      found: `t`
+      expected: `u`
+    ");
+    assert_snapshot!(equal("t\n0\n0.1\n0.2\n0.4\n0.5\n0.6\n"), @"
+    t.csv:5: row 4, column `t`: the times are not equally spaced
+      found: 0.4 after 0.2, a spacing of 0.2
+      expected: a spacing of 0.1, as between most rows
+    ");
+    assert_snapshot!(equal("t\n0\n0.1\n0.20001\n0.3\n0.4\n"), @"
+    t.csv:4: row 3, column `t`: the times are not equally spaced
+      found: 0.20001 after 0.1, a spacing of 0.10001
+      expected: a spacing of 0.1, as between most rows
+    ");
+    assert_snapshot!(equal("t\n0\n0\n"), @"
+    t.csv:3: row 2, column `t`: two rows with the same time
+      found: 0 after 0 in line 2
+      expected: a time greater than 0
+    ");
+    assert_snapshot!(equal("t\n0\n"), @"
+    t.csv:2: row 1, column `t`: there is only one time
+      found: 1 row
+      expected: at least 2 rows, to have a spacing
+    ");
+}
