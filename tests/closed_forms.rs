@@ -24,7 +24,9 @@ fn bessel_error(nodes: usize, method: Method) -> f64 {
     };
     let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
     let errors = times.iter().zip(&motion.displacement);
-    errors.fold(0.0f64, |most, (t, y)| most.max((y - exact.displacement(*t)).abs()))
+    errors.fold(0.0f64, |most, (t, y)| {
+        most.max((y - exact.displacement(*t)).abs())
+    })
 }
 
 #[test]
@@ -41,13 +43,18 @@ fn the_closed_form_satisfies_its_initial_state_and_the_published_value() {
 fn midpoint_converges_to_the_bessel_solution_with_its_known_constant() {
     for nodes in [1000, 2000, 4000, 8000] {
         let constant = bessel_error(nodes, Method::Midpoint) * ((nodes - 1) as f64).powi(2);
-        assert!((constant / 11393.0 - 1.0).abs() < 0.01, "N = {nodes}: {constant}");
+        assert!(
+            (constant / 11393.0 - 1.0).abs() < 0.01,
+            "N = {nodes}: {constant}"
+        );
     }
 }
 
 #[test]
 fn rk4_converges_to_the_bessel_solution_with_order_4() {
-    let errors: Vec<f64> = [251, 501, 1001].map(|n| bessel_error(n, Method::Rk4)).to_vec();
+    let errors: Vec<f64> = [251, 501, 1001]
+        .map(|n| bessel_error(n, Method::Rk4))
+        .to_vec();
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();
         assert!((order - 4.0).abs() < 0.05, "{errors:?}");
@@ -78,7 +85,9 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
                 };
                 let motion = oscillator.forward(&device, initial, None).unwrap();
                 let times = oscillator.grid.times();
-                let exact = times.iter().map(|t| constant_coefficients((m, c, k), initial, *t));
+                let exact = times
+                    .iter()
+                    .map(|t| constant_coefficients((m, c, k), initial, *t));
                 let errors = exact.zip(motion.displacement.iter().zip(&motion.velocity));
                 errors.fold(0.0f64, |most, ((ye, ve), (y, v))| {
                     most.max((y - ye).abs()).max((v - ve).abs())
@@ -86,7 +95,10 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
             };
             let order = (error(801) / error(1601)).log2();
             let expected = f64::from(method.order());
-            assert!((order - expected).abs() < 0.1, "{m} {c} {k} {method:?}: order {order}");
+            assert!(
+                (order - expected).abs() < 0.1,
+                "{m} {c} {k} {method:?}: order {order}"
+            );
         }
     }
 }

@@ -3,8 +3,8 @@
 mod common;
 
 use common::reference::{Inputs, motion};
-use kmcfit::dynamics::{Device, DeviceTangent, Grid, Method, Oscillator, State, Term, Trajectory};
 use kmcfit::dynamics::adjoint::discrete;
+use kmcfit::dynamics::{Device, DeviceTangent, Grid, Method, Oscillator, State, Term, Trajectory};
 use kmcfit::objective::GradientKind;
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
@@ -57,7 +57,9 @@ impl Case {
     fn adjoint_gradient(&self) -> DeviceTangent {
         let oscillator = self.oscillator();
         let force = Some(self.force.as_slice());
-        let motion = oscillator.forward(&self.device, self.initial, force).unwrap();
+        let motion = oscillator
+            .forward(&self.device, self.initial, force)
+            .unwrap();
         let source = self.source(&motion);
         discrete::gradient(&oscillator, &self.device, force, &motion, &source)
     }
@@ -192,10 +194,16 @@ fn taylor_remainders_of_the_discrete_gradient_fall_with_the_square_of_the_step()
     let remainders = problem
         .taylor_remainders(&theta, &direction, GradientKind::Discrete, &steps)
         .unwrap();
-    let rates: Vec<f64> = remainders.windows(2).map(|w| (w[0] / w[1]).log2()).collect();
+    let rates: Vec<f64> = remainders
+        .windows(2)
+        .map(|w| (w[0] / w[1]).log2())
+        .collect();
     // The next order of the expansion shows at the longest step and halves with every step.
     for (i, rate) in rates.iter().enumerate() {
-        assert!((rate - 2.0).abs() < 0.1 * 0.5f64.powi(i as i32) + 0.01, "{rates:?}");
+        assert!(
+            (rate - 2.0).abs() < 0.1 * 0.5f64.powi(i as i32) + 0.01,
+            "{rates:?}"
+        );
     }
 }
 
@@ -213,7 +221,10 @@ fn the_error_of_the_discrete_gradient_falls_in_proportion_to_the_step() {
             let step = 10f64.powi(exponent);
             let error = figure_2(nodes, GradientKind::Discrete, step);
             let expected = 9.5 * step;
-            assert!((error / expected - 1.0).abs() < 0.2, "N = {nodes}, a = {step}: {error}");
+            assert!(
+                (error / expected - 1.0).abs() < 0.2,
+                "N = {nodes}, a = {step}: {error}"
+            );
         }
         assert!(figure_2(nodes, GradientKind::Discrete, 1e-8) <= 1.2e-7);
     }

@@ -60,7 +60,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         return Ok(OK);
     }
-    let folder = arguments.out.as_deref().map(OutputFolder::prepare).transpose()?;
+    let folder = arguments
+        .out
+        .as_deref()
+        .map(OutputFolder::prepare)
+        .transpose()?;
     let mut curves = Vec::new();
     print(&format!(
         "{:>8}  {:<10}  {:>12}  {:>9}\n",
@@ -133,7 +137,9 @@ fn verdict(curves: &[Curve]) -> u8 {
         .filter(|c| c.kind == GradientKind::Discrete && !(c.best().1 <= PASS))
         .collect();
     if failed.is_empty() {
-        print(&format!("the discrete gradient is exact: least error below {PASS:.0e}\n"));
+        print(&format!(
+            "the discrete gradient is exact: least error below {PASS:.0e}\n"
+        ));
         return OK;
     }
     for curve in failed {
@@ -155,7 +161,10 @@ fn write(folder: &OutputFolder, curves: &[Curve]) -> std::io::Result<()> {
             error: &c.error,
         })
         .collect();
-    folder.write("figures/gradient.svg", &render(&figures::gradient_error(&drawn)))?;
+    folder.write(
+        "figures/gradient.svg",
+        &render(&figures::gradient_error(&drawn)),
+    )?;
     let mut table = CsvTable::new().column("step", steps());
     for curve in curves {
         // Steps that broke down are missing from a curve.

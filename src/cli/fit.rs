@@ -53,11 +53,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 fn search(model: &Model) -> Result<Fit, Failure> {
     let progress = Progress::new(model.settings.stopping.iterations);
     let start = model.problem.functions.start();
-    let result = fit(&model.problem, &start, &model.settings, &mut |row| progress.show(row));
+    let result = fit(&model.problem, &start, &model.settings, &mut |row| {
+        progress.show(row)
+    });
     progress.clear();
-    result.map_err(|breakdown| {
-        Failure::Numerical(format!("the start has no motion: {breakdown}"))
-    })
+    result.map_err(|breakdown| Failure::Numerical(format!("the start has no motion: {breakdown}")))
 }
 
 fn predictions(

@@ -90,9 +90,12 @@ fn exit_code(status: Status) -> u8 {
 
 /// A failure to write, as an input error about where the output should go.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
-    InputError::new(Place::Argument("--out".into()), "the results cannot be written")
-        .found(format!("{}: {error}", path.display()))
-        .expected("a place that can be written to")
+    InputError::new(
+        Place::Argument("--out".into()),
+        "the results cannot be written",
+    )
+    .found(format!("{}: {error}", path.display()))
+    .expected("a place that can be written to")
 }
 
 /// Prints results; a reader that has gone away (`| head`) is no error.

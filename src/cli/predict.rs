@@ -32,7 +32,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
     let run = FinishedRun::open(&arguments.run)?;
-    let folder = arguments.out.as_deref().map(OutputFolder::prepare).transpose()?;
+    let folder = arguments
+        .out
+        .as_deref()
+        .map(OutputFolder::prepare)
+        .transpose()?;
     let motions = predict(&run.oscillator, &run.device, run.truth.as_ref(), &states)
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     if let Some(folder) = folder {
@@ -67,11 +71,7 @@ fn state(text: &str) -> Result<State, InputError> {
     }
 }
 
-fn write(
-    folder: &OutputFolder,
-    times: &[f64],
-    motions: &[PredictedMotion],
-) -> std::io::Result<()> {
+fn write(folder: &OutputFolder, times: &[f64], motions: &[PredictedMotion]) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
     for (i, motion) in motions.iter().enumerate() {
         table = table.column(format!("y_m_{}", i + 1), motion.motion.displacement.clone());

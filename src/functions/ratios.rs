@@ -21,7 +21,11 @@ impl Ratios {
     /// # Panics
     /// If the device has fewer coefficients.
     pub fn of(device: &Device) -> Self {
-        let (m, c, k) = (&device.mass, &device.coefficients[0], &device.coefficients[1]);
+        let (m, c, k) = (
+            &device.mass,
+            &device.coefficients[0],
+            &device.coefficients[1],
+        );
         let over_mass = |f: &[f64]| -> Vec<f64> { f.iter().zip(m).map(|(f, m)| f / m).collect() };
         let k_over_m = over_mass(k);
         let c_over_m = over_mass(c);
@@ -30,7 +34,13 @@ impl Ratios {
             .map(|r| r.sqrt() / std::f64::consts::TAU)
             .collect();
         let damping_ratio = (c_over_m.iter().zip(&k_over_m))
-            .map(|(c, k)| if *k > 0.0 { 0.5 * c / k.sqrt() } else { f64::NAN })
+            .map(|(c, k)| {
+                if *k > 0.0 {
+                    0.5 * c / k.sqrt()
+                } else {
+                    f64::NAN
+                }
+            })
             .collect();
         Self {
             k_over_m,

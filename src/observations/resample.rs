@@ -24,7 +24,9 @@ pub fn resample(values: &[f64], count: usize) -> Vec<f64> {
 fn lagrange(values: &[f64], x: f64) -> f64 {
     let weight = |j: usize| -> f64 {
         let others = (0..values.len()).filter(|&k| k != j);
-        others.map(|k| (x - k as f64) / (j as f64 - k as f64)).product()
+        others
+            .map(|k| (x - k as f64) / (j as f64 - k as f64))
+            .product()
     };
     values.iter().enumerate().map(|(j, v)| v * weight(j)).sum()
 }

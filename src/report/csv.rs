@@ -62,7 +62,15 @@ mod tests {
 
     #[test]
     fn numbers_read_back_to_the_same_bits() {
-        let values = vec![0.1 + 0.2, 1e-300, -2.5e22, 0.0, 1.0, f64::MIN_POSITIVE, 25.0 / 1999.0];
+        let values = vec![
+            0.1 + 0.2,
+            1e-300,
+            -2.5e22,
+            0.0,
+            1.0,
+            f64::MIN_POSITIVE,
+            25.0 / 1999.0,
+        ];
         let text = CsvTable::new().column("x", values.clone()).to_csv();
         let read: Vec<f64> = text.lines().skip(1).map(|l| l.parse().unwrap()).collect();
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
@@ -71,7 +79,10 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_empty() {
-        let text = CsvTable::new().column("a", vec![f64::NAN]).column("b", vec![1.0]).to_csv();
+        let text = CsvTable::new()
+            .column("a", vec![f64::NAN])
+            .column("b", vec![1.0])
+            .to_csv();
         assert_eq!(text, "a,b\n,1\n");
     }
 }

@@ -1,9 +1,9 @@
 //! The standard figures of a fit, from plain slices.
 
-use super::predict::PredictedMotion;
-use crate::dynamics::Trajectory;
 use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
+use super::predict::PredictedMotion;
+use crate::dynamics::Trajectory;
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
@@ -278,12 +278,20 @@ pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
     motions.iter().fold(figure, |figure, predicted| {
         let found = Style::new(Colour::Blue).width(1.8);
         let state = &predicted.summary;
-        let title = format!("from y = {} m, v = {} m/s", state.displacement, state.velocity);
+        let title = format!(
+            "from y = {} m, v = {} m/s",
+            state.displacement, state.velocity
+        );
         let true_motion = |motion: &Trajectory| truth(t, &motion.displacement);
         figure.panel(
             Panel::new(time(), Axis::linear("displacement y", "m"))
                 .title(title)
-                .mark(Mark::line("predicted", t, &predicted.motion.displacement, found))
+                .mark(Mark::line(
+                    "predicted",
+                    t,
+                    &predicted.motion.displacement,
+                    found,
+                ))
                 .maybe(predicted.truth.as_ref().map(true_motion)),
         )
     })

@@ -40,8 +40,10 @@ impl FinishedRun {
         let grid = (document.model.grid())
             .ok_or_else(|| unusable(format!("{} nodes", document.model.nodes)))?;
         let steppers = [Method::Midpoint, Method::Rk4];
-        let method = (steppers.into_iter().find(|m| m.name() == document.model.stepper))
-            .ok_or_else(|| unusable(format!("stepper `{}`", document.model.stepper)))?;
+        let method = (steppers
+            .into_iter()
+            .find(|m| m.name() == document.model.stepper))
+        .ok_or_else(|| unusable(format!("stepper `{}`", document.model.stepper)))?;
         let table = Table::read(folder.join("functions.csv"))?;
         if table.rows() != grid.nodes() {
             return Err(

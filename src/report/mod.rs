@@ -36,11 +36,11 @@ pub mod svg;
 mod text;
 
 pub use csv::CsvTable;
-pub use finished::FinishedRun;
-pub use summary::{prediction_table, summary};
+pub use figure::{Axis, Figure, Panel, Scale};
 pub use files::{OutputFolder, write_whole};
+pub use finished::FinishedRun;
+pub use mark::{Colour, Dash, Mark, Style};
 pub use predict::{PredictedMotion, predict};
 pub use run::{Run, json};
-pub use figure::{Axis, Figure, Panel, Scale};
-pub use mark::{Colour, Dash, Mark, Style};
+pub use summary::{prediction_table, summary};
 pub use svg::render;

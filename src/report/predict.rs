@@ -49,7 +49,9 @@ fn summarise(
     truth: Option<&Trajectory>,
 ) -> Prediction {
     let integral = |f: &dyn Fn(usize) -> f64| {
-        let squares: Vec<f64> = (0..motion.displacement.len()).map(|i| f(i).powi(2)).collect();
+        let squares: Vec<f64> = (0..motion.displacement.len())
+            .map(|i| f(i).powi(2))
+            .collect();
         trapezoid(&squares, oscillator.grid.step())
     };
     Prediction {

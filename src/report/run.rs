@@ -38,7 +38,11 @@ impl Run<'_> {
         folder.write("history.csv", &self.history().to_csv())?;
         folder.write("functions.csv", &self.functions_table().to_csv())?;
         folder.write("trajectory.csv", &self.trajectories().to_csv())?;
-        let figures = if with_figures { self.figures() } else { Vec::new() };
+        let figures = if with_figures {
+            self.figures()
+        } else {
+            Vec::new()
+        };
         for figure in figures {
             folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
@@ -188,7 +192,10 @@ impl Run<'_> {
         let problem = &self.model.problem;
         let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
         let several = problem.experiments.len() > 1;
-        let motions = problem.experiments.iter().zip(&self.fit.best.evaluation.trajectories);
+        let motions = problem
+            .experiments
+            .iter()
+            .zip(&self.fit.best.evaluation.trajectories);
         for (i, (experiment, motion)) in motions.enumerate() {
             let name = |column: &str| match several {
                 true => format!("{column}_{}", i + 1),
@@ -210,7 +217,11 @@ impl Run<'_> {
 
     /// The figures of a fit.
     pub fn figures(&self) -> Vec<Figure> {
-        let mut figures = vec![self.convergence(), self.functions_figure(), self.ratios_figure()];
+        let mut figures = vec![
+            self.convergence(),
+            self.functions_figure(),
+            self.ratios_figure(),
+        ];
         let problem = &self.model.problem;
         let several = problem.experiments.len() > 1;
         for (i, experiment) in problem.experiments.iter().enumerate() {
@@ -248,7 +259,11 @@ impl Run<'_> {
         let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
             .map(|s| {
                 let motion = &s.trajectories[experiment];
-                (s.iteration as usize, grid_times.as_slice(), motion.displacement.as_slice())
+                (
+                    s.iteration as usize,
+                    grid_times.as_slice(),
+                    motion.displacement.as_slice(),
+                )
             })
             .collect();
         let last = self.fit.history.len();
@@ -299,13 +314,19 @@ fn curves(ratios: &Ratios) -> RatioCurves<'_> {
 
 fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
     let errors = |truth: &[f64]| -> Vec<f64> {
-        values.iter().zip(truth).map(|(a, b)| (a - b).abs()).collect()
+        values
+            .iter()
+            .zip(truth)
+            .map(|(a, b)| (a - b).abs())
+            .collect()
     };
     let errors = truth.map(errors);
     FunctionSummary {
         min: values.iter().copied().fold(f64::INFINITY, f64::min),
         max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        truth_max_error: errors.as_ref().map(|e| e.iter().copied().fold(0.0, f64::max)),
+        truth_max_error: errors
+            .as_ref()
+            .map(|e| e.iter().copied().fold(0.0, f64::max)),
         truth_rms_error: errors
             .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
     }

@@ -14,7 +14,11 @@ pub fn summary(document: &ResultDocument) -> String {
 fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let cost = &document.cost;
     writeln!(text, "{}", document.title)?;
-    writeln!(text, "{}: {}", document.outcome.status, document.outcome.reason)?;
+    writeln!(
+        text,
+        "{}: {}",
+        document.outcome.status, document.outcome.reason
+    )?;
     writeln!(
         text,
         "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {} iterations, {} forward and {} adjoint solves, {:.2} s",
@@ -42,7 +46,10 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
 }
 
 fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let has_truth = document.functions.values().any(|f| f.truth_max_error.is_some());
+    let has_truth = document
+        .functions
+        .values()
+        .any(|f| f.truth_max_error.is_some());
     write!(text, "{:<10} {:>12} {:>12}", "function", "min", "max")?;
     if has_truth {
         write!(text, " {:>14} {:>14}", "largest error", "rms error")?;
@@ -52,7 +59,11 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         let Some(function) = document.functions.get(name) else {
             continue;
         };
-        write!(text, "{name:<10} {:>12.5} {:>12.5}", function.min, function.max)?;
+        write!(
+            text,
+            "{name:<10} {:>12.5} {:>12.5}",
+            function.min, function.max
+        )?;
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }

@@ -25,7 +25,11 @@ pub(super) struct Record {
 pub(super) fn read(file: &ModelFile, purpose: Purpose) -> Result<Vec<Option<Record>>, InputError> {
     if matches!(purpose, Purpose::Simulate { .. }) {
         // The duration may still have to come from the readings.
-        let has_duration = file.spec.grid.as_ref().is_some_and(|g| g.duration.is_some());
+        let has_duration = file
+            .spec
+            .grid
+            .as_ref()
+            .is_some_and(|g| g.duration.is_some());
         let all_have_data = file.spec.experiments.iter().all(|e| e.data.is_some());
         if has_duration || !all_have_data {
             return Ok(file.spec.experiments.iter().map(|_| None).collect());
@@ -123,11 +127,7 @@ pub(super) fn build(
         .collect()
 }
 
-fn weighting(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-) -> Result<Option<f64>, InputError> {
+fn weighting(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> Result<Option<f64>, InputError> {
     let sigma = spec.sigma.as_ref().and_then(|s| s.displacement.as_ref());
     match sigma {
         Some(sigma) if sigma.0 <= 0.0 => Err(file

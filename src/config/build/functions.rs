@@ -75,10 +75,17 @@ fn free(
         }
         (Basis::Constant, NumberOrColumn::Number(value)) => {
             positive_mass(file, quantity, &key, &[value.0])?;
-            Ok(CoefficientFunction::constant(quantity, value.0, grid.nodes()))
+            Ok(CoefficientFunction::constant(
+                quantity,
+                value.0,
+                grid.nodes(),
+            ))
         }
         (Basis::Constant, NumberOrColumn::Column(_)) => Err(file
-            .error_at(&key, "the basis `constant` has one value, not a column of them")
+            .error_at(
+                &key,
+                "the basis `constant` has one value, not a column of them",
+            )
             .found("a column of a file")
             .expected("a number")),
     }

@@ -67,7 +67,10 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let mut warnings = Vec::new();
     let list = functions::build(file, &grid, &mut warnings)?;
     let functions = Functions::new(list, grid.nodes(), grid.step()).ok_or_else(|| {
-        file.error_at("functions", "a basis has functions that the grid cannot tell apart")
+        file.error_at(
+            "functions",
+            "a basis has functions that the grid cannot tell apart",
+        )
     })?;
     let problem = Problem {
         oscillator: Oscillator {
@@ -100,9 +103,9 @@ const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::
 fn title(file: &ModelFile) -> String {
     match &file.spec.title {
         Some(title) => title.0.clone(),
-        None => file
-            .path
-            .file_stem()
-            .map_or_else(|| "untitled".into(), |stem| stem.to_string_lossy().into_owned()),
+        None => file.path.file_stem().map_or_else(
+            || "untitled".into(),
+            |stem| stem.to_string_lossy().into_owned(),
+        ),
     }
 }

@@ -40,7 +40,11 @@ pub(super) fn column_on_grid(
                 .expected(format!("at least {first} s to {last} s")),
         );
     }
-    Ok(grid.times().iter().map(|t| linear(times, values, *t)).collect())
+    Ok(grid
+        .times()
+        .iter()
+        .map(|t| linear(times, values, *t))
+        .collect())
 }
 
 /// Linear interpolation, constant beyond the ends.
