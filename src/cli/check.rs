@@ -134,7 +134,7 @@ fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
 
 fn verdict(curves: &[Curve]) -> u8 {
     let failed: Vec<&Curve> = (curves.iter())
-        .filter(|c| c.kind == GradientKind::Discrete && !(c.best().1 <= PASS))
+        .filter(|c| c.kind == GradientKind::Discrete && c.best().1.is_nan() || c.best().1 > PASS)
         .collect();
     if failed.is_empty() {
         print(&format!(

@@ -119,8 +119,7 @@ impl Oscillator {
     }
 
     fn require_positive_mass(&self, device: &Device) -> Result<(), Breakdown> {
-        // Also true for NaN, which is why the comparison is not turned round.
-        let broken = |m: &f64| !(*m > 0.0);
+        let broken = |m: &f64| m.is_nan() || *m <= 0.0;
         match device.mass.iter().position(broken) {
             Some(node) => Err(self.breakdown(Cause::Mass, node, device.mass[node])),
             None => Ok(()),

@@ -15,7 +15,7 @@ pub enum Gram {
         /// `G`.
         matrix: CsrMatrix<f64>,
         /// Its factor.
-        factor: CscCholesky<f64>,
+        factor: Box<CscCholesky<f64>>,
     },
 }
 
@@ -36,7 +36,7 @@ impl Gram {
                 let factor = CscCholesky::factor(&CscMatrix::from(&gram)).ok()?;
                 Some(Gram::Factored {
                     matrix: gram,
-                    factor,
+                    factor: Box::new(factor),
                 })
             }
         }

@@ -2,7 +2,7 @@
 
 mod resample;
 mod table;
-mod times;
+pub mod times;
 
 pub use resample::resample;
 pub use table::Table;

@@ -44,7 +44,7 @@ impl Lbfgs {
         let gradient = at.gradient(point);
         let direction = self.direction(at, &gradient);
         let slope = at.inner(&gradient, &direction);
-        if !(slope < 0.0) {
+        if slope.is_nan() || slope >= 0.0 {
             return None;
         }
         let first = if self.pairs.is_empty() {

@@ -60,3 +60,25 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         }],
     }
 }
+
+/// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None`, loudly,
+/// where it is absent.
+pub fn shared(folder: &str) -> Option<std::path::PathBuf> {
+    let root = std::env::var_os("KMCFIT_SHARED").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+        std::path::PathBuf::from,
+    );
+    let path = root.join(folder);
+    if path.is_dir() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: no shared `{folder}`; set KMCFIT_SHARED to check against it");
+    None
+}
+
+/// The numbers of a CSV file without its header.
+pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = |line: &str| line.split(',').map(|x| x.parse().unwrap()).collect();
+    text.lines().skip(1).map(row).collect()
+}

@@ -72,7 +72,7 @@ fn every_key_is_read() {
     assert_eq!(grid.duration.map(f64::from), Some(25.0));
 
     let functions = spec.functions;
-    assert_eq!(functions.mass.basis, Basis::Nodal);
+    assert_eq!(functions.mass.basis, Some(Basis::Nodal));
     assert_eq!(
         functions.mass.start,
         Some(NumberOrColumn::Number(Number(2.0)))
