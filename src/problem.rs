@@ -1,7 +1,7 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
 use crate::dynamics::{Oscillator, State};
-use crate::functions::Functions;
+use crate::functions::{Functions, Penalty};
 use crate::objective::{Readings, Weighting};
 
 /// One record of the device's motion.
@@ -26,9 +26,25 @@ pub struct Problem {
     pub functions: Functions,
     /// The records.
     pub experiments: Vec<Experiment>,
+    /// What the functions pay for being rough.
+    pub penalties: Vec<Penalty>,
 }
 
 impl Problem {
+    /// A problem without regularisation.
+    pub fn new(
+        oscillator: Oscillator,
+        functions: Functions,
+        experiments: Vec<Experiment>,
+    ) -> Self {
+        Self {
+            oscillator,
+            functions,
+            experiments,
+            penalties: Vec::new(),
+        }
+    }
+
     /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading per node.
     pub fn supports_continuous(&self) -> bool {
         let fits =

@@ -246,8 +246,8 @@ fn the_error_of_the_continuous_gradient_has_the_floors_of_the_paper() {
 fn difference_of_gradients(nodes: usize) -> [f64; 3] {
     let problem = common::paper_problem(nodes, [2.0, 1.0, 1.0]);
     let here = problem.evaluate(&problem.functions.start()).unwrap();
-    let discrete = problem.gradient(&here, GradientKind::Discrete);
-    let continuous = problem.gradient(&here, GradientKind::Continuous);
+    let discrete = problem.gradient(&problem.functions.start(), &here, GradientKind::Discrete);
+    let continuous = problem.gradient(&problem.functions.start(), &here, GradientKind::Continuous);
     let largest = discrete.l2.iter().fold(0.0f64, |m, g| m.max(g.abs()));
     let pairs = || discrete.l2.iter().zip(&continuous.l2);
     let most = pairs().fold(0.0f64, |m, (d, c)| m.max((d - c).abs()));

@@ -137,7 +137,7 @@ fn all_rows_and_the_optimum_follow_the_shared_reference() {
 fn the_gradient_at_the_start_has_the_known_norm_and_integrals() {
     let problem = common::paper_problem(2000, [2.0, 1.0, 1.0]);
     let here = problem.evaluate(&problem.functions.start()).unwrap();
-    let gradient = problem.gradient(&here, GradientKind::Continuous);
+    let gradient = problem.gradient(&problem.functions.start(), &here, GradientKind::Continuous);
     assert!((gradient.norm_squared / 1127.38210431 - 1.0).abs() < 1e-11);
     let dt = problem.oscillator.grid.step();
     let expected = [23.47941458, -9.07073615, -37.88810824];

@@ -46,6 +46,16 @@ impl Position {
         }
     }
 
+    /// How much of a node's value, at either end of a step, is seen at this position.
+    #[inline(always)]
+    pub fn share(self, node: Position) -> f64 {
+        match (self, node) {
+            (Position::Middle, _) => 0.5,
+            (here, node) if here == node => 1.0,
+            _ => 0.0,
+        }
+    }
+
     /// Transpose of [`Position::of`]: adds `value` to the nodes that the position reads.
     #[inline(always)]
     pub fn spread(self, f: &mut [f64], i: usize, value: f64) {

@@ -8,12 +8,14 @@ pub mod basis;
 mod collection;
 mod design;
 mod gram;
+mod penalty;
 mod quantity;
 mod ratios;
 
 pub use collection::Functions;
 pub use design::Design;
 pub use gram::Gram;
+pub use penalty::Penalty;
 pub use quantity::Quantity;
 pub use ratios::Ratios;
 

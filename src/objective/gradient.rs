@@ -41,25 +41,37 @@ impl Problem {
     ///
     /// # Panics
     /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
-    pub fn gradient(&self, evaluation: &Evaluation, kind: GradientKind) -> Gradient {
-        match kind {
+    pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
+        let (mut euclidean, mut l2) = match kind {
             GradientKind::Discrete => {
                 let nodal = self.discrete_gradient(evaluation);
                 let euclidean = self.functions.transpose(&nodal);
                 let l2 = self.functions.gram_solve(&euclidean);
-                self.assemble(euclidean, l2)
+                (euclidean, l2)
             }
             GradientKind::Continuous => self.continuous_gradient(evaluation),
+        };
+        if !self.penalties.is_empty() {
+            let push = self.penalty_gradient(theta);
+            let push_l2 = self.functions.gram_solve(&push);
+            euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
+            l2.iter_mut().zip(&push_l2).for_each(|(g, p)| *g += p);
         }
-    }
-
-    fn assemble(&self, euclidean: Vec<f64>, l2: Vec<f64>) -> Gradient {
         let norm_squared = self.functions.norm_squared(&l2);
         Gradient {
             euclidean,
             l2,
             norm_squared,
         }
+    }
+
+    fn penalty_gradient(&self, theta: &[f64]) -> Vec<f64> {
+        let mut gradient = vec![0.0; theta.len()];
+        for penalty in &self.penalties {
+            let range = self.functions.ranges()[penalty.function].clone();
+            penalty.add_gradient(&theta[range.clone()], &mut gradient[range]);
+        }
+        gradient
     }
 
     /// Euclidean gradient in nodal values.
@@ -85,7 +97,8 @@ impl Problem {
         total
     }
 
-    fn continuous_gradient(&self, evaluation: &Evaluation) -> Gradient {
+    /// Euclidean gradient in the parameters, and the parameters of the L2 gradient.
+    fn continuous_gradient(&self, evaluation: &Evaluation) -> (Vec<f64>, Vec<f64>) {
         assert!(
             self.supports_continuous(),
             "Eq. 13 needs one reading per node and no sigma"
@@ -118,7 +131,7 @@ impl Problem {
                 l2[range.clone()].copy_from_slice(values);
             }
         }
-        self.assemble(euclidean, l2)
+        (euclidean, l2)
     }
 }
 

@@ -14,8 +14,12 @@ use crate::problem::Problem;
 /// The cost at one point and everything that it was computed from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// Cost `J`.
+    /// Cost `J`, the sum of the next two.
     pub cost: f64,
+    /// Part of the readings.
+    pub misfit: f64,
+    /// Part of the penalties.
+    pub regularisation: f64,
     /// The device at this point.
     pub device: Device,
     /// The motion in each experiment.
@@ -27,6 +31,8 @@ impl Problem {
     pub fn workspace(&self) -> Evaluation {
         Evaluation {
             cost: f64::NAN,
+            misfit: f64::NAN,
+            regularisation: f64::NAN,
             device: self.functions.empty_device(),
             trajectories: vec![Trajectory::default(); self.experiments.len()],
         }
@@ -34,7 +40,8 @@ impl Problem {
 
     /// Cost, device and motions for the parameters `theta`.
     ///
-    /// The cost is the sum over the experiments of [`Readings::cost`].
+    /// The cost is the sum over the experiments of [`Readings::cost`] plus the sum over the penalties
+    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]).
     ///
     /// # Errors
     /// A [`Breakdown`] if a motion does not exist: the mass is not positive, or it overflows.
@@ -55,7 +62,7 @@ impl Problem {
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
         self.functions.device_into(theta, &mut evaluation.device);
-        evaluation.cost = 0.0;
+        evaluation.misfit = 0.0;
         for (experiment, trajectory) in self.experiments.iter().zip(&mut evaluation.trajectories) {
             self.oscillator.forward_into(
                 &evaluation.device,
@@ -64,9 +71,20 @@ impl Problem {
                 trajectory,
             )?;
             if let Some(readings) = &experiment.readings {
-                evaluation.cost += readings.cost(&trajectory.displacement);
+                evaluation.misfit += readings.cost(&trajectory.displacement);
             }
         }
+        evaluation.regularisation = self.regularisation(theta);
+        evaluation.cost = evaluation.misfit + evaluation.regularisation;
         Ok(())
+    }
+
+    /// `sum_j weight_j |L_j theta_j - target_j|^2`.
+    fn regularisation(&self, theta: &[f64]) -> f64 {
+        let ranges = self.functions.ranges();
+        let paid = self.penalties.iter().map(|penalty| {
+            penalty.weight * penalty.roughness(&theta[ranges[penalty.function].clone()])
+        });
+        paid.sum()
     }
 }

@@ -27,7 +27,7 @@ impl Problem {
         steps: &[f64],
     ) -> Result<Vec<GradientError>, Breakdown> {
         let here = self.evaluate(theta)?;
-        let gradient = self.gradient(&here, kind);
+        let gradient = self.gradient(theta, &here, kind);
         let mut trial = self.workspace();
         let mut errors = Vec::with_capacity(steps.len());
         for &step in steps {
@@ -49,12 +49,13 @@ impl Problem {
     pub fn cost_difference(&self, from: &Evaluation, to: &Evaluation) -> f64 {
         let motions = from.trajectories.iter().zip(&to.trajectories);
         let pairs = self.experiments.iter().zip(motions);
-        pairs
+        let misfit: f64 = pairs
             .filter_map(|(experiment, (from, to))| {
                 let readings = experiment.readings.as_ref()?;
                 Some(readings.cost_difference(&from.displacement, &to.displacement))
             })
-            .sum()
+            .sum();
+        misfit + (to.regularisation - from.regularisation)
     }
 
     /// Taylor remainders `|J(theta + a d) - J(theta) - a <dJ, d>|` along `direction` for each of
@@ -70,7 +71,7 @@ impl Problem {
         steps: &[f64],
     ) -> Result<Vec<f64>, Breakdown> {
         let here = self.evaluate(theta)?;
-        let gradient = self.gradient(&here, kind).euclidean;
+        let gradient = self.gradient(theta, &here, kind).euclidean;
         let slope: f64 = gradient.iter().zip(direction).map(|(g, d)| g * d).sum();
         let mut trial = self.workspace();
         let mut remainder = |step: f64| {

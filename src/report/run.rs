@@ -65,8 +65,8 @@ impl Run<'_> {
                 initial: fit.initial_cost,
                 r#final: fit.best.evaluation.cost,
                 ratio: fit.cost_ratio(),
-                misfit: fit.best.evaluation.cost,
-                regularisation: 0.0,
+                misfit: fit.best.evaluation.misfit,
+                regularisation: fit.best.evaluation.regularisation,
             },
             gradient: GradientSummary {
                 initial_norm_squared: fit.initial_norm_squared,

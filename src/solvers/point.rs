@@ -60,14 +60,14 @@ impl<'a, 'p> Work<'a, 'p> {
     }
 
     /// One adjoint solve at an evaluated point.
-    pub fn gradient(&mut self, evaluation: &Evaluation) -> Gradient {
+    pub fn gradient(&mut self, parameters: &[f64], evaluation: &Evaluation) -> Gradient {
         *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
-        self.problem().gradient(evaluation, self.kind)
+        self.problem().gradient(parameters, evaluation, self.kind)
     }
 
     /// The point that an evaluation belongs to, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
-        let gradient = self.gradient(&evaluation);
+        let gradient = self.gradient(&parameters, &evaluation);
         Point {
             parameters,
             evaluation,

@@ -49,16 +49,14 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .map(|(q, value)| CoefficientFunction::nodal(q, vec![value; nodes]))
         .collect();
     let weighting = Weighting::Integral { spacing: step };
-    Problem {
-        functions: Functions::new(list, nodes, step).unwrap(),
-        oscillator,
-        experiments: vec![Experiment {
-            name: "free decay".into(),
-            initial: INITIAL,
-            force: None,
-            readings: Some(Readings::new(observed, 1, weighting)),
-        }],
-    }
+    let experiment = Experiment {
+        name: "free decay".into(),
+        initial: INITIAL,
+        force: None,
+        readings: Some(Readings::new(observed, 1, weighting)),
+    };
+    let functions = Functions::new(list, nodes, step).unwrap();
+    Problem::new(oscillator, functions, vec![experiment])
 }
 
 /// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None`, loudly,

@@ -72,15 +72,13 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
             "a basis has functions that the grid cannot tell apart",
         )
     })?;
-    let problem = Problem {
-        oscillator: Oscillator {
-            grid,
-            method: grid::method(file),
-            terms: vec![Term::Damping, Term::Stiffness],
-        },
-        functions,
-        experiments: experiments::build(file, purpose, &grid, records)?,
+    let oscillator = Oscillator {
+        grid,
+        method: grid::method(file),
+        terms: vec![Term::Damping, Term::Stiffness],
     };
+    let experiments = experiments::build(file, purpose, &grid, records)?;
+    let problem = Problem::new(oscillator, functions, experiments);
     let settings = fit::build(file, &problem)?;
     let truth = functions::truth(file, &grid)?;
     let state = |s: &super::spec::StateSpec| State {

@@ -1,0 +1,55 @@
+//! Smoothness: what a function pays for its roughness.
+
+use super::Design;
+use nalgebra_sparse::CsrMatrix;
+
+/// `weight * |L theta_j - target|^2` for one function `j`.
+///
+/// With `L` the roughness rows of order `q` of a basis and no target this is
+/// `weight * integral (d^q p/dt^q)^2 dt`: the same for every basis and number of nodes. It stays in
+/// residual form: `L^T L` holds powers of `1/dt^4` and loses the digits of a smooth function.
+#[derive(Debug, Clone)]
+pub struct Penalty {
+    /// Index of the function, mass 0.
+    pub function: usize,
+    /// Order `q` of the derivative.
+    pub order: usize,
+    /// Weight, in the unit of J per unit of the integral.
+    pub weight: f64,
+    /// `L`, rows x parameters of the function.
+    pub rows: Design,
+    /// Target of the rows.
+    pub target: Vec<f64>,
+}
+
+impl Penalty {
+    /// Roughness `rows` of order `order` with target zero.
+    pub fn new(function: usize, order: usize, weight: f64, rows: CsrMatrix<f64>) -> Self {
+        Self {
+            function,
+            order,
+            weight,
+            target: vec![0.0; rows.nrows()],
+            rows: Design::Sparse(rows),
+        }
+    }
+
+    /// `L theta - target`.
+    pub fn residuals(&self, theta: &[f64]) -> Vec<f64> {
+        let mut residuals: Vec<f64> = self.target.iter().map(|t| -t).collect();
+        self.rows.multiply_add(theta, &mut residuals);
+        residuals
+    }
+
+    /// `|L theta - target|^2`, without the weight.
+    pub fn roughness(&self, theta: &[f64]) -> f64 {
+        self.residuals(theta).iter().map(|r| r * r).sum()
+    }
+
+    /// Adds `2 weight L^T (L theta - target)` to the gradient in the function's parameters.
+    pub fn add_gradient(&self, theta: &[f64], gradient: &mut [f64]) {
+        let mut residuals = self.residuals(theta);
+        residuals.iter_mut().for_each(|r| *r *= 2.0 * self.weight);
+        self.rows.transpose_multiply_add(&residuals, gradient);
+    }
+}
