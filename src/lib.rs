@@ -5,6 +5,7 @@
 )]
 pub mod cli;
 pub mod config;
+pub mod constraints;
 pub mod dynamics;
 pub mod error;
 pub mod functions;
@@ -13,5 +14,6 @@ mod near;
 pub mod objective;
 pub mod observations;
 pub mod problem;
+pub mod qp;
 pub mod report;
 pub mod solvers;

@@ -1,5 +1,6 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
+use crate::constraints::Constraints;
 use crate::dynamics::{Oscillator, State};
 use crate::functions::{Functions, Penalty};
 use crate::objective::{Readings, Weighting};
@@ -28,10 +29,12 @@ pub struct Problem {
     pub experiments: Vec<Experiment>,
     /// What the functions pay for being rough.
     pub penalties: Vec<Penalty>,
+    /// What the functions must satisfy.
+    pub constraints: Constraints,
 }
 
 impl Problem {
-    /// A problem without regularisation.
+    /// A problem without regularisation or constraints.
     pub fn new(
         oscillator: Oscillator,
         functions: Functions,
@@ -42,6 +45,7 @@ impl Problem {
             functions,
             experiments,
             penalties: Vec::new(),
+            constraints: Constraints::default(),
         }
     }
 

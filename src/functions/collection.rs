@@ -110,6 +110,11 @@ impl Functions {
         out
     }
 
+    /// Diagonal of `G`, all functions: the squared L2 norm of each parameter's function, s.
+    pub fn gram_diagonal(&self) -> Vec<f64> {
+        self.grams.iter().flat_map(Gram::diagonal).collect()
+    }
+
     /// `G theta`, all functions.
     pub fn gram_multiply(&self, theta: &[f64]) -> Vec<f64> {
         self.each_gram(theta, Gram::multiply)

@@ -14,6 +14,20 @@ pub enum Design {
 }
 
 impl Design {
+    /// Columns and values of row `i`.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let unit = matches!(self, Design::Identity).then_some((i, 1.0));
+        let sparse = match self {
+            Design::Sparse(matrix) => matrix.get_row(i),
+            _ => None,
+        };
+        let entries = sparse.into_iter().flat_map(|row| {
+            let columns = row.col_indices().iter().copied();
+            columns.zip(row.values().iter().copied()).collect::<Vec<_>>()
+        });
+        unit.into_iter().chain(entries)
+    }
+
     /// `values += B theta`.
     pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
         match self {

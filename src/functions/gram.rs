@@ -42,6 +42,17 @@ impl Gram {
         }
     }
 
+    /// The diagonal of `G`.
+    pub fn diagonal(&self) -> Vec<f64> {
+        match self {
+            Gram::Diagonal(weights) => weights.clone(),
+            Gram::Factored { matrix, .. } => {
+                let entry = |i| matrix.get_entry(i, i).map_or(0.0, |e| e.into_value());
+                (0..matrix.nrows()).map(entry).collect()
+            }
+        }
+    }
+
     /// `out = G theta`.
     pub fn multiply(&self, theta: &[f64], out: &mut [f64]) {
         match self {

@@ -1,5 +1,6 @@
 //! The loop around every solver, run by argmin's executor.
 
+use super::gauss_newton::GaussNewton;
 use super::lbfgs::Lbfgs;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
@@ -74,6 +75,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
     match solver {
         Solver::SteepestDescent => Box::<SteepestDescent>::default(),
         Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
+        Solver::GaussNewton => Box::<GaussNewton>::default(),
     }
 }
 

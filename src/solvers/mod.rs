@@ -2,6 +2,7 @@
 //! record of what happened are shared.
 
 mod executor;
+mod gauss_newton;
 mod lbfgs;
 mod line_search;
 mod outcome;
@@ -31,6 +32,8 @@ pub enum Solver {
         /// Number of pairs kept.
         memory: usize,
     },
+    /// Gauss–Newton with a proximal term, under constraints.
+    GaussNewton,
 }
 
 impl Solver {
@@ -39,6 +42,7 @@ impl Solver {
         match self {
             Solver::SteepestDescent => "steepest-descent",
             Solver::Lbfgs { .. } => "lbfgs",
+            Solver::GaussNewton => "gauss-newton",
         }
     }
 }

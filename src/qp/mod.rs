@@ -1,0 +1,14 @@
+//! Convex subproblems behind one door: the only place that knows Clarabel.
+//!
+//! Every subproblem is a least-squares problem in residual form with linear and second-order-cone
+//! constraints ([`Subproblem`]). [`Subproblem::solve_plain`] solves it without its inequalities by
+//! one sparse factorisation; [`Subproblem::solve`] solves all of it by Clarabel.
+
+mod clarabel;
+mod factor;
+mod rows;
+mod subproblem;
+
+pub use self::clarabel::{ConicStatus, Solution};
+pub use rows::Rows;
+pub use subproblem::{Cone, Subproblem};

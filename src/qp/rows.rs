@@ -1,0 +1,86 @@
+//! Sparse rows with a right-hand side, built one after the other.
+
+/// Rows `a_i^T z` with right-hand sides `b_i`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Rows {
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Rows {
+    /// No rows.
+    pub fn new() -> Self {
+        Self {
+            starts: vec![0],
+            ..Self::default()
+        }
+    }
+
+    /// Adds the row with these entries (columns may repeat; they add up) and right-hand side.
+    pub fn push(&mut self, entries: impl IntoIterator<Item = (usize, f64)>, right: f64) {
+        if self.starts.is_empty() {
+            self.starts.push(0);
+        }
+        let first = self.columns.len();
+        for (column, value) in entries {
+            let known = self.columns[first..].iter().position(|c| *c == column);
+            match known {
+                Some(k) => self.values[first + k] += value,
+                None => {
+                    self.columns.push(column);
+                    self.values.push(value);
+                }
+            }
+        }
+        self.starts.push(self.columns.len());
+        self.right.push(right);
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.right.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.right.is_empty()
+    }
+
+    /// Entries of row `i`.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[i]..self.starts[i + 1];
+        let columns = self.columns[range.clone()].iter().copied();
+        columns.zip(self.values[range].iter().copied())
+    }
+
+    /// Right-hand sides.
+    pub fn right(&self) -> &[f64] {
+        &self.right
+    }
+
+    /// `a_i^T z` for all rows.
+    pub fn multiply(&self, z: &[f64]) -> Vec<f64> {
+        (0..self.len()).map(|i| self.row(i).map(|(j, a)| a * z[j]).sum()).collect()
+    }
+
+    /// `out += A^T y`.
+    pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
+        for (i, y) in y.iter().enumerate() {
+            for (j, a) in self.row(i) {
+                out[j] += a * y;
+            }
+        }
+    }
+
+    /// Number of stored entries.
+    pub fn entries(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Largest size of an entry of row `i`; 0 for an empty row.
+    pub fn scale(&self, i: usize) -> f64 {
+        self.row(i).fold(0.0, |most, (_, a)| most.max(a.abs()))
+    }
+}

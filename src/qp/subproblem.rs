@@ -1,0 +1,96 @@
+//! The convex subproblem and its plain solution.
+
+use super::Rows;
+use super::factor::Symmetric;
+
+/// `|(rows_1, ..., rows_k) z - right_{1..k}| <= rows_0 z - right_0`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cone {
+    /// The bound first, then the parts of the norm.
+    pub rows: Rows,
+}
+
+/// Minimise `|F z - f|^2 + sum_j d_j z_j^2` subject to `E z = e`, `l <= G z <= u` and second-order
+/// cones.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Subproblem {
+    /// Number of variables.
+    pub variables: usize,
+    /// `F` and `f`.
+    pub residuals: Rows,
+    /// `d`, one per variable, not negative.
+    pub proximal: Vec<f64>,
+    /// `E` and `e`.
+    pub equalities: Rows,
+    /// `G` and `l`; minus infinity where there is no lower bound.
+    pub inequalities: Rows,
+    /// `u`; infinity where there is no upper bound.
+    pub upper: Vec<f64>,
+    /// Second-order cones.
+    pub cones: Vec<Cone>,
+}
+
+impl Subproblem {
+    /// An empty problem in `variables` variables.
+    pub fn new(variables: usize) -> Self {
+        Self {
+            variables,
+            residuals: Rows::new(),
+            proximal: vec![0.0; variables],
+            equalities: Rows::new(),
+            inequalities: Rows::new(),
+            upper: Vec::new(),
+            cones: Vec::new(),
+        }
+    }
+
+    /// Adds `lower <= entries z <= upper`.
+    pub fn bound(
+        &mut self,
+        entries: impl IntoIterator<Item = (usize, f64)>,
+        lower: f64,
+        upper: f64,
+    ) {
+        self.inequalities.push(entries, lower);
+        self.upper.push(upper);
+    }
+
+    /// `|F z - f|^2 + sum d z^2`.
+    pub fn value(&self, z: &[f64]) -> f64 {
+        let fz = self.residuals.multiply(z);
+        let fit = fz.iter().zip(self.residuals.right());
+        let near = self.proximal.iter().zip(z);
+        fit.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() + near.map(|(d, z)| d * z * z).sum::<f64>()
+    }
+
+    /// The minimiser without the inequalities and cones; `None` if it cannot be found to
+    /// [`Subproblem::PLAIN_RESIDUAL`].
+    ///
+    /// Solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
+    /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, so that `F^T F` is never formed.
+    pub fn solve_plain(&self) -> Option<Vec<f64>> {
+        let (n, r, e) = (self.variables, self.residuals.len(), self.equalities.len());
+        let signs = [vec![1i8; n], vec![-1; r + e]].concat();
+        let mut matrix = Symmetric::new(signs);
+        for (j, d) in self.proximal.iter().enumerate() {
+            matrix.add(j, j, *d);
+        }
+        for i in 0..r {
+            self.residuals.row(i).for_each(|(j, a)| matrix.add(j, n + i, a));
+            matrix.add(n + i, n + i, -1.0);
+        }
+        for i in 0..e {
+            let row = self.equalities.row(i);
+            row.for_each(|(j, a)| matrix.add(j, n + r + i, a));
+        }
+        let right = [&vec![0.0; n], self.residuals.right(), self.equalities.right()].concat();
+        let (mut solution, residual) = matrix.solve(&right)?;
+        solution.truncate(n);
+        (residual <= Self::PLAIN_RESIDUAL).then_some(solution)
+    }
+
+    /// Largest residual of the optimality conditions, relative to their right-hand side, with which
+    /// a plain solution is used: a step this exact converges as an exact one does until the last
+    /// digits.
+    pub const PLAIN_RESIDUAL: f64 = 1e-6;
+}

@@ -1,0 +1,49 @@
+mod common;
+use kmcfit::constraints::RowGroup;
+use kmcfit::functions::Penalty;
+use kmcfit::objective::GradientKind;
+use kmcfit::qp::Rows;
+use kmcfit::solvers::{FitSettings, Solver, Stopping, fit};
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
+
+fn differences(n: usize, h: f64, order: usize) -> CsrMatrix<f64> {
+    let mut coo = CooMatrix::new(n - order, n);
+    for i in 0..n - order {
+        if order == 1 {
+            let s = (1.0 / h).sqrt();
+            coo.push(i, i, -s); coo.push(i, i + 1, s);
+        } else {
+            let s = h.sqrt() / h / h;
+            coo.push(i, i, s); coo.push(i, i + 1, -2.0 * s); coo.push(i, i + 2, s);
+        }
+    }
+    CsrMatrix::from(&coo)
+}
+
+#[test]
+fn smooth() {
+    let sizes: Vec<usize> = std::env::var("NS").unwrap_or("500,2000".into()).split(',').map(|x| x.parse().unwrap()).collect();
+    for n in sizes {
+        let mut problem = common::paper_problem(n, [2.0, 1.0, 1.0]);
+        let h = problem.oscillator.grid.step();
+        let beta: f64 = std::env::var("BETA").unwrap_or("1".into()).parse().unwrap();
+        problem.penalties = vec![
+            Penalty::new(0, 2, beta, differences(n, h, 2)),
+            Penalty::new(1, 1, beta, differences(n, h, 1)),
+            Penalty::new(2, 1, beta, differences(n, h, 1)),
+        ];
+        let mut rows = Rows::new();
+        rows.push([(2 * n, 1.0)], 1.0);
+        problem.constraints.groups.push(RowGroup { name: "k(0) = 1".into(), rows, upper: vec![1.0], times: vec![[0.0, 0.0]] });
+        let settings = FitSettings {
+            solver: Solver::GaussNewton,
+            gradient: GradientKind::Discrete,
+            stopping: Stopping { tolerance: Some(1e-9), ..Stopping::exactly(60) },
+            interrupt: None,
+        };
+        let result = fit(&problem, &problem.functions.start(), &settings, &mut |row| println!("  {} {:.4e} {:.3e} {:.1e}", row.iteration, row.cost, row.cost_ratio, row.relative_change)).unwrap();
+        let truth = common::paper_device(n);
+        let errs: Vec<f64> = result.best.evaluation.device.functions().zip(truth.functions()).map(|(a, b)| a.iter().zip(b).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()))).collect();
+        println!("N {n} {:?} {:?} {:?} its {} errs {errs:?}", result.outcome, result.counts, result.elapsed, result.history.len());
+    }
+}
