@@ -2,7 +2,6 @@ mod common;
 use kmcfit::constraints::RowGroup;
 use kmcfit::functions::Penalty;
 use kmcfit::objective::GradientKind;
-use kmcfit::qp::Rows;
 use kmcfit::solvers::{FitSettings, Solver, Stopping, fit};
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
@@ -32,16 +31,33 @@ fn smooth() {
             Penalty::new(1, 1, beta, differences(n, h, 1)),
             Penalty::new(2, 1, beta, differences(n, h, 1)),
         ];
-        let mut rows = Rows::new();
-        rows.push([(2 * n, 1.0)], 1.0);
-        problem.constraints.groups.push(RowGroup { name: "k(0) = 1".into(), rows, upper: vec![1.0], times: vec![[0.0, 0.0]] });
+        let mut group = RowGroup::new("k(0) = 1");
+        group.push([(2 * n, 1.0)], [1.0, 1.0], [0.0, 0.0]);
+        problem.constraints.groups.push(group);
+        let mut group = RowGroup::new("positive");
+        if std::env::var_os("POS").is_some() {
+        for i in 0..n {
+            group.push([(i, 1.0)], [0.05, f64::INFINITY], [0.0, 0.0]);
+            group.push([(n+i, 1.0)], [0.0, f64::INFINITY], [0.0, 0.0]);
+            group.push([(2*n+i, 1.0)], [0.0, f64::INFINITY], [0.0, 0.0]);
+        }
+        problem.constraints.groups.push(group);
+        }
         let settings = FitSettings {
             solver: Solver::GaussNewton,
             gradient: GradientKind::Discrete,
             stopping: Stopping { tolerance: Some(1e-9), ..Stopping::exactly(60) },
             interrupt: None,
         };
-        let result = fit(&problem, &problem.functions.start(), &settings, &mut |row| println!("  {} {:.4e} {:.3e} {:.1e}", row.iteration, row.cost, row.cost_ratio, row.relative_change)).unwrap();
+        let mut start = problem.functions.start();
+        let clock = std::time::Instant::now();
+        if std::env::var_os("EE").is_some() {
+            start = kmcfit::solvers::equation_error(&problem, &start).unwrap();
+            let d = problem.functions.device(&start);
+            let e: Vec<f64> = d.functions().zip(common::paper_device(n).functions()).map(|(a, b)| a.iter().zip(b).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()))).collect();
+            println!("EE {:?} errs {e:?}", clock.elapsed());
+        }
+        let result = fit(&problem, &start, &settings, &mut |row| println!("  {} {:.4e} {:.3e} {:.1e}", row.iteration, row.cost, row.cost_ratio, row.relative_change)).unwrap();
         let truth = common::paper_device(n);
         let errs: Vec<f64> = result.best.evaluation.device.functions().zip(truth.functions()).map(|(a, b)| a.iter().zip(b).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()))).collect();
         println!("N {n} {:?} {:?} {:?} its {} errs {errs:?}", result.outcome, result.counts, result.elapsed, result.history.len());

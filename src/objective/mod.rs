@@ -2,6 +2,7 @@
 
 mod gradient;
 mod readings;
+mod sizes;
 mod verify;
 
 pub use gradient::{Gradient, GradientKind};
@@ -80,7 +81,7 @@ impl Problem {
     }
 
     /// `sum_j weight_j |L_j theta_j - target_j|^2`.
-    fn regularisation(&self, theta: &[f64]) -> f64 {
+    pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
         let paid = self.penalties.iter().map(|penalty| {
             penalty.weight * penalty.roughness(&theta[ranges[penalty.function].clone()])

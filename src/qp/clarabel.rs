@@ -1,6 +1,7 @@
 //! Subproblems by Clarabel.
 
-use super::{Rows, Subproblem};
+use super::Subproblem;
+use crate::constraints::Rows;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,

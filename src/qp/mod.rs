@@ -6,9 +6,9 @@
 
 mod clarabel;
 mod factor;
-mod rows;
+mod projection;
 mod subproblem;
 
 pub use self::clarabel::{ConicStatus, Solution};
-pub use rows::Rows;
-pub use subproblem::{Cone, Subproblem};
+pub use projection::{Projection, RowPlace, project};
+pub use subproblem::Subproblem;

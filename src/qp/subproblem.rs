@@ -1,14 +1,7 @@
 //! The convex subproblem and its plain solution.
 
-use super::Rows;
 use super::factor::Symmetric;
-
-/// `|(rows_1, ..., rows_k) z - right_{1..k}| <= rows_0 z - right_0`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cone {
-    /// The bound first, then the parts of the norm.
-    pub rows: Rows,
-}
+use crate::constraints::{Cone, Rows};
 
 /// Minimise `|F z - f|^2 + sum_j d_j z_j^2` subject to `E z = e`, `l <= G z <= u` and second-order
 /// cones.
@@ -87,6 +80,16 @@ impl Subproblem {
         let (mut solution, residual) = matrix.solve(&right)?;
         solution.truncate(n);
         (residual <= Self::PLAIN_RESIDUAL).then_some(solution)
+    }
+
+    /// Whether all inequalities and cones hold at `z`, to `tolerance` relative to each row's size.
+    pub fn holds(&self, z: &[f64], tolerance: f64) -> bool {
+        let values = self.inequalities.multiply(z);
+        let rows = values.iter().enumerate().all(|(i, value)| {
+            let slack = tolerance * self.inequalities.scale(i).max(f64::MIN_POSITIVE);
+            *value >= self.inequalities.right()[i] - slack && *value <= self.upper[i] + slack
+        });
+        rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
     }
 
     /// Largest residual of the optimality conditions, relative to their right-hand side, with which

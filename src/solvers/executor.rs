@@ -123,8 +123,9 @@ impl Run<'_> {
         let before = &progress.point;
         match self.method.step(work, before) {
             Step::Stuck(reason) => self.outcome = Some(Outcome::new(Status::Stalled, reason)),
+            Step::Minimum(reason) => self.outcome = Some(Outcome::new(Status::Converged, reason)),
             Step::Moved { point, length } => {
-                progress.recorder.record(before, &point, length);
+                progress.recorder.record(work.problem(), before, &point, length);
                 let previous_cost = before.evaluation.cost;
                 progress.point = point;
                 if let Some(row) = progress.recorder.rows.last() {

@@ -1,6 +1,7 @@
 //! Solvers: each is a direction and a step rule ([`Descend`]); the loop, the stopping test and the
 //! record of what happened are shared.
 
+mod equation_error;
 mod executor;
 mod gauss_newton;
 mod lbfgs;
@@ -11,6 +12,7 @@ mod recorder;
 mod steepest_descent;
 mod stopping;
 
+pub use equation_error::equation_error;
 pub use executor::{Fit, fit};
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};
@@ -66,6 +68,8 @@ pub(crate) enum Step {
     Moved { point: Point, length: f64 },
     /// Nowhere: no step lowers the cost, for this reason.
     Stuck(String),
+    /// Nowhere: the model predicts no decrease worth the name; the point is a minimum.
+    Minimum(String),
 }
 
 /// A direction and a step rule.

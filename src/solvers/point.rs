@@ -36,6 +36,8 @@ pub(crate) struct Work<'a, 'p> {
 
 const FORWARD: &str = "forward_count";
 const ADJOINT: &str = "adjoint_count";
+const TANGENT: &str = "tangent_count";
+const QP: &str = "qp_count";
 
 impl<'a, 'p> Work<'a, 'p> {
     pub fn new(problem: &'a mut argmin::core::Problem<&'p Problem>, kind: GradientKind) -> Self {
@@ -65,6 +67,16 @@ impl<'a, 'p> Work<'a, 'p> {
         self.problem().gradient(parameters, evaluation, self.kind)
     }
 
+    /// Counts tangent solves.
+    pub fn count_tangents(&mut self, solves: u64) {
+        *self.problem.counts.entry(TANGENT).or_insert(0) += solves;
+    }
+
+    /// Counts a quadratic program.
+    pub fn count_qp(&mut self) {
+        *self.problem.counts.entry(QP).or_insert(0) += 1;
+    }
+
     /// The point that an evaluation belongs to, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
         let gradient = self.gradient(&parameters, &evaluation);
@@ -82,8 +94,8 @@ impl Counts {
         Self {
             forward: count(FORWARD),
             adjoint: count(ADJOINT),
-            tangent: 0,
-            qp: 0,
+            tangent: count(TANGENT),
+            qp: count(QP),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What happened, iteration by iteration.
 
 use super::Point;
-use crate::dynamics::{Device, Trajectory};
+use crate::dynamics::Trajectory;
+use crate::problem::Problem;
 
 /// One iteration: the cost after it, the gradient before it.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +17,7 @@ pub struct Row {
     pub gradient_norm_squared_ratio: f64,
     /// Step length along the solver's direction.
     pub step: f64,
-    /// Largest change of a function relative to its largest value, over the functions.
+    /// Largest change of a function relative to its natural size ([`Problem::relative_change`]).
     pub relative_change: f64,
 }
 
@@ -54,7 +55,7 @@ impl Recorder {
     }
 
     /// Records the iteration that led from `before` to `after`.
-    pub fn record(&mut self, before: &Point, after: &Point, step: f64) {
+    pub fn record(&mut self, problem: &Problem, before: &Point, after: &Point, step: f64) {
         let iteration = self.rows.len() as u64 + 1;
         self.rows.push(Row {
             iteration,
@@ -65,7 +66,7 @@ impl Recorder {
                 self.initial_norm_squared,
             ),
             step,
-            relative_change: relative_change(&before.evaluation.device, &after.evaluation.device),
+            relative_change: problem.relative_change(&before.evaluation, &after.evaluation.device),
         });
         self.keep_snapshot(iteration, after);
     }
@@ -83,17 +84,4 @@ impl Recorder {
 /// `value / reference`, and 0 where both are zero: a start without misfit stays without misfit.
 pub(super) fn ratio(value: f64, reference: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / reference }
-}
-
-fn relative_change(before: &Device, after: &Device) -> f64 {
-    let largest = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let change = |(b, a): (&[f64], &[f64])| {
-        let difference = b
-            .iter()
-            .zip(a)
-            .fold(0.0f64, |m, (b, a)| m.max((a - b).abs()));
-        ratio(difference, largest(a).max(largest(b)))
-    };
-    let pairs = before.functions().zip(after.functions());
-    pairs.map(change).fold(0.0, f64::max)
 }

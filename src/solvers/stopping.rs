@@ -15,11 +15,11 @@ pub struct Stopping {
     /// at the start of the iteration, as in the paper.
     pub gradient_ratio: Option<f64>,
     /// Converged when an iteration lowers `J` by at most this fraction and changes no function by
-    /// more than the square root of this, relative to its largest value; or when it changes none by
+    /// more than the square root of this, relative to its natural size; or when it changes none by
     /// more than this.
     pub tolerance: Option<f64>,
-    /// Converged when an iteration changes no function by more than this, relative to its largest
-    /// value.
+    /// Converged when an iteration changes no function by more than this, relative to its natural
+    /// size ([`crate::problem::Problem::relative_change`]).
     pub step: Option<f64>,
     /// Wall-clock limit.
     pub limit: Option<Duration>,

@@ -1,12 +1,21 @@
 //! Gauss–Newton steps with a proximal term, under constraints.
+//!
+//! Each iteration minimises the linearised cost plus `damping * J * sum_f 1/T integral (delta p_f /
+//! size of p_f)^2 dt` under the linearised constraints. The plain step, one sparse factorisation, is
+//! taken where it stays in the set; where it leaves a set of simple bounds, the clipped step is
+//! taken if it is nearly as good as the plain one, which no step in the set can beat; only
+//! otherwise a quadratic program is solved.
 
 mod dense;
 mod structured;
 
 use super::point::Work;
 use super::{Descend, Point, Step};
+use crate::constraints;
+use crate::dynamics::{DeviceTangent, State};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::qp::Subproblem;
+use crate::qp::{ConicStatus, Subproblem};
 
 /// Up to so many parameters the Jacobian is formed by one tangent solve each.
 const FEW_PARAMETERS: usize = 64;
@@ -14,110 +23,232 @@ const FEW_PARAMETERS: usize = 64;
 const FIRST_DAMPING: f64 = 1e-2;
 /// Smallest weight: less is lost in the factorisation's own shift.
 const LEAST_DAMPING: f64 = 1e-10;
-/// Most tries in one iteration.
-const TRIES: usize = 30;
+/// Largest weight: a step so short changes no digit of the cost.
+const MOST_DAMPING: f64 = 1e14;
+/// A step is taken if it brings this share of the predicted decrease.
+const ACCEPTED: f64 = 0.05;
+/// Above this share the damping falls, below the next it rises.
+const GOOD: f64 = 0.7;
+const POOR: f64 = 0.3;
+/// A clipped step is used if it keeps this share of the plain step's predicted decrease.
+const CLIPPED: f64 = 0.9;
+/// A predicted decrease below this share of J0 is rounding: J0 is a sum of squares, so this is the
+/// square of the precision of its terms.
+const NO_DECREASE: f64 = 1e-30;
+
+/// Relative rounding of a cost: a sum of some thousand squares.
+const ROUNDING: f64 = 1e-13;
+/// A relative change of the functions below this is not a step but rounding.
+const SMALLEST_CHANGE: f64 = 1e-9;
 
 /// The method and its damping.
 pub struct GaussNewton {
     damping: f64,
+    first_cost: Option<f64>,
 }
 
 impl Default for GaussNewton {
     fn default() -> Self {
         Self {
             damping: FIRST_DAMPING,
+            first_cost: None,
         }
     }
+}
+
+/// A step of the parameters and the decrease of J that the model predicts for it.
+struct Proposal {
+    parameters: Vec<f64>,
+    predicted: f64,
+}
+
+/// What a subproblem gives.
+enum Answer {
+    Step(Proposal),
+    /// No step: the subproblem could not be solved, for this reason.
+    Unsolved(ConicStatus),
 }
 
 impl Descend for GaussNewton {
     fn step(&mut self, work: &mut Work, point: &Point) -> Step {
         let problem = work.problem();
-        let mut sub = linearise(problem, point);
+        let first_cost = *self.first_cost.get_or_insert(point.evaluation.cost);
+        if point.evaluation.cost <= NO_DECREASE * first_cost {
+            return Step::Minimum("the cost is zero to rounding".into());
+        }
+        let mut sub = linearise(work, point);
         let scales = proximal_scales(problem, point);
-        let n = problem.functions.parameters();
         let mut evaluation = problem.workspace();
-        for _ in 0..TRIES {
+        let mut trouble = None;
+        while self.damping <= MOST_DAMPING {
             let weight = self.damping * point.evaluation.cost;
             for (d, s) in sub.proximal.iter_mut().zip(&scales) {
                 *d = weight * s;
             }
-            let Some(z) = sub.solve_plain() else {
-                self.damping *= 10.0;
-                continue;
-            };
-            let predicted = point.evaluation.cost - sub.value(&z);
-            let trial: Vec<f64> =
-                point.parameters.iter().zip(&z[..n]).map(|(p, d)| p + d).collect();
-            let result = work.evaluate_into(&trial, &mut evaluation);
-            let gain = match result {
-                Ok(()) => (point.evaluation.cost - evaluation.cost) / predicted,
-                Err(_) => f64::NAN,
-            };
-            if std::env::var_os("GN_TRACE").is_some() {
-                eprintln!("    damping {:.1e} predicted {predicted:.3e} gain {gain:.3} {:?}", self.damping, result.is_ok().then_some(evaluation.cost));
-            }
-            if gain > 0.05 {
-                if gain > 0.7 {
-                    self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
-                } else if gain < 0.3 {
-                    self.damping *= 3.0;
+            let proposal = match propose(work, &sub, point) {
+                Answer::Step(proposal) => proposal,
+                Answer::Unsolved(status) => {
+                    trouble = Some(status);
+                    self.damping *= 10.0;
+                    continue;
                 }
+            };
+            let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
+            let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
+            let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
+            if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
+                self.learn(gain);
                 return Step::Moved {
-                    point: work.complete(trial, evaluation),
+                    point: work.complete(proposal.parameters, evaluation),
                     length: 1.0,
                 };
             }
+            if let Some(reason) = at_minimum(problem, point, &proposal) {
+                return Step::Minimum(reason);
+            }
             self.damping *= 8.0;
         }
-        Step::Stuck("no Gauss-Newton step lowers the cost".into())
+        self.damping = FIRST_DAMPING;
+        Step::Stuck(match trouble {
+            Some(status) => status.sentence().into(),
+            None => "no Gauss-Newton step lowers the cost".into(),
+        })
     }
 }
 
-/// The subproblem at a point: readings, penalties, constraints, without the proximal term.
-fn linearise(problem: &Problem, point: &Point) -> Subproblem {
-    let mut sub = match problem.functions.parameters() {
-        0..=FEW_PARAMETERS => dense::subproblem(problem, &point.evaluation),
-        _ => structured::subproblem(problem, &point.evaluation),
+impl GaussNewton {
+    fn learn(&mut self, gain: f64) {
+        if gain > GOOD {
+            self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
+        } else if gain < POOR {
+            self.damping *= 3.0;
+        }
+    }
+}
+
+/// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
+/// less than the rounding of the cost, or moves less than rounding moves the motion.
+fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<String> {
+    if proposal.predicted <= ROUNDING * point.evaluation.cost {
+        return Some("the linearised cost cannot be lowered any further".into());
+    }
+    let device = problem.functions.device(&proposal.parameters);
+    let change = problem.relative_change(&point.evaluation, &device);
+    (change <= SMALLEST_CHANGE).then(|| {
+        format!("no function is to change by more than {change:.1e} of its size")
+    })
+}
+
+/// The best step that the subproblem offers in the constraint set.
+fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
+    let constraints = &work.problem().constraints;
+    let plain = sub.solve_plain();
+    let cost = point.evaluation.cost;
+    let moved = |z: &[f64]| -> Vec<f64> {
+        let mut moved: Vec<f64> = point.parameters.iter().zip(z).map(|(p, d)| p + d).collect();
+        constraints.clip(&mut moved);
+        moved
     };
+    if let Some(z) = &plain {
+        let best = cost - sub.value(z);
+        if sub.holds(z, 0.1 * constraints::TOLERANCE) {
+            return Answer::Step(Proposal {
+                parameters: moved(z),
+                predicted: best,
+            });
+        }
+        if constraints.are_simple() {
+            let parameters = moved(z);
+            let predicted = cost - model_cost(work, sub, point, &parameters);
+            if predicted >= CLIPPED * best {
+                return Answer::Step(Proposal {
+                    parameters,
+                    predicted,
+                });
+            }
+        }
+    }
+    work.count_qp();
+    let solution = sub.solve();
+    match solution.status {
+        ConicStatus::Solved | ConicStatus::Almost => {
+            let parameters = moved(&solution.z);
+            if constraints.hold(&parameters, constraints::TOLERANCE) {
+                let predicted = cost - sub.value(&solution.z);
+                Answer::Step(Proposal {
+                    parameters,
+                    predicted,
+                })
+            } else {
+                Answer::Unsolved(ConicStatus::Stalled)
+            }
+        }
+        status => Answer::Unsolved(status),
+    }
+}
+
+/// The subproblem's cost for the step to `parameters`, by tangent solves.
+fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f64]) -> f64 {
+    let problem = work.problem();
+    work.count_tangents(1);
+    let delta: Vec<f64> = parameters.iter().zip(&point.parameters).map(|(a, b)| a - b).collect();
+    let near: f64 = sub.proximal.iter().zip(&delta).map(|(d, z)| d * z * z).sum();
+    near + problem.regularisation(parameters) + linear_misfit(problem, &point.evaluation, &delta)
+}
+
+/// `sum w (r + J delta)^2` over all readings.
+fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
+    let direction = DeviceTangent {
+        device: problem.functions.direction(delta),
+        initial: State {
+            displacement: 0.0,
+            velocity: 0.0,
+        },
+    };
+    let motions = problem.experiments.iter().zip(&evaluation.trajectories);
+    let misfits = motions.filter_map(|(experiment, motion)| {
+        let readings = experiment.readings.as_ref()?;
+        let force = experiment.force.as_deref();
+        let tangent =
+            problem.oscillator.tangent(&evaluation.device, force, motion, &direction);
+        let pairs = motion.displacement.iter().zip(&tangent.displacement);
+        let moved: Vec<f64> = pairs.map(|(y, dy)| y + dy).collect();
+        Some(readings.cost(&moved))
+    });
+    misfits.sum()
+}
+
+/// The subproblem at a point: readings, penalties, constraints, without the proximal term.
+fn linearise(work: &mut Work, point: &Point) -> Subproblem {
+    let problem = work.problem();
+    let parameters = problem.functions.parameters();
+    let mut sub = if parameters <= FEW_PARAMETERS {
+        work.count_tangents(parameters as u64);
+        dense::subproblem(problem, &point.evaluation)
+    } else {
+        work.count_tangents(1);
+        structured::subproblem(problem, &point.evaluation)
+    };
+    add_penalties(problem, &point.parameters, &mut sub);
+    sub.constrain(&problem.constraints, &point.parameters);
+    sub
+}
+
+/// `sqrt(weight) (L (theta + delta) - target)` as residual rows.
+pub(super) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     for penalty in &problem.penalties {
         let range = problem.functions.ranges()[penalty.function].clone();
         let root = penalty.weight.sqrt();
-        let residuals = penalty.residuals(&point.parameters[range.clone()]);
+        let residuals = penalty.residuals(&parameters[range.clone()]);
         for (i, r) in residuals.iter().enumerate() {
             let row = penalty.rows.row(i).map(|(j, a)| (range.start + j, root * a));
             sub.residuals.push(row, -root * r);
         }
     }
-    for group in &problem.constraints.groups {
-        let values = group.rows.multiply(&point.parameters);
-        for (i, value) in values.iter().enumerate() {
-            let (lower, upper) = group.bounds(i);
-            if lower == upper {
-                sub.equalities.push(group.rows.row(i), lower - value);
-            } else {
-                sub.bound(group.rows.row(i), lower - value, upper - value);
-            }
-        }
-    }
-    sub
 }
 
 /// Diagonal of the proximal term: `1/T integral (delta p / size of p)^2 dt`, summed over functions.
 fn proximal_scales(problem: &Problem, point: &Point) -> Vec<f64> {
-    let mut scales = vec![0.0; problem.functions.parameters()];
-    let duration = problem.oscillator.grid.duration();
-    let diagonal = problem.functions.gram_diagonal();
-    let sizes: Vec<f64> = (point.evaluation.device.functions())
-        .map(|f| f.iter().fold(0.0f64, |m, p| m.max(p.abs())))
-        .collect();
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    for (range, size) in problem.functions.ranges().iter().zip(sizes) {
-        // A function that is zero has no size of its own.
-        let size = if size > 0.0 { size } else { largest };
-        for j in range.clone() {
-            scales[j] = diagonal[j] / (duration * size * size);
-        }
-    }
-    scales
+    let sizes = problem.natural_sizes(&point.evaluation);
+    problem.functions.relative_metric(&sizes, problem.oscillator.grid.duration())
 }

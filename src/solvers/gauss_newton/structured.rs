@@ -1,10 +1,11 @@
 //! The Gauss–Newton subproblem with the states as unknowns: sparse, and of a size linear in the number
 //! of nodes, for functions with many parameters.
 
+use crate::constraints::Rows;
 use crate::dynamics::{StepJacobian, Trajectory};
 use crate::objective::Evaluation;
 use crate::problem::{Experiment, Problem};
-use crate::qp::{Rows, Subproblem};
+use crate::qp::Subproblem;
 
 /// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
 /// trajectory per experiment; the first state of each is given and no unknown.

@@ -1,0 +1,77 @@
+//! How far a point is outside.
+
+use super::{Cone, Constraints, RowGroup};
+
+/// A constraint holds if it is violated by no more than this, relative to its row's scale.
+pub const TOLERANCE: f64 = 1e-9;
+
+/// The row that is violated most.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// Violation relative to the row's scale; 0 if all constraints hold.
+    pub relative: f64,
+    /// Name of its group.
+    pub name: String,
+    /// Time that it speaks of, s.
+    pub time: f64,
+}
+
+impl RowGroup {
+    /// What row `i`'s violation is measured against: the larger of its bounds' size and the sum of
+    /// its terms' sizes.
+    pub fn scale(&self, i: usize, theta: &[f64]) -> f64 {
+        let terms: f64 = self.rows.row(i).map(|(j, a)| (a * theta[j]).abs()).sum();
+        let finite = |b: f64| if b.is_finite() { b.abs() } else { 0.0 };
+        let [lower, upper] = self.bounds(i);
+        // A row that is all zeros has the scale of its coefficients.
+        let size = terms.max(finite(lower)).max(finite(upper));
+        size.max(self.rows.scale(i))
+    }
+
+    /// How far row `i` is outside its bounds, relative to its scale; not positive if it is inside.
+    pub fn relative_violation(&self, i: usize, theta: &[f64]) -> f64 {
+        let value: f64 = self.rows.row(i).map(|(j, a)| a * theta[j]).sum();
+        let [lower, upper] = self.bounds(i);
+        (lower - value).max(value - upper) / self.scale(i, theta).max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Cone {
+    /// How far the cone is violated at `z`, relative to the size of its parts; not positive inside.
+    pub fn violation(&self, z: &[f64]) -> f64 {
+        let values = self.rows.multiply(z);
+        let parts: Vec<f64> =
+            values.iter().zip(self.rows.right()).map(|(v, r)| v - r).collect();
+        let Some((bound, parts)) = parts.split_first() else {
+            return 0.0;
+        };
+        let norm = parts.iter().map(|p| p * p).sum::<f64>().sqrt();
+        (norm - bound) / norm.max(bound.abs()).max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Constraints {
+    /// The largest violation at `theta`; `None` if there are no constraints.
+    pub fn largest_violation(&self, theta: &[f64]) -> Option<Violation> {
+        let rows = self.groups.iter().flat_map(|group| {
+            (0..group.rows.len()).map(move |i| {
+                (group.relative_violation(i, theta), &group.name, group.times[i][0])
+            })
+        });
+        let cones = self.cones.iter().flat_map(|group| {
+            let pairs = group.cones.iter().zip(&group.times);
+            pairs.map(move |(cone, time)| (cone.violation(theta), &group.name, *time))
+        });
+        let worst = rows.chain(cones).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Violation {
+            relative: worst.0.max(0.0),
+            name: worst.1.clone(),
+            time: worst.2,
+        })
+    }
+
+    /// Whether all constraints hold to `tolerance` relative to their scales.
+    pub fn hold(&self, theta: &[f64], tolerance: f64) -> bool {
+        self.largest_violation(theta).is_none_or(|v| v.relative <= tolerance)
+    }
+}

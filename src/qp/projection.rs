@@ -1,0 +1,86 @@
+//! The constraints of a problem as rows of a subproblem, and the projection onto them.
+
+use super::{ConicStatus, Solution, Subproblem};
+use crate::constraints::{Cone, Constraints, RowGroup, Rows};
+
+/// Where each row group's rows went, so that multipliers find their way back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowPlace {
+    /// An equality, by its index.
+    Equality(usize),
+    /// An inequality, by its index.
+    Inequality(usize),
+}
+
+impl Subproblem {
+    /// Adds `constraints` for the step from `theta`: the first variables of the subproblem are the
+    /// change of the parameters. Returns where each group's rows are.
+    pub fn constrain(&mut self, constraints: &Constraints, theta: &[f64]) -> Vec<Vec<RowPlace>> {
+        let places = (constraints.groups.iter())
+            .map(|group| self.constrain_group(group, theta))
+            .collect();
+        for cone in constraints.cones.iter().flat_map(|group| &group.cones) {
+            let values = cone.rows.multiply(theta);
+            let mut rows = Rows::new();
+            for (i, value) in values.iter().enumerate() {
+                rows.push(cone.rows.row(i), cone.rows.right()[i] - value);
+            }
+            self.cones.push(Cone { rows });
+        }
+        places
+    }
+
+    fn constrain_group(&mut self, group: &RowGroup, theta: &[f64]) -> Vec<RowPlace> {
+        let values = group.rows.multiply(theta);
+        let rows = values.iter().enumerate().map(|(i, value)| {
+            let [lower, upper] = group.bounds(i);
+            if lower == upper {
+                self.equalities.push(group.rows.row(i), lower - value);
+                RowPlace::Equality(self.equalities.len() - 1)
+            } else {
+                self.bound(group.rows.row(i), lower - value, upper - value);
+                RowPlace::Inequality(self.inequalities.len() - 1)
+            }
+        });
+        rows.collect()
+    }
+}
+
+impl Solution {
+    /// Multipliers by group and row.
+    pub fn by_group(&self, places: &[Vec<RowPlace>]) -> Vec<Vec<f64>> {
+        let multiplier = |place: &RowPlace| match *place {
+            RowPlace::Equality(i) => self.equality_multipliers[i],
+            RowPlace::Inequality(i) => self.multipliers[i],
+        };
+        let group = |rows: &Vec<RowPlace>| rows.iter().map(multiplier).collect();
+        places.iter().map(group).collect()
+    }
+}
+
+/// The point of the constraint set nearest to `theta`, and the multipliers of all rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Projection {
+    /// How the quadratic program ended.
+    pub status: ConicStatus,
+    /// The nearest point.
+    pub theta: Vec<f64>,
+    /// Multipliers by group and row, of `1/2 |theta' - theta|^2` in the metric.
+    pub multipliers: Vec<Vec<f64>>,
+}
+
+/// Projects `theta` onto the constraints in the diagonal metric `metric`:
+/// minimises `sum_j metric_j (theta'_j - theta_j)^2`.
+pub fn project(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Projection {
+    let mut sub = Subproblem::new(theta.len());
+    sub.proximal.copy_from_slice(metric);
+    let places = sub.constrain(constraints, theta);
+    let solution = sub.solve();
+    let mut projected: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
+    constraints.clip(&mut projected);
+    Projection {
+        status: solution.status,
+        theta: projected,
+        multipliers: solution.by_group(&places),
+    }
+}
