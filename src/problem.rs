@@ -35,11 +35,7 @@ pub struct Problem {
 
 impl Problem {
     /// A problem without regularisation or constraints.
-    pub fn new(
-        oscillator: Oscillator,
-        functions: Functions,
-        experiments: Vec<Experiment>,
-    ) -> Self {
+    pub fn new(oscillator: Oscillator, functions: Functions, experiments: Vec<Experiment>) -> Self {
         Self {
             oscillator,
             functions,
@@ -47,6 +43,19 @@ impl Problem {
             penalties: Vec::new(),
             constraints: Constraints::default(),
         }
+    }
+
+    /// The same problem with only the first part of the readings, `share` of each record.
+    #[must_use]
+    pub fn first_part(&self, share: f64) -> Self {
+        let mut part = self.clone();
+        for experiment in &mut part.experiments {
+            if let Some(readings) = &mut experiment.readings {
+                let count = (readings.values().len() as f64 * share).ceil() as usize;
+                readings.truncate(count.max(2));
+            }
+        }
+        part
     }
 
     /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading per node.

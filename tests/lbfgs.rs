@@ -3,13 +3,14 @@
 mod common;
 
 use kmcfit::objective::GradientKind;
-use kmcfit::solvers::{FitSettings, Solver, Status, Stopping, fit};
+use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn settings(stopping: Stopping) -> FitSettings {
     FitSettings {
         solver: Solver::Lbfgs { memory: 20 },
+        initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping,
         interrupt: None,

@@ -6,7 +6,7 @@ use kmcfit::dynamics::quadrature::trapezoid;
 use kmcfit::dynamics::{Oscillator, State};
 use kmcfit::objective::GradientKind;
 use kmcfit::report::predict;
-use kmcfit::solvers::{Fit, FitSettings, Solver, Status, Stopping, fit};
+use kmcfit::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
 use std::sync::OnceLock;
 
 /// Iteration, J/J0 after it, G^2/G0^2 before it: computed from the formulas of the paper in plain
@@ -70,6 +70,7 @@ const TOLERANCE: f64 = 1e-9;
 fn settings(stopping: Stopping) -> FitSettings {
     FitSettings {
         solver: Solver::SteepestDescent,
+        initial: Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping,
         interrupt: None,

@@ -62,7 +62,9 @@ impl Rows {
 
     /// `a_i^T z` for all rows.
     pub fn multiply(&self, z: &[f64]) -> Vec<f64> {
-        (0..self.len()).map(|i| self.row(i).map(|(j, a)| a * z[j]).sum()).collect()
+        (0..self.len())
+            .map(|i| self.row(i).map(|(j, a)| a * z[j]).sum())
+            .collect()
     }
 
     /// `out += A^T y`.

@@ -103,7 +103,11 @@ impl Constraints {
                 };
                 let [lower, upper] = group.bounds(i);
                 let ends = [lower / a, upper / a];
-                let (low, high) = if a > 0.0 { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
+                let (low, high) = if a > 0.0 {
+                    (ends[0], ends[1])
+                } else {
+                    (ends[1], ends[0])
+                };
                 // Not clamp(), which panics on contradictory bounds.
                 theta[j] = theta[j].min(high).max(low);
             }

@@ -40,8 +40,11 @@ impl Cone {
     /// How far the cone is violated at `z`, relative to the size of its parts; not positive inside.
     pub fn violation(&self, z: &[f64]) -> f64 {
         let values = self.rows.multiply(z);
-        let parts: Vec<f64> =
-            values.iter().zip(self.rows.right()).map(|(v, r)| v - r).collect();
+        let parts: Vec<f64> = values
+            .iter()
+            .zip(self.rows.right())
+            .map(|(v, r)| v - r)
+            .collect();
         let Some((bound, parts)) = parts.split_first() else {
             return 0.0;
         };
@@ -55,7 +58,11 @@ impl Constraints {
     pub fn largest_violation(&self, theta: &[f64]) -> Option<Violation> {
         let rows = self.groups.iter().flat_map(|group| {
             (0..group.rows.len()).map(move |i| {
-                (group.relative_violation(i, theta), &group.name, group.times[i][0])
+                (
+                    group.relative_violation(i, theta),
+                    &group.name,
+                    group.times[i][0],
+                )
             })
         });
         let cones = self.cones.iter().flat_map(|group| {
@@ -72,6 +79,7 @@ impl Constraints {
 
     /// Whether all constraints hold to `tolerance` relative to their scales.
     pub fn hold(&self, theta: &[f64], tolerance: f64) -> bool {
-        self.largest_violation(theta).is_none_or(|v| v.relative <= tolerance)
+        self.largest_violation(theta)
+            .is_none_or(|v| v.relative <= tolerance)
     }
 }

@@ -103,8 +103,7 @@ fn column<const S: usize>(
             Seed::Function(f, node) => position.share(node) * rhs.terms[f - 1].phi(y, v),
             _ => 0.0,
         };
-        change.a[s] =
-            slopes.da_dy * change.y[s] + slopes.da_dv * change.v[s] - push / slopes.mass;
+        change.a[s] = slopes.da_dy * change.y[s] + slopes.da_dv * change.v[s] - push / slopes.mass;
     }
     let (y, v) = advance(tableau, rhs.dt, &change, dy, dv);
     [y, v]

@@ -118,7 +118,10 @@ impl Functions {
     /// Diagonal of `sum_f 1/T integral (p_f / size_f)^2 dt` in the parameters, with a size for each
     /// function and `T = duration`. A function of size zero takes the largest size of all.
     pub fn relative_metric(&self, sizes: &[f64], duration: f64) -> Vec<f64> {
-        let largest = sizes.iter().copied().fold(f64::MIN_POSITIVE.sqrt(), f64::max);
+        let largest = sizes
+            .iter()
+            .copied()
+            .fold(f64::MIN_POSITIVE.sqrt(), f64::max);
         let mut metric = self.gram_diagonal();
         for (range, size) in self.ranges.iter().zip(sizes) {
             let size = if *size > 0.0 { *size } else { largest };

@@ -23,7 +23,9 @@ impl Design {
         };
         let entries = sparse.into_iter().flat_map(|row| {
             let columns = row.col_indices().iter().copied();
-            columns.zip(row.values().iter().copied()).collect::<Vec<_>>()
+            columns
+                .zip(row.values().iter().copied())
+                .collect::<Vec<_>>()
         });
         unit.into_iter().chain(entries)
     }

@@ -37,6 +37,11 @@ impl Readings {
         }
     }
 
+    /// Keeps the first `count` readings.
+    pub fn truncate(&mut self, count: usize) {
+        self.values.truncate(count);
+    }
+
     /// The measured displacements, m.
     pub fn values(&self) -> &[f64] {
         &self.values

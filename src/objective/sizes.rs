@@ -11,9 +11,15 @@ impl Problem {
     pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
         let step = self.oscillator.grid.step();
         let squares = |f: &dyn Fn(usize, usize) -> f64| -> f64 {
-            let each = evaluation.trajectories.iter().enumerate().map(|(e, motion)| {
-                (0..motion.displacement.len()).map(|i| f(e, i).powi(2)).sum::<f64>()
-            });
+            let each = evaluation
+                .trajectories
+                .iter()
+                .enumerate()
+                .map(|(e, motion)| {
+                    (0..motion.displacement.len())
+                        .map(|i| f(e, i).powi(2))
+                        .sum::<f64>()
+                });
             each.sum::<f64>().sqrt()
         };
         let accelerations: Vec<Vec<f64>> = (evaluation.trajectories.iter())
@@ -27,11 +33,17 @@ impl Problem {
                 let motion = &evaluation.trajectories[e];
                 self.oscillator.terms[j].phi(motion.displacement[i], motion.velocity[i])
             });
-            if response > 0.0 { inertia / response } else { 0.0 }
+            if response > 0.0 {
+                inertia / response
+            } else {
+                0.0
+            }
         };
         let own = evaluation.device.functions().map(largest);
         let natural = std::iter::once(mass).chain((0..self.oscillator.terms.len()).map(natural));
-        own.zip(natural).map(|(own, natural)| own.max(natural)).collect()
+        own.zip(natural)
+            .map(|(own, natural)| own.max(natural))
+            .collect()
     }
 
     /// The largest change of a function from one point to another, relative to
@@ -39,7 +51,10 @@ impl Problem {
     pub fn relative_change(&self, before: &Evaluation, after: &crate::dynamics::Device) -> f64 {
         let pairs = before.device.functions().zip(after.functions());
         let changes = pairs.zip(self.natural_sizes(before)).map(|((b, a), size)| {
-            let change = b.iter().zip(a).fold(0.0f64, |most, (b, a)| most.max((a - b).abs()));
+            let change = b
+                .iter()
+                .zip(a)
+                .fold(0.0f64, |most, (b, a)| most.max((a - b).abs()));
             if change == 0.0 { 0.0 } else { change / size }
         });
         changes.fold(0.0, f64::max)

@@ -29,7 +29,9 @@ impl ConicStatus {
         match self {
             ConicStatus::Solved => "the quadratic program was solved",
             ConicStatus::Almost => "the quadratic program was solved to reduced accuracy",
-            ConicStatus::Infeasible => "no point satisfies all constraints of the quadratic program",
+            ConicStatus::Infeasible => {
+                "no point satisfies all constraints of the quadratic program"
+            }
             ConicStatus::Unbounded => "the quadratic program has no minimum",
             ConicStatus::Stalled => "the quadratic program could not be solved: its solver stalled",
         }
@@ -98,7 +100,8 @@ impl Conic {
     fn push(&mut self, row: &[(usize, f64)], right: f64, sign: f64, origin: Origin) {
         let largest = row.iter().fold(0.0f64, |m, (_, a)| m.max(a.abs()));
         let scale = if largest > 0.0 { sign / largest } else { sign };
-        self.rows.push(row.iter().map(|(j, a)| (*j, a * scale)), right * scale);
+        self.rows
+            .push(row.iter().map(|(j, a)| (*j, a * scale)), right * scale);
         self.origins.push((origin, scale));
     }
 }
@@ -130,7 +133,12 @@ impl Subproblem {
             return self.nothing();
         };
         solver.solve();
-        self.read(&solver.solution.x, &solver.solution.z, solver.solution.status, &conic)
+        self.read(
+            &solver.solution.x,
+            &solver.solution.z,
+            solver.solution.status,
+            &conic,
+        )
     }
 
     fn nothing(&self) -> Solution {
@@ -180,8 +188,15 @@ impl Subproblem {
             }
         }
         let bounds = conic.rows.len() - zeros;
-        let kinds = [(zeros, ZeroConeT(zeros)), (bounds, NonnegativeConeT(bounds))];
-        conic.cones = kinds.into_iter().filter(|(n, _)| *n > 0).map(|(_, c)| c).collect();
+        let kinds = [
+            (zeros, ZeroConeT(zeros)),
+            (bounds, NonnegativeConeT(bounds)),
+        ];
+        conic.cones = kinds
+            .into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(_, c)| c)
+            .collect();
         for cone in &self.cones {
             for i in 0..cone.rows.len() {
                 // s = A z - right must lie in the cone: rows enter with a minus sign, unscaled.

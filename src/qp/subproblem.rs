@@ -69,14 +69,21 @@ impl Subproblem {
             matrix.add(j, j, *d);
         }
         for i in 0..r {
-            self.residuals.row(i).for_each(|(j, a)| matrix.add(j, n + i, a));
+            self.residuals
+                .row(i)
+                .for_each(|(j, a)| matrix.add(j, n + i, a));
             matrix.add(n + i, n + i, -1.0);
         }
         for i in 0..e {
             let row = self.equalities.row(i);
             row.for_each(|(j, a)| matrix.add(j, n + r + i, a));
         }
-        let right = [&vec![0.0; n], self.residuals.right(), self.equalities.right()].concat();
+        let right = [
+            &vec![0.0; n],
+            self.residuals.right(),
+            self.equalities.right(),
+        ]
+        .concat();
         let (mut solution, residual) = matrix.solve(&right)?;
         solution.truncate(n);
         (residual <= Self::PLAIN_RESIDUAL).then_some(solution)

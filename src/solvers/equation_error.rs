@@ -40,9 +40,15 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     let held = with_scale_held(problem, start);
     sub.constrain(&held, start);
     let sizes: Vec<f64> = (problem.functions.device(start).functions())
-        .map(|f| f.iter().fold(0.0f64, |m, p| m.max(p.abs())).max(f64::MIN_POSITIVE.sqrt()))
+        .map(|f| {
+            f.iter()
+                .fold(0.0f64, |m, p| m.max(p.abs()))
+                .max(f64::MIN_POSITIVE.sqrt())
+        })
         .collect();
-    let metric = problem.functions.relative_metric(&sizes, problem.oscillator.grid.duration());
+    let metric = problem
+        .functions
+        .relative_metric(&sizes, problem.oscillator.grid.duration());
     let weight = PULL * sub.value(&vec![0.0; start.len()]).max(f64::MIN_POSITIVE);
     sub.proximal = metric.iter().map(|m| m * weight).collect();
     let plain = sub.solve_plain().filter(|z| sub.holds(z, 0.0));
@@ -73,12 +79,17 @@ fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     if !something_fixed {
         let grid = &problem.oscillator.grid;
         let mut ones = problem.functions.empty_device();
-        ones.mass.copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
+        ones.mass
+            .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
         let row = problem.functions.transpose(&ones);
         let mean: f64 = row.iter().zip(start).map(|(a, s)| a * s).sum();
         let entries = row.into_iter().enumerate().filter(|(_, a)| *a != 0.0);
         let mut group = RowGroup::new("mean of the mass as at the start");
-        group.push(entries, [mean, mean], [grid.start(), grid.start() + grid.duration()]);
+        group.push(
+            entries,
+            [mean, mean],
+            [grid.start(), grid.start() + grid.duration()],
+        );
         constraints.groups.push(group);
     }
     constraints
@@ -107,8 +118,7 @@ fn add_experiment(problem: &Problem, experiment: &Experiment, start: &[f64], sub
         let mut entries = Vec::new();
         let mut error = -force;
         let parts = problem.functions.iter().zip(problem.functions.ranges());
-        for (((function, range), values), response) in
-            parts.zip(device.functions()).zip(responses)
+        for (((function, range), values), response) in parts.zip(device.functions()).zip(responses)
         {
             error += values[node] * response;
             let row = function.design.row(node);
@@ -126,9 +136,7 @@ fn kinematics(readings: &Readings, spacing: f64) -> Option<Kinematics> {
     Some(Kinematics {
         first: 2,
         v: each(&|w| (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / (12.0 * h)),
-        a: each(&|w| {
-            (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h)
-        }),
+        a: each(&|w| (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h)),
         y: each(&|w| w[2]),
     })
 }
@@ -149,7 +157,8 @@ fn smoothed(readings: &Readings) -> Option<Vec<f64>> {
         let middle = 0.5 * (low + high);
         let candidate = smooth(observed, 10f64.powf(middle))?;
         let pairs = candidate.iter().zip(observed);
-        let mean_square = pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / observed.len() as f64;
+        let mean_square =
+            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / observed.len() as f64;
         if mean_square.sqrt() <= noise {
             (low, best) = (middle, candidate);
         } else {
@@ -162,7 +171,9 @@ fn smoothed(readings: &Readings) -> Option<Vec<f64>> {
 /// Standard deviation of the noise from fourth differences, which a smooth motion hardly has: their
 /// variance is 70 times that of white noise.
 fn noise_level(observed: &[f64]) -> f64 {
-    let fourth = observed.windows(5).map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
+    let fourth = observed
+        .windows(5)
+        .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
     let squares: f64 = fourth.map(|d| d * d).sum();
     (squares / (70.0 * (observed.len() - 4) as f64)).sqrt()
 }
@@ -175,7 +186,12 @@ fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
     }
     let root = weight.sqrt();
     for i in 0..observed.len() - 3 {
-        let row = [(i, -root), (i + 1, 3.0 * root), (i + 2, -3.0 * root), (i + 3, root)];
+        let row = [
+            (i, -root),
+            (i + 1, 3.0 * root),
+            (i + 2, -3.0 * root),
+            (i + 3, root),
+        ];
         sub.residuals.push(row, 0.0);
     }
     sub.solve_plain()

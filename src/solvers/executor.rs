@@ -6,7 +6,7 @@ use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
 use super::recorder::{Recorder, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Solver, Step};
+use super::{Descend, FitSettings, Rung, Solver, Step};
 use crate::dynamics::{Breakdown, Cause};
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
@@ -32,6 +32,8 @@ pub struct Fit {
     pub counts: Counts,
     /// Wall-clock time.
     pub elapsed: Duration,
+    /// The starts that were tried, in order.
+    pub rungs: Vec<Rung>,
 }
 
 impl Fit {
@@ -41,13 +43,13 @@ impl Fit {
     }
 }
 
-/// Fits `problem` from `start`; `observe` is called after every iteration.
+/// Runs one solver from `start`; `observe` is called after every iteration.
 ///
 /// Every method accepts only points of lower cost, so the last point is the best one.
 ///
 /// # Errors
 /// A [`Breakdown`] if the start itself cannot be evaluated.
-pub fn fit(
+pub(super) fn search(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
@@ -125,7 +127,9 @@ impl Run<'_> {
             Step::Stuck(reason) => self.outcome = Some(Outcome::new(Status::Stalled, reason)),
             Step::Minimum(reason) => self.outcome = Some(Outcome::new(Status::Converged, reason)),
             Step::Moved { point, length } => {
-                progress.recorder.record(work.problem(), before, &point, length);
+                progress
+                    .recorder
+                    .record(work.problem(), before, &point, length);
                 let previous_cost = before.evaluation.cost;
                 progress.point = point;
                 if let Some(row) = progress.recorder.rows.last() {
@@ -165,6 +169,7 @@ impl Run<'_> {
                 .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
             counts,
             elapsed: self.clock.elapsed(),
+            rungs: Vec::new(),
         })
     }
 

@@ -4,19 +4,23 @@
 mod equation_error;
 mod executor;
 mod gauss_newton;
+mod ladder;
 mod lbfgs;
 mod line_search;
 mod outcome;
 mod point;
 mod recorder;
+mod start;
 mod steepest_descent;
 mod stopping;
 
 pub use equation_error::equation_error;
-pub use executor::{Fit, fit};
+pub use executor::Fit;
+pub use ladder::{Initial, Rung, fit};
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};
 pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
+pub use start::Start;
 pub use stopping::Stopping;
 
 use crate::objective::GradientKind;
@@ -54,6 +58,8 @@ impl Solver {
 pub struct FitSettings {
     /// The solver.
     pub solver: Solver,
+    /// Where it starts.
+    pub initial: Initial,
     /// Which adjoint gives its gradients.
     pub gradient: GradientKind,
     /// When it ends.

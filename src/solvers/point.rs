@@ -88,6 +88,19 @@ impl<'a, 'p> Work<'a, 'p> {
     }
 }
 
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            forward: self.forward + other.forward,
+            adjoint: self.adjoint + other.adjoint,
+            tangent: self.tangent + other.tangent,
+            qp: self.qp + other.qp,
+        }
+    }
+}
+
 impl Counts {
     pub(crate) fn of(problem: &argmin::core::Problem<&Problem>) -> Self {
         let count = |key| problem.counts.get(key).copied().unwrap_or(0);

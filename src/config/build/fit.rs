@@ -5,7 +5,7 @@ use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
-use crate::solvers::{FitSettings, Solver, Stopping};
+use crate::solvers::{FitSettings, Initial, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
@@ -35,6 +35,7 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<FitSettings, 
     };
     Ok(FitSettings {
         solver,
+        initial: Initial::Functions,
         gradient,
         stopping,
         interrupt: None,

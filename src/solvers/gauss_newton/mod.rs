@@ -134,9 +134,8 @@ fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<S
     }
     let device = problem.functions.device(&proposal.parameters);
     let change = problem.relative_change(&point.evaluation, &device);
-    (change <= SMALLEST_CHANGE).then(|| {
-        format!("no function is to change by more than {change:.1e} of its size")
-    })
+    (change <= SMALLEST_CHANGE)
+        .then(|| format!("no function is to change by more than {change:.1e} of its size"))
 }
 
 /// The best step that the subproblem offers in the constraint set.
@@ -191,8 +190,17 @@ fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
 fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f64]) -> f64 {
     let problem = work.problem();
     work.count_tangents(1);
-    let delta: Vec<f64> = parameters.iter().zip(&point.parameters).map(|(a, b)| a - b).collect();
-    let near: f64 = sub.proximal.iter().zip(&delta).map(|(d, z)| d * z * z).sum();
+    let delta: Vec<f64> = parameters
+        .iter()
+        .zip(&point.parameters)
+        .map(|(a, b)| a - b)
+        .collect();
+    let near: f64 = sub
+        .proximal
+        .iter()
+        .zip(&delta)
+        .map(|(d, z)| d * z * z)
+        .sum();
     near + problem.regularisation(parameters) + linear_misfit(problem, &point.evaluation, &delta)
 }
 
@@ -209,8 +217,9 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
     let misfits = motions.filter_map(|(experiment, motion)| {
         let readings = experiment.readings.as_ref()?;
         let force = experiment.force.as_deref();
-        let tangent =
-            problem.oscillator.tangent(&evaluation.device, force, motion, &direction);
+        let tangent = problem
+            .oscillator
+            .tangent(&evaluation.device, force, motion, &direction);
         let pairs = motion.displacement.iter().zip(&tangent.displacement);
         let moved: Vec<f64> = pairs.map(|(y, dy)| y + dy).collect();
         Some(readings.cost(&moved))
@@ -241,7 +250,10 @@ pub(super) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Sub
         let root = penalty.weight.sqrt();
         let residuals = penalty.residuals(&parameters[range.clone()]);
         for (i, r) in residuals.iter().enumerate() {
-            let row = penalty.rows.row(i).map(|(j, a)| (range.start + j, root * a));
+            let row = penalty
+                .rows
+                .row(i)
+                .map(|(j, a)| (range.start + j, root * a));
             sub.residuals.push(row, -root * r);
         }
     }
@@ -250,5 +262,7 @@ pub(super) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Sub
 /// Diagonal of the proximal term: `1/T integral (delta p / size of p)^2 dt`, summed over functions.
 fn proximal_scales(problem: &Problem, point: &Point) -> Vec<f64> {
     let sizes = problem.natural_sizes(&point.evaluation);
-    problem.functions.relative_metric(&sizes, problem.oscillator.grid.duration())
+    problem
+        .functions
+        .relative_metric(&sizes, problem.oscillator.grid.duration())
 }

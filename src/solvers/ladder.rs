@@ -1,0 +1,197 @@
+//! The ladder against local minima: if a fit from one start does not explain the record, the next
+//! start is tried.
+//!
+//! A motion whose period is off by a few per cent fits worse than no motion at all, so descent from
+//! a wrong start ends in a minimum that means nothing. The rungs: the start as given; the
+//! equation-error start; a horizon that grows from an eighth of the record to all of it.
+
+use super::executor::search;
+use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
+use crate::dynamics::Breakdown;
+use crate::problem::Problem;
+
+/// A fit explains the record if its misfit is below this share of that of no motion at all. False
+/// minima leave tens of per cent.
+const EXPLAINED: f64 = 0.05;
+/// Parts of the record that the growing horizon fits in turn.
+const HORIZONS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
+/// Most iterations on each part but the last.
+const HORIZON_ITERATIONS: u64 = 20;
+
+/// Where a fit starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Initial {
+    /// From the start values of the functions.
+    Functions,
+    /// From the equation error of the readings.
+    Data,
+}
+
+impl Initial {
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Initial::Functions => "functions",
+            Initial::Data => "data",
+        }
+    }
+}
+
+/// One attempt of the ladder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rung {
+    /// Where it started.
+    pub name: &'static str,
+    /// J at its start; NaN if the start had no motion.
+    pub initial_cost: f64,
+    /// J at its end; NaN if the start had no motion.
+    pub cost: f64,
+    /// Iterations it took.
+    pub iterations: u64,
+    /// How it ended.
+    pub outcome: Outcome,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Attempt {
+    Functions,
+    Data,
+    GrowingHorizon,
+}
+
+impl Attempt {
+    fn name(self) -> &'static str {
+        match self {
+            Attempt::Functions => "start values",
+            Attempt::Data => "equation error",
+            Attempt::GrowingHorizon => "growing horizon",
+        }
+    }
+}
+
+/// Fits `problem` from `start`; `observe` is called after every iteration.
+///
+/// Gauss–Newton climbs the ladder until a rung explains the record; the rung with the lowest cost
+/// is returned. The other solvers take the first rung only.
+///
+/// # Errors
+/// A [`Breakdown`] if no rung has a motion at its start.
+pub fn fit(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<Fit, Breakdown> {
+    let attempts = match settings.initial {
+        Initial::Functions => [Attempt::Functions, Attempt::Data, Attempt::GrowingHorizon],
+        Initial::Data => [Attempt::Data, Attempt::Functions, Attempt::GrowingHorizon],
+    };
+    let climbs = settings.solver == Solver::GaussNewton;
+    let mut best: Option<Fit> = None;
+    let mut rungs = Vec::new();
+    let mut trouble = None;
+    for attempt in attempts {
+        match run(problem, start, settings, attempt, observe) {
+            Ok(fit) => {
+                rungs.push(Rung {
+                    name: attempt.name(),
+                    initial_cost: fit.initial_cost,
+                    cost: fit.best.evaluation.cost,
+                    iterations: fit.history.len() as u64,
+                    outcome: fit.outcome.clone(),
+                });
+                let ended = matches!(fit.outcome.status, Status::Interrupted | Status::TimeLimit);
+                let enough = !climbs || ended || explains(problem, &fit);
+                best = Some(better(best, fit));
+                if enough {
+                    break;
+                }
+            }
+            Err(breakdown) => {
+                rungs.push(Rung {
+                    name: attempt.name(),
+                    initial_cost: f64::NAN,
+                    cost: f64::NAN,
+                    iterations: 0,
+                    outcome: Outcome::new(Status::Failed, breakdown.to_string()),
+                });
+                trouble = trouble.or(Some(breakdown));
+                if !climbs {
+                    break;
+                }
+            }
+        }
+    }
+    match (best, trouble) {
+        (Some(fit), _) => Ok(Fit { rungs, ..fit }),
+        (None, Some(breakdown)) => Err(breakdown),
+        (None, None) => {
+            unreachable!("there is at least one attempt, and it ends one way or the other")
+        }
+    }
+}
+
+/// The fit with the lower cost, with the work of both.
+fn better(best: Option<Fit>, fit: Fit) -> Fit {
+    let Some(best) = best else {
+        return fit;
+    };
+    let counts = best.counts + fit.counts;
+    let elapsed = best.elapsed + fit.elapsed;
+    let winner = if fit.best.evaluation.cost < best.best.evaluation.cost {
+        fit
+    } else {
+        best
+    };
+    Fit {
+        counts,
+        elapsed,
+        ..winner
+    }
+}
+
+fn explains(problem: &Problem, fit: &Fit) -> bool {
+    let silence = vec![0.0; problem.oscillator.grid.nodes()];
+    let readings = problem
+        .experiments
+        .iter()
+        .filter_map(|e| e.readings.as_ref());
+    let of_silence: f64 = readings.map(|r| r.cost(&silence)).sum();
+    fit.best.evaluation.misfit <= EXPLAINED * of_silence
+}
+
+fn run(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    attempt: Attempt,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<Fit, Breakdown> {
+    match attempt {
+        Attempt::Functions => search(problem, start, settings, observe),
+        Attempt::Data => search(problem, &from_data(problem, start), settings, observe),
+        Attempt::GrowingHorizon => {
+            let mut parameters = from_data(problem, start);
+            for share in HORIZONS {
+                if share == 1.0 {
+                    return search(problem, &parameters, settings, observe);
+                }
+                let part = problem.first_part(share);
+                let mut short = settings.clone();
+                short.stopping.iterations = HORIZON_ITERATIONS;
+                if let Ok(fit) = search(&part, &parameters, &short, observe) {
+                    parameters = fit.best.parameters;
+                }
+            }
+            search(problem, &parameters, settings, observe)
+        }
+    }
+}
+
+/// The equation-error start; where it has no motion, the start as given.
+fn from_data(problem: &Problem, start: &[f64]) -> Vec<f64> {
+    match equation_error(problem, start) {
+        Ok(theta) if problem.evaluate(&theta).is_ok() => theta,
+        _ => start.to_vec(),
+    }
+}
