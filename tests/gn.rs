@@ -33,14 +33,18 @@ fn smooth() {
         let mut problem = common::paper_problem(n, [2.0, 1.0, 1.0]);
         let h = problem.oscillator.grid.step();
         let beta: f64 = std::env::var("BETA").unwrap_or("1".into()).parse().unwrap();
-        problem.penalties = vec![
-            Penalty::new(0, 2, beta, differences(n, h, 2)),
-            Penalty::new(1, 1, beta, differences(n, h, 1)),
-            Penalty::new(2, 1, beta, differences(n, h, 1)),
-        ];
+        if beta > 0.0 {
+            problem.penalties = vec![
+                Penalty::new(0, 2, beta, differences(n, h, 2)),
+                Penalty::new(1, 1, beta, differences(n, h, 1)),
+                Penalty::new(2, 1, beta, differences(n, h, 1)),
+            ];
+        }
         let mut group = RowGroup::new("k(0) = 1");
         group.push([(2 * n, 1.0)], [1.0, 1.0], [0.0, 0.0]);
-        problem.constraints.groups.push(group);
+        if std::env::var_os("NOK").is_none() {
+            problem.constraints.groups.push(group);
+        }
         let mut group = RowGroup::new("positive");
         if std::env::var_os("POS").is_some() {
             for i in 0..n {
@@ -51,12 +55,16 @@ fn smooth() {
             problem.constraints.groups.push(group);
         }
         let settings = FitSettings {
-            solver: Solver::GaussNewton,
+            solver: if std::env::var_os("PG").is_some() {
+                Solver::ProjectedGradient
+            } else {
+                Solver::GaussNewton
+            },
             initial: Initial::Functions,
             gradient: GradientKind::Discrete,
             stopping: Stopping {
                 tolerance: Some(1e-9),
-                ..Stopping::exactly(60)
+                ..Stopping::exactly(std::env::var("ITS").unwrap_or("60".into()).parse().unwrap())
             },
             interrupt: None,
         };

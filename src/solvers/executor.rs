@@ -4,6 +4,7 @@ use super::gauss_newton::GaussNewton;
 use super::lbfgs::Lbfgs;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
+use super::projected_gradient::ProjectedGradient;
 use super::recorder::{Recorder, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step};
@@ -77,6 +78,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
     match solver {
         Solver::SteepestDescent => Box::<SteepestDescent>::default(),
         Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
+        Solver::ProjectedGradient => Box::<ProjectedGradient>::default(),
         Solver::GaussNewton => Box::<GaussNewton>::default(),
     }
 }

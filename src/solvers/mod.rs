@@ -9,6 +9,7 @@ mod lbfgs;
 mod line_search;
 mod outcome;
 mod point;
+mod projected_gradient;
 mod recorder;
 mod start;
 mod steepest_descent;
@@ -38,6 +39,8 @@ pub enum Solver {
         /// Number of pairs kept.
         memory: usize,
     },
+    /// Spectral projected gradient, under constraints.
+    ProjectedGradient,
     /// Gauss–Newton with a proximal term, under constraints.
     GaussNewton,
 }
@@ -48,6 +51,7 @@ impl Solver {
         match self {
             Solver::SteepestDescent => "steepest-descent",
             Solver::Lbfgs { .. } => "lbfgs",
+            Solver::ProjectedGradient => "projected-gradient",
             Solver::GaussNewton => "gauss-newton",
         }
     }
