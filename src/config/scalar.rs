@@ -10,7 +10,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 
 use super::complaint::Complaint;
-use super::spec::ColumnSpec;
+use super::spec::{ColumnSpec, WeightRule};
 use crate::input::quote;
 
 /// What YAML holds at one place, as far as a value's reader wants to know.
@@ -47,9 +47,16 @@ impl Scalar<'_> {
     }
 }
 
-/// The visits that hand a scalar to `$convert`; lists and maps can only be refused there.
+/// The visits that hand a scalar to `$convert`; lists and maps can only be refused there. With
+/// `but lists` the visitor reads those itself.
 macro_rules! scalar_visits {
     ($value:ty, $convert:path) => {
+        scalar_visits!($value, $convert, but lists);
+        fn visit_seq<A: SeqAccess<'de>>(self, _: A) -> Result<$value, A::Error> {
+            $convert(Scalar::List).map_err(A::Error::custom)
+        }
+    };
+    ($value:ty, $convert:path, but lists) => {
         fn visit_unit<E: Error>(self) -> Result<$value, E> {
             $convert(Scalar::Nothing).map_err(E::custom)
         }
@@ -77,9 +84,6 @@ macro_rules! scalar_visits {
         }
         fn visit_str<E: Error>(self, value: &str) -> Result<$value, E> {
             $convert(Scalar::Text(value)).map_err(E::custom)
-        }
-        fn visit_seq<A: SeqAccess<'de>>(self, _: A) -> Result<$value, A::Error> {
-            $convert(Scalar::List).map_err(A::Error::custom)
         }
         fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<$value, A::Error> {
             $convert(Scalar::Tag).map_err(A::Error::custom)
@@ -314,6 +318,179 @@ impl<'de> Deserialize<'de> for NumberOrColumn {
             }
         }
         deserializer.deserialize_any(Reader)
+    }
+}
+
+/// Elements of a list, each with its own place in messages.
+fn elements<'de, T: Deserialize<'de>, A: SeqAccess<'de>>(mut list: A) -> Result<Vec<T>, A::Error> {
+    let mut elements = Vec::new();
+    while let Some(element) = list.next_element()? {
+        elements.push(element);
+    }
+    Ok(elements)
+}
+
+/// Where a fit starts: a number, a list of values, or a column of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Start {
+    /// The same number at all times.
+    Number(Number),
+    /// One value per parameter; what they are depends on the basis.
+    List(Vec<Number>),
+    /// Values over time.
+    Column(ColumnSpec),
+}
+
+impl Start {
+    const EXPECTED: &'static str =
+        "a finite number, a list of numbers, or a column: {data: file.csv, column: name}";
+
+    fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
+        Number::read_or(scalar, Self::EXPECTED).map(Self::Number)
+    }
+}
+
+impl<'de> Deserialize<'de> for Start {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader;
+        impl<'de> Visitor<'de> for Reader {
+            type Value = Start;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(Start::EXPECTED)
+            }
+            scalar_visits!(Start, Start::read, but lists);
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Start, A::Error> {
+                elements(list).map(Start::List)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Start, A::Error> {
+                ColumnSpec::deserialize(MapAccessDeserializer::new(map)).map(Start::Column)
+            }
+        }
+        deserializer.deserialize_any(Reader)
+    }
+}
+
+/// Break points: how many, equally spaced over the record, or their times in s.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Knots {
+    /// So many over the record, both ends included.
+    Count(Count),
+    /// At these times, in s.
+    Times(Vec<Number>),
+}
+
+impl Knots {
+    const EXPECTED: &'static str = "an integer (so many, equally spaced), or a list of times in s";
+
+    fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
+        let count = Count::read(scalar).map(Self::Count);
+        count.map_err(|complaint| Complaint {
+            expected: Self::EXPECTED.to_owned(),
+            ..complaint
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Knots {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader;
+        impl<'de> Visitor<'de> for Reader {
+            type Value = Knots;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(Knots::EXPECTED)
+            }
+            scalar_visits!(Knots, Knots::read, but lists);
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Knots, A::Error> {
+                elements(list).map(Knots::Times)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, _: A) -> Result<Knots, A::Error> {
+                Knots::read(Scalar::Map).map_err(A::Error::custom)
+            }
+        }
+        deserializer.deserialize_any(Reader)
+    }
+}
+
+/// The weight of a penalty: a number, or the name of a rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    /// Given.
+    Number(Number),
+    /// Chosen from the data.
+    Rule(WeightRule),
+}
+
+impl Weight {
+    fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
+        let names = || WeightRule::ALL.iter().map(|(name, _)| *name);
+        let expected = format!("a finite number, or {}", crate::input::one_of(names()));
+        let weight = match scalar {
+            Scalar::Text(word) if number_in(word).is_none() => {
+                choose(scalar, WeightRule::ALL).map(Self::Rule)
+            }
+            other => Number::read(other).map(Self::Number),
+        };
+        weight.map_err(|complaint| Complaint {
+            expected,
+            ..complaint
+        })
+    }
+}
+
+deserialize_scalar!(Weight, Weight::read, "a number or the name of a rule");
+
+/// One map, or a list of such maps.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OneOrMany<T> {
+    /// One map.
+    One(T),
+    /// A list of maps.
+    Many(Vec<T>),
+}
+
+impl<T> OneOrMany<T> {
+    /// Every map with its place behind the key: nothing, or an index such as `[1]`.
+    pub fn iter(&self) -> impl Iterator<Item = (String, &T)> {
+        let (list, indexed) = match self {
+            Self::One(one) => (std::slice::from_ref(one), false),
+            Self::Many(list) => (list.as_slice(), true),
+        };
+        list.iter().enumerate().map(move |(i, one)| {
+            let place = if indexed {
+                format!("[{i}]")
+            } else {
+                String::new()
+            };
+            (place, one)
+        })
+    }
+
+    fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
+        Err(Complaint::new(
+            "this is the wrong kind of value",
+            scalar.describe(),
+            "a map, or a list of maps",
+        ))
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader<T>(std::marker::PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Reader<T> {
+            type Value = OneOrMany<T>;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a map, or a list of maps")
+            }
+            scalar_visits!(OneOrMany<T>, OneOrMany::read, but lists);
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<OneOrMany<T>, A::Error> {
+                elements(list).map(OneOrMany::Many)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<OneOrMany<T>, A::Error> {
+                T::deserialize(MapAccessDeserializer::new(map)).map(OneOrMany::One)
+            }
+        }
+        deserializer.deserialize_any(Reader(std::marker::PhantomData))
     }
 }
 

@@ -7,7 +7,8 @@ use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-use super::scalar::{Count, Format, Number, NumberOrColumn, Scalar, Text};
+use super::scalar::{Count, Format, Knots, Number, NumberOrColumn, OneOrMany, Scalar, Start};
+use super::scalar::{Text, Weight};
 use super::scalar::{choice, deserialize_scalar, scalar_visits};
 
 /// A whole model file.
@@ -137,10 +138,22 @@ pub struct FunctionsSpec {
 pub struct FunctionSpec {
     /// Shape of the function.
     pub basis: Option<Basis>,
+    /// Break points of a piecewise function or a spline, in s: how many, or a list.
+    pub knots: Option<Knots>,
+    /// Degree of a polynomial.
+    pub degree: Option<Count>,
     /// Values to start the fit from.
-    pub start: Option<NumberOrColumn>,
+    pub start: Option<Start>,
     /// Values that are known and not fitted.
     pub fixed: Option<NumberOrColumn>,
+    /// Smallest value allowed.
+    pub min: Option<NumberOrColumn>,
+    /// Largest value allowed.
+    pub max: Option<NumberOrColumn>,
+    /// Penalties on squared derivatives.
+    pub smooth: Option<OneOrMany<SmoothSpec>>,
+    /// Penalty on the total variation.
+    pub variation: Option<VariationSpec>,
 }
 
 choice! {
@@ -150,7 +163,50 @@ choice! {
         Nodal = "nodal",
         /// One value for all times.
         Constant = "constant",
+        /// One value per cell between knots.
+        PiecewiseConstant = "piecewise-constant",
+        /// One value per knot, linear in between.
+        PiecewiseLinear = "piecewise-linear",
+        /// A polynomial over the whole record.
+        Polynomial = "polynomial",
+        /// A cubic spline.
+        BSpline = "b-spline",
     }
+}
+
+/// A penalty `weight * integral (d^order p / dt^order)^2 dt`; with order 0 of `p - reference`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {order: 2, weight: 0.1}"
+)]
+pub struct SmoothSpec {
+    /// Which derivative: 0, 1 or 2.
+    pub order: Count,
+    /// Factor of the penalty, or the rule that chooses it.
+    pub weight: Weight,
+    /// What a penalty of order 0 pulls towards, in the unit of the function.
+    pub reference: Option<NumberOrColumn>,
+}
+
+choice! {
+    /// How the weight of a penalty is chosen from the data.
+    pub enum WeightRule {
+        /// The largest weight that still fits the readings within their noise.
+        Discrepancy = "discrepancy",
+        /// The corner of misfit against roughness.
+        LCurve = "l-curve",
+        /// Generalised cross-validation.
+        Gcv = "gcv",
+    }
+}
+
+/// A penalty `weight * total variation of p`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a map such as {weight: 0.1}")]
+pub struct VariationSpec {
+    /// Factor of the penalty.
+    pub weight: Number,
 }
 
 /// A column of a file.

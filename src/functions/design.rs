@@ -1,6 +1,6 @@
 //! Design matrices: from parameters to values at the nodes.
 
-use nalgebra_sparse::CsrMatrix;
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 /// A matrix `B` of shape `nodes x parameters`.
 #[derive(Debug, Clone)]
@@ -64,5 +64,12 @@ impl Design {
                 }
             }
         }
+    }
+
+    /// One parameter that is the value at all nodes.
+    pub fn ones(nodes: usize) -> Self {
+        let mut entries = CooMatrix::new(nodes, 1);
+        (0..nodes).for_each(|i| entries.push(i, 0, 1.0));
+        Design::Sparse(CsrMatrix::from(&entries))
     }
 }

@@ -3,7 +3,12 @@
 use super::Design;
 use nalgebra::DMatrix;
 use nalgebra_sparse::factorization::CscCholesky;
-use nalgebra_sparse::{CscMatrix, CsrMatrix};
+use nalgebra_sparse::{CscMatrix, CsrMatrix, SparseEntry};
+
+/// Smallest squared sine of the angle between a column of the design and those before it at which
+/// they count as independent: rounding alone leaves 1e-15 or so, and gradients are enlarged by its
+/// inverse.
+const INDEPENDENT: f64 = 1e-12;
 
 /// The Gram matrix of one basis in L2, and its inverse.
 #[derive(Debug, Clone)]
@@ -21,7 +26,7 @@ pub enum Gram {
 
 impl Gram {
     /// The Gram matrix of `design` under the quadrature `weights` (s) at the nodes; `None` if the
-    /// columns are linearly dependent on the grid.
+    /// columns are linearly dependent on the grid, or nearly so.
     pub fn new(design: &Design, weights: &[f64]) -> Option<Self> {
         match design {
             Design::Empty => Some(Gram::Diagonal(Vec::new())),
@@ -34,6 +39,7 @@ impl Gram {
                 }
                 let gram = matrix.transpose() * weighted;
                 let factor = CscCholesky::factor(&CscMatrix::from(&gram)).ok()?;
+                independent(&gram, factor.l()).then_some(())?;
                 Some(Gram::Factored {
                     matrix: gram,
                     factor: Box::new(factor),
@@ -83,4 +89,13 @@ impl Gram {
             }
         }
     }
+}
+
+/// Whether no pivot `L_jj^2` is negligible beside the diagonal entry `G_jj` it came from.
+fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
+    let diagonal = |matrix: Option<SparseEntry<'_, f64>>| matrix.map_or(0.0, |e| e.into_value());
+    (0..gram.nrows()).all(|j| {
+        let pivot = diagonal(lower.get_entry(j, j));
+        pivot * pivot > INDEPENDENT * diagonal(gram.get_entry(j, j))
+    })
 }

@@ -12,6 +12,7 @@ mod penalty;
 mod quantity;
 mod ratios;
 
+pub use basis::Basis;
 pub use collection::Functions;
 pub use design::Design;
 pub use gram::Gram;
@@ -19,11 +20,15 @@ pub use penalty::Penalty;
 pub use quantity::Quantity;
 pub use ratios::Ratios;
 
+use crate::dynamics::Grid;
+
 /// One coefficient function and where its search starts.
 #[derive(Debug, Clone)]
 pub struct CoefficientFunction {
     /// Which function this is.
     pub quantity: Quantity,
+    /// The space that the function is sought in; `None` if it is fixed.
+    pub basis: Option<Basis>,
     /// How parameters become values at the nodes.
     pub design: Design,
     /// Fixed part at the nodes, in the unit of the quantity.
@@ -40,6 +45,7 @@ impl CoefficientFunction {
     pub fn fixed(quantity: Quantity, values: Vec<f64>) -> Self {
         Self {
             quantity,
+            basis: None,
             design: Design::Empty,
             offset: values,
             start: Vec::new(),
@@ -47,25 +53,46 @@ impl CoefficientFunction {
         }
     }
 
+    /// A function of `basis` on `grid`, starting from the parameters `start`.
+    ///
+    /// # Panics
+    /// If `start` has another number of parameters than the basis.
+    pub fn free(quantity: Quantity, basis: Basis, grid: &Grid, start: Vec<f64>) -> Self {
+        assert_eq!(
+            start.len(),
+            basis.parameters(grid),
+            "one start per parameter"
+        );
+        let design = basis.design(grid);
+        Self::with_design(quantity, basis, design, grid.nodes(), start)
+    }
+
     /// One value per node, starting from `start`.
     pub fn nodal(quantity: Quantity, start: Vec<f64>) -> Self {
-        Self {
-            quantity,
-            design: basis::nodal(),
-            offset: vec![0.0; start.len()],
-            start,
-            positive_parameters: true,
-        }
+        let nodes = start.len();
+        Self::with_design(quantity, Basis::Nodal, Design::Identity, nodes, start)
     }
 
     /// One value for all `nodes` nodes, starting from `start`.
     pub fn constant(quantity: Quantity, start: f64, nodes: usize) -> Self {
+        let design = Design::ones(nodes);
+        Self::with_design(quantity, Basis::Constant, design, nodes, vec![start])
+    }
+
+    fn with_design(
+        quantity: Quantity,
+        basis: Basis,
+        design: Design,
+        nodes: usize,
+        start: Vec<f64>,
+    ) -> Self {
         Self {
             quantity,
-            design: basis::constant(nodes),
+            design,
             offset: vec![0.0; nodes],
-            start: vec![start],
-            positive_parameters: true,
+            start,
+            positive_parameters: basis.positive_parameters(),
+            basis: Some(basis),
         }
     }
 

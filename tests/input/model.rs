@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::scalar::{Count, Number, NumberOrColumn};
-use kmcfit::config::spec::{Basis, FitMethod, Gradient, StepMethod};
+use kmcfit::config::scalar::{Count, Knots, Number, NumberOrColumn, Start, Weight};
+use kmcfit::config::spec::{Basis, FitMethod, Gradient, SmoothSpec, StepMethod, WeightRule};
 
 pub const FULL: &str = "\
 format: 1
@@ -73,11 +73,8 @@ fn every_key_is_read() {
 
     let functions = spec.functions;
     assert_eq!(functions.mass.basis, Some(Basis::Nodal));
-    assert_eq!(
-        functions.mass.start,
-        Some(NumberOrColumn::Number(Number(2.0)))
-    );
-    let Some(NumberOrColumn::Column(start)) = functions.damping.start else {
+    assert_eq!(functions.mass.start, Some(Start::Number(Number(2.0))));
+    let Some(Start::Column(start)) = functions.damping.start else {
         panic!("a column")
     };
     assert_eq!(
@@ -108,6 +105,55 @@ fn every_key_is_read() {
     assert_eq!(columns.damping.as_deref(), Some("damping_N_s_per_m"));
     assert_eq!(columns.stiffness.as_deref(), Some("stiffness_N_per_m"));
     assert_eq!(spec.predict.unwrap()[0].velocity, Number(1.001));
+}
+
+#[test]
+fn shapes_limits_and_penalties_are_read() {
+    let text = SHORT
+        .replace("mass: {basis: nodal}", "mass: {basis: piecewise-linear, knots: 11, start: [1, 2.5], min: 0.1, max: {data: m.csv, column: m}}")
+        .replace("damping: {basis: nodal}", "damping: {basis: b-spline, knots: [0, 1.5, 3], smooth: {order: 1, weight: l-curve}, variation: {weight: 2}}")
+        .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, smooth: [{order: 0, weight: 1e-3, reference: 1}, {order: 2, weight: gcv}]}");
+    let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
+
+    let mass = functions.mass;
+    assert_eq!(mass.basis, Some(Basis::PiecewiseLinear));
+    assert_eq!(mass.knots, Some(Knots::Count(Count(11))));
+    let list = vec![Number(1.0), Number(2.5)];
+    assert_eq!(mass.start, Some(Start::List(list)));
+    assert_eq!(mass.min, Some(NumberOrColumn::Number(Number(0.1))));
+    let Some(NumberOrColumn::Column(max)) = mass.max else {
+        panic!("a column")
+    };
+    assert_eq!((&*max.data, &*max.column), ("m.csv", "m"));
+
+    let damping = functions.damping;
+    assert_eq!(damping.basis, Some(Basis::BSpline));
+    let times = [0.0, 1.5, 3.0].map(Number).to_vec();
+    assert_eq!(damping.knots, Some(Knots::Times(times)));
+    assert_eq!(damping.variation.map(|v| v.weight), Some(Number(2.0)));
+    let one: Vec<_> = damping.smooth.iter().flat_map(|s| s.iter()).collect();
+    let slope = SmoothSpec {
+        order: Count(1),
+        weight: Weight::Rule(WeightRule::LCurve),
+        reference: None,
+    };
+    assert_eq!(one, [(String::new(), &slope)]);
+
+    let stiffness = functions.stiffness;
+    assert_eq!(stiffness.degree, Some(Count(3)));
+    let many: Vec<_> = stiffness.smooth.iter().flat_map(|s| s.iter()).collect();
+    let value = SmoothSpec {
+        order: Count(0),
+        weight: Weight::Number(Number(1e-3)),
+        reference: Some(NumberOrColumn::Number(Number(1.0))),
+    };
+    let curvature = SmoothSpec {
+        order: Count(2),
+        weight: Weight::Rule(WeightRule::Gcv),
+        reference: None,
+    };
+    let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
+    assert_eq!(many, expected);
 }
 
 #[test]

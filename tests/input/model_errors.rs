@@ -84,7 +84,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("fixed: 1", "Fixed: 1"), @"
     m.yaml:18:32: functions.stiffness: unknown key
       found: `Fixed`
-      expected: one of: basis, start, fixed
+      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation
       hint: did you mean `fixed`?
     ");
     assert_snapshot!(changed("cost_ratio", "cost-ratio"), @"
@@ -346,7 +346,7 @@ fn choices() {
     assert_snapshot!(changed("basis: constant", "basis: Constant"), @"
     m.yaml:18:22: functions.stiffness.basis: unknown choice
       found: `Constant`
-      expected: one of: nodal, constant
+      expected: one of: nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
       hint: did you mean `constant`?
     ");
 }
@@ -436,10 +436,10 @@ fn wrong_kinds() {
     assert_snapshot!(changed("start: 2.0", "start: two"), @"
     m.yaml:14:31: functions.mass.start: not a number
       found: text `two`
-      expected: a finite number, or a column: {data: file.csv, column: name}
+      expected: a finite number, a list of numbers, or a column: {data: file.csv, column: name}
     ");
-    assert_snapshot!(changed("start: 2.0", "start: [2.0, 2.0]"), @"
-    m.yaml:14:31: functions.mass.start: not a number
+    assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
+    m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
       expected: a finite number, or a column: {data: file.csv, column: name}
     ");

@@ -1,13 +1,18 @@
 //! Functions: basis, start, fixed part; and the truth.
 
+mod basis;
+mod limits;
+mod start;
+
 use super::QUANTITIES;
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
+use crate::config::scalar::Start;
 use crate::config::spec::{Basis, FunctionSpec};
 use crate::dynamics::{Device, Grid};
 use crate::error::InputError;
-use crate::functions::{CoefficientFunction, Quantity};
+use crate::functions::{self, CoefficientFunction, Quantity};
 
 /// All functions on the grid, mass first.
 pub(super) fn build(
@@ -40,6 +45,8 @@ fn function(
 ) -> Result<CoefficientFunction, InputError> {
     let key = format!("functions.{}", quantity.name());
     let spec = spec(file, quantity);
+    basis::keys_fit(file, &key, spec)?;
+    limits::check(file, grid, &key, spec)?;
     match (&spec.fixed, &spec.start, spec.basis) {
         (Some(_), Some(_), _) => Err(file
             .error_at(&format!("{key}.start"), "a fixed function has no start")
@@ -55,7 +62,10 @@ fn function(
         (None, Some(_), None) => Err(file
             .error_at(&key, "a function to be fitted needs a basis")
             .expected(format!("`basis`, one of {}", basis_names()))),
-        (None, Some(start), Some(basis)) => free(file, grid, quantity, start, basis),
+        (None, Some(given), Some(kind)) => {
+            let basis = basis::build(file, grid, &key, spec, kind)?;
+            free(file, grid, quantity, basis, given)
+        }
     }
 }
 
@@ -63,32 +73,16 @@ fn free(
     file: &ModelFile,
     grid: &Grid,
     quantity: Quantity,
-    start: &NumberOrColumn,
-    basis: Basis,
+    basis: functions::Basis,
+    given: &Start,
 ) -> Result<CoefficientFunction, InputError> {
     let key = format!("functions.{}.start", quantity.name());
-    match (basis, start) {
-        (Basis::Nodal, _) => {
-            let values = values(file, grid, &key, start)?;
-            positive_mass(file, quantity, &key, &values)?;
-            Ok(CoefficientFunction::nodal(quantity, values))
-        }
-        (Basis::Constant, NumberOrColumn::Number(value)) => {
-            positive_mass(file, quantity, &key, &[value.0])?;
-            Ok(CoefficientFunction::constant(
-                quantity,
-                value.0,
-                grid.nodes(),
-            ))
-        }
-        (Basis::Constant, NumberOrColumn::Column(_)) => Err(file
-            .error_at(
-                &key,
-                "the basis `constant` has one value, not a column of them",
-            )
-            .found("a column of a file")
-            .expected("a number")),
-    }
+    let start = start::parameters(file, grid, &key, &basis, given)?;
+    let function = CoefficientFunction::free(quantity, basis, grid, start);
+    let mut values = vec![0.0; grid.nodes()];
+    function.values_into(&function.start, &mut values);
+    positive_mass(file, quantity, &key, &values)?;
+    Ok(function)
 }
 
 fn values(
@@ -112,12 +106,13 @@ fn positive_mass(
     values: &[f64],
 ) -> Result<(), InputError> {
     let broken = values.iter().position(|m| *m <= 0.0);
+    let same = values.iter().all(|m| *m == values[0]);
     match broken {
         Some(i) if quantity == Quantity::Mass => Err(file
             .error_at(key, "the mass must be positive at all times")
-            .found(match values.len() {
-                1 => values[i].to_string(),
-                _ => format!("{} at node {i}", values[i]),
+            .found(match same {
+                true => values[i].to_string(),
+                false => format!("{} at node {i}", values[i]),
             })
             .expected("a number greater than 0, in kg")),
         _ => Ok(()),

@@ -1,13 +1,39 @@
 //! One value for all times.
 
-use crate::functions::Design;
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
+use super::knots::uniform_knots;
+use super::space::Space;
+use crate::dynamics::Grid;
 
-/// Design matrix of shape `nodes x 1`, all ones.
-pub fn constant(nodes: usize) -> Design {
-    let mut entries = CooMatrix::new(nodes, 1);
-    for i in 0..nodes {
-        entries.push(i, 0, 1.0);
+/// The function 1.
+pub(super) struct Constant {
+    ends: Vec<f64>,
+}
+
+impl Constant {
+    /// On the record.
+    pub fn on(grid: &Grid) -> Self {
+        Self {
+            ends: uniform_knots(grid, 2),
+        }
     }
-    Design::Sparse(CsrMatrix::from(&entries))
+}
+
+impl Space for Constant {
+    fn parameters(&self) -> usize {
+        1
+    }
+
+    fn degree(&self) -> usize {
+        0
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        self.ends.clone()
+    }
+
+    fn row(&self, _: f64, derivative: usize, entries: &mut Vec<(usize, f64)>) {
+        if derivative == 0 {
+            entries.push((0, 1.0));
+        }
+    }
 }

@@ -1,7 +1,194 @@
-//! Bases: each makes the design matrix from parameters to nodal values; one file each.
+//! Bases: each turns parameters `theta` into a function `p(t) = sum_j theta_j b_j(t)` of time.
+//!
+//! What was chosen is a [`Basis`]; how its functions `b_j` behave is in one file per basis. All but
+//! the polynomials are non-negative and sum to one, so that their parameters have the unit and the
+//! size of the function itself.
 
+mod b_spline;
 mod constant;
+mod differences;
+mod gauss;
+mod knots;
 mod nodal;
+mod piecewise_constant;
+mod piecewise_linear;
+mod polynomial;
+mod space;
 
-pub use constant::constant;
-pub use nodal::nodal;
+pub use knots::uniform_knots;
+pub use polynomial::{from_physical_powers, physical_powers};
+
+use super::{Design, Gram};
+use crate::dynamics::Grid;
+use crate::dynamics::quadrature::trapezoid_weights;
+use nalgebra_sparse::CsrMatrix;
+use space::{Space, matrix};
+
+/// How often [`Basis::project`] corrects its solution of the normal equations; the second pass
+/// removes what the first one lost to rounding.
+const PROJECTION_PASSES: usize = 3;
+
+/// A finite-dimensional space of functions of time on the record.
+///
+/// `knots` are times in s: at least two, increasing, the first and the last of them the ends of the
+/// record. They need not fall on nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Basis {
+    /// One value per node of the grid, linear in between.
+    Nodal,
+    /// One value for all times.
+    Constant,
+    /// One value per cell between two knots; at an inner knot the value of the cell after it.
+    PiecewiseConstant {
+        /// Times in s at which the value may jump, and both ends.
+        knots: Vec<f64>,
+    },
+    /// One value per knot, linear in between.
+    PiecewiseLinear {
+        /// Times in s at which the slope may jump, and both ends.
+        knots: Vec<f64>,
+    },
+    /// Legendre polynomials `P_n(x)`, `n = 0..=degree`, on the record mapped to `x` in `[-1, 1]`.
+    Polynomial {
+        /// Highest power.
+        degree: usize,
+    },
+    /// Cubic B-splines on a clamped knot sequence: twice continuously differentiable.
+    BSpline {
+        /// Times in s at which the third derivative may jump, and both ends.
+        knots: Vec<f64>,
+    },
+}
+
+impl Basis {
+    /// Name in a model file.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Basis::Nodal => "nodal",
+            Basis::Constant => "constant",
+            Basis::PiecewiseConstant { .. } => "piecewise-constant",
+            Basis::PiecewiseLinear { .. } => "piecewise-linear",
+            Basis::Polynomial { .. } => "polynomial",
+            Basis::BSpline { .. } => "b-spline",
+        }
+    }
+
+    /// The functions of this basis on a record: the one place where the kinds are told apart.
+    fn on(&self, grid: &Grid) -> Box<dyn Space> {
+        match self {
+            Basis::Nodal => Box::new(nodal::on(grid)),
+            Basis::Constant => Box::new(constant::Constant::on(grid)),
+            Basis::PiecewiseConstant { knots } => {
+                Box::new(piecewise_constant::PiecewiseConstant::new(knots))
+            }
+            Basis::PiecewiseLinear { knots } => {
+                Box::new(piecewise_linear::PiecewiseLinear::new(knots))
+            }
+            Basis::Polynomial { degree } => Box::new(polynomial::Legendre::on(grid, *degree)),
+            Basis::BSpline { knots } => Box::new(b_spline::CubicSpline::new(knots)),
+        }
+    }
+
+    /// Number of parameters: nodes (`nodal`), 1 (`constant`), knots - 1 (`piecewise-constant`),
+    /// knots (`piecewise-linear`), degree + 1 (`polynomial`), knots + 2 (`b-spline`).
+    pub fn parameters(&self, grid: &Grid) -> usize {
+        match self {
+            Basis::Nodal => grid.nodes(),
+            Basis::Constant => 1,
+            Basis::PiecewiseConstant { knots } => knots.len() - 1,
+            Basis::PiecewiseLinear { knots } => knots.len(),
+            Basis::Polynomial { degree } => degree + 1,
+            Basis::BSpline { knots } => knots.len() + 2,
+        }
+    }
+
+    /// The design matrix `B_ij = b_j(t_i)` at the nodes, `nodes x parameters`; without unit.
+    pub fn design(&self, grid: &Grid) -> Design {
+        match self {
+            Basis::Nodal => Design::Identity,
+            _ => Design::Sparse(self.rows(grid, &grid.times(), 0)),
+        }
+    }
+
+    /// `d^q b_j / dt^q` at arbitrary `times` (s) inside the record, `q = derivative`:
+    /// `times.len() x parameters`, in 1/s^q.
+    ///
+    /// Where the derivative jumps it is the one after the time; at the end of the record the one
+    /// before. A node that misses a knot by rounding only counts as being on it. Times outside the
+    /// record are moved to its ends.
+    pub fn rows(&self, grid: &Grid, times: &[f64], derivative: usize) -> CsrMatrix<f64> {
+        let space = self.on(grid);
+        let row = |t: &f64| (*t, 1.0);
+        matrix(space.as_ref(), times.iter().map(row), derivative)
+    }
+
+    /// The roughness `L` of order `q` in residual form, rows `x parameters`:
+    /// `|L theta|^2 = integral (d^q p / dt^q)^2 dt` over the record, in (unit of p)^2 s^(1-2q).
+    ///
+    /// Exact for every function of the basis, by Gauss-Legendre quadrature of each cell. Where the
+    /// derivative is not square-integrable — `nodal` and `piecewise-linear` with `q = 2`,
+    /// `piecewise-constant` with `q >= 1` — it is the sum of `h (divided difference)^2` over the
+    /// inner knots (for `piecewise-constant`: of differences between cell centres), `h` the mean of
+    /// the two neighbouring spacings; with equal spacing `h ((p_{j-1} - 2 p_j + p_{j+1}) / h^2)^2`.
+    /// It leaves out the half cell at either end. A derivative that is zero has no rows.
+    pub fn roughness(&self, grid: &Grid, order: usize) -> CsrMatrix<f64> {
+        self.on(grid).roughness(order)
+    }
+
+    /// Times (s) at which the function may change its formula: the nodes, the knots, or the two
+    /// ends of the record.
+    pub fn knot_times(&self, grid: &Grid) -> Vec<f64> {
+        match self {
+            Basis::Nodal => grid.times(),
+            Basis::Constant | Basis::Polynomial { .. } => uniform_knots(grid, 2),
+            Basis::PiecewiseConstant { knots }
+            | Basis::PiecewiseLinear { knots }
+            | Basis::BSpline { knots } => knots.clone(),
+        }
+    }
+
+    /// Whether positive parameters make a function positive at all times: all but polynomials of
+    /// degree 1 and more.
+    pub fn positive_parameters(&self) -> bool {
+        !matches!(self, Basis::Polynomial { degree: 1.. })
+    }
+
+    /// The parameters of the constant function `value`.
+    pub fn constant(&self, grid: &Grid, value: f64) -> Vec<f64> {
+        let mut theta = vec![0.0; self.parameters(grid)];
+        match self {
+            Basis::Polynomial { .. } => theta[0] = value,
+            _ => theta.fill(value),
+        }
+        theta
+    }
+
+    /// The parameters of the function closest to the values `nodal` at the nodes:
+    /// `min sum_i w_i (p(t_i) - nodal_i)^2` with the trapezoid weights `w_i` (s). `None` if the
+    /// nodes cannot tell the functions of the basis apart.
+    ///
+    /// # Panics
+    /// If there is not one value per node.
+    pub fn project(&self, grid: &Grid, nodal: &[f64]) -> Option<Vec<f64>> {
+        assert_eq!(nodal.len(), grid.nodes(), "one value per node");
+        if *self == Basis::Nodal {
+            return Some(nodal.to_vec());
+        }
+        let design = self.design(grid);
+        let weights = trapezoid_weights(grid.nodes(), grid.step());
+        let gram = Gram::new(&design, &weights)?;
+        // From a constant, so that constants come back as they are.
+        let mut theta = self.constant(grid, nodal[0]);
+        let mut correction = theta.clone();
+        for _ in 0..PROJECTION_PASSES {
+            let values = design.multiply(&theta, grid.nodes());
+            let misses = nodal.iter().zip(&values).zip(&weights);
+            let weighted: Vec<f64> = misses.map(|((n, v), w)| w * (n - v)).collect();
+            let mut dual = vec![0.0; theta.len()];
+            design.transpose_multiply_add(&weighted, &mut dual);
+            gram.solve(&dual, &mut correction);
+            theta.iter_mut().zip(&correction).for_each(|(t, c)| *t += c);
+        }
+        Some(theta)
+    }
+}

@@ -1,8 +1,10 @@
 //! One value per node, linear in between: the paper's choice.
 
-use crate::functions::Design;
+use super::knots::Knots;
+use super::piecewise_linear::PiecewiseLinear;
+use crate::dynamics::Grid;
 
-/// The identity.
-pub fn nodal() -> Design {
-    Design::Identity
+/// Piecewise linear functions with the nodes as knots.
+pub(super) fn on(grid: &Grid) -> PiecewiseLinear {
+    PiecewiseLinear::on(Knots::nodes(grid))
 }

@@ -1,0 +1,73 @@
+//! Cubic B-splines: smooth functions with local parameters.
+
+use super::knots::Knots;
+use super::space::Space;
+
+/// Degree of the pieces.
+const DEGREE: usize = 3;
+
+/// Clamped cubic B-splines: the break points with each end repeated, so that the first and the last
+/// parameter are the values at the ends of the record.
+pub(super) struct CubicSpline {
+    knots: Knots,
+}
+
+impl CubicSpline {
+    /// Between `knots` (s).
+    pub fn new(knots: &[f64]) -> Self {
+        Self {
+            knots: Knots::new(knots),
+        }
+    }
+
+    /// Knot `i` of the clamped sequence, in which cell `s` begins at `i = s + DEGREE`.
+    fn clamped(&self, i: usize) -> f64 {
+        let index = i.saturating_sub(DEGREE).min(self.knots.cells());
+        self.knots.times()[index]
+    }
+}
+
+impl Space for CubicSpline {
+    fn parameters(&self) -> usize {
+        self.knots.cells() + DEGREE
+    }
+
+    fn degree(&self) -> usize {
+        DEGREE
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        self.knots.times().to_vec()
+    }
+
+    /// The recursion of Cox and de Boor, from degree to degree; its last steps take derivatives:
+    ///
+    /// ```text
+    /// N_{i,p}  = (t - u_i) / (u_{i+p} - u_i) N_{i,p-1}
+    ///          + (u_{i+p+1} - t) / (u_{i+p+1} - u_{i+1}) N_{i+1,p-1}
+    /// N_{i,p}' = p / (u_{i+p} - u_i) N_{i,p-1} - p / (u_{i+p+1} - u_{i+1}) N_{i+1,p-1}
+    /// ```
+    fn row(&self, t: f64, derivative: usize, entries: &mut Vec<(usize, f64)>) {
+        let Some(degree_of_values) = DEGREE.checked_sub(derivative) else {
+            return;
+        };
+        let (cell, t) = self.knots.locate(t);
+        let mut values = [1.0, 0.0, 0.0, 0.0];
+        for degree in 1..=DEGREE {
+            let mut raised = [0.0; DEGREE + 1];
+            for r in 0..degree {
+                // The function of the degree below whose support is [begin, end].
+                let i = cell + DEGREE + 1 + r - degree;
+                let (begin, end) = (self.clamped(i), self.clamped(i + degree));
+                let (falling, rising) = match degree <= degree_of_values {
+                    true => (end - t, t - begin),
+                    false => (-(degree as f64), degree as f64),
+                };
+                raised[r] += falling / (end - begin) * values[r];
+                raised[r + 1] += rising / (end - begin) * values[r];
+            }
+            values = raised;
+        }
+        entries.extend(values.into_iter().enumerate().map(|(r, v)| (cell + r, v)));
+    }
+}

@@ -1,0 +1,30 @@
+//! Divided differences of values at unequal spacings, as roughness of functions that have no
+//! square-integrable derivative.
+
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
+
+/// Rows `sqrt(h) (p_{j+1} - p_j) / h` for values with the spacings `h` (s).
+pub(super) fn first(spacings: &[f64]) -> CsrMatrix<f64> {
+    let mut rows = CooMatrix::new(spacings.len(), spacings.len() + 1);
+    for (j, h) in spacings.iter().enumerate() {
+        let factor = 1.0 / h.sqrt();
+        rows.push(j, j, -factor);
+        rows.push(j, j + 1, factor);
+    }
+    CsrMatrix::from(&rows)
+}
+
+/// Rows `sqrt(h) ((p_{j+1} - p_j) / h_after - (p_j - p_{j-1}) / h_before) / h`, `h` the mean of the
+/// spacings before and after (s).
+pub(super) fn second(spacings: &[f64]) -> CsrMatrix<f64> {
+    let inner = spacings.len().saturating_sub(1);
+    let mut rows = CooMatrix::new(inner, spacings.len() + 1);
+    for (j, pair) in spacings.windows(2).enumerate() {
+        let factor = 1.0 / (0.5 * (pair[0] + pair[1])).sqrt();
+        let (before, after) = (factor / pair[0], factor / pair[1]);
+        rows.push(j, j, before);
+        rows.push(j, j + 1, -(before + after));
+        rows.push(j, j + 2, after);
+    }
+    CsrMatrix::from(&rows)
+}

@@ -1,0 +1,54 @@
+//! One value per cell: functions with jumps.
+
+use super::differences;
+use super::knots::Knots;
+use super::space::{Space, square_integral};
+use nalgebra_sparse::CsrMatrix;
+
+/// The indicator functions of the cells.
+pub(super) struct PiecewiseConstant {
+    knots: Knots,
+}
+
+impl PiecewiseConstant {
+    /// Cells between `knots` (s).
+    pub fn new(knots: &[f64]) -> Self {
+        Self {
+            knots: Knots::new(knots),
+        }
+    }
+
+    /// Distances between the centres of neighbouring cells, in s.
+    fn centre_distances(&self) -> Vec<f64> {
+        let pairs = self.knots.widths().windows(2);
+        pairs.map(|w| 0.5 * (w[0] + w[1])).collect()
+    }
+}
+
+impl Space for PiecewiseConstant {
+    fn parameters(&self) -> usize {
+        self.knots.cells()
+    }
+
+    fn degree(&self) -> usize {
+        0
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        self.knots.times().to_vec()
+    }
+
+    fn row(&self, t: f64, derivative: usize, entries: &mut Vec<(usize, f64)>) {
+        if derivative == 0 {
+            entries.push((self.knots.locate(t).0, 1.0));
+        }
+    }
+
+    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+        match order {
+            1 => differences::first(&self.centre_distances()),
+            2 => differences::second(&self.centre_distances()),
+            _ => square_integral(self, order),
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! One value per knot, linear in between.
+
+use super::differences;
+use super::knots::Knots;
+use super::space::{Space, square_integral};
+use nalgebra_sparse::CsrMatrix;
+
+/// Hat functions: 1 at their own knot, 0 at all others.
+pub(super) struct PiecewiseLinear {
+    knots: Knots,
+}
+
+impl PiecewiseLinear {
+    /// Between `knots` (s).
+    pub fn new(knots: &[f64]) -> Self {
+        Self::on(Knots::new(knots))
+    }
+
+    /// On cells that are there already.
+    pub fn on(knots: Knots) -> Self {
+        Self { knots }
+    }
+}
+
+impl Space for PiecewiseLinear {
+    fn parameters(&self) -> usize {
+        self.knots.times().len()
+    }
+
+    fn degree(&self) -> usize {
+        1
+    }
+
+    fn breaks(&self) -> Vec<f64> {
+        self.knots.times().to_vec()
+    }
+
+    fn row(&self, t: f64, derivative: usize, entries: &mut Vec<(usize, f64)>) {
+        let (cell, t) = self.knots.locate(t);
+        let width = self.knots.widths()[cell];
+        let (before, after) = (self.knots.times()[cell], self.knots.times()[cell + 1]);
+        match derivative {
+            0 => {
+                // Exactly 1 at the knot after, whatever the rounding of the width.
+                let share = match t < after {
+                    true => ((t - before) / width).min(1.0),
+                    false => 1.0,
+                };
+                entries.extend([(cell, 1.0 - share), (cell + 1, share)]);
+            }
+            1 => entries.extend([(cell, -1.0 / width), (cell + 1, 1.0 / width)]),
+            _ => {}
+        }
+    }
+
+    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+        match order {
+            2 => differences::second(self.knots.widths()),
+            _ => square_integral(self, order),
+        }
+    }
+}

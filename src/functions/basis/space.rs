@@ -1,0 +1,63 @@
+//! What every basis can do on a record.
+
+use super::gauss;
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
+
+/// The functions `b_j` of a basis on a record: polynomials between break points.
+pub(super) trait Space {
+    /// Number of functions.
+    fn parameters(&self) -> usize;
+
+    /// Highest degree between break points.
+    fn degree(&self) -> usize;
+
+    /// Times (s) between which the functions are polynomials, both ends included.
+    fn breaks(&self) -> Vec<f64>;
+
+    /// Appends the index and the `derivative`-th derivative (1/s^derivative) of every function that
+    /// is not zero around the time `t` (s).
+    fn row(&self, t: f64, derivative: usize, entries: &mut Vec<(usize, f64)>);
+
+    /// The roughness, see [`Basis::roughness`](super::Basis::roughness); as it stands for functions
+    /// whose derivative is square-integrable.
+    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+        square_integral(self, order)
+    }
+}
+
+/// The matrix with one row per time and factor: `factor * d^derivative b_j / dt^derivative`.
+pub(super) fn matrix<S: Space + ?Sized>(
+    space: &S,
+    rows: impl ExactSizeIterator<Item = (f64, f64)>,
+    derivative: usize,
+) -> CsrMatrix<f64> {
+    let mut matrix = CooMatrix::new(rows.len(), space.parameters());
+    let mut entries = Vec::new();
+    for (i, (t, factor)) in rows.enumerate() {
+        entries.clear();
+        space.row(t, derivative, &mut entries);
+        for &(j, value) in entries.iter().filter(|(_, value)| *value != 0.0) {
+            matrix.push(i, j, factor * value);
+        }
+    }
+    CsrMatrix::from(&matrix)
+}
+
+/// `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule:
+/// `degree - order + 1` rows per cell.
+pub(super) fn square_integral<S: Space + ?Sized>(space: &S, order: usize) -> CsrMatrix<f64> {
+    let Some(rest) = space.degree().checked_sub(order) else {
+        return CsrMatrix::zeros(0, space.parameters());
+    };
+    let rule = gauss::rule(rest + 1);
+    let breaks = space.breaks();
+    let cells = breaks.windows(2);
+    let points: Vec<(f64, f64)> = cells
+        .flat_map(|cell| {
+            let (middle, half) = (0.5 * (cell[0] + cell[1]), 0.5 * (cell[1] - cell[0]));
+            rule.iter()
+                .map(move |(x, w)| (middle + half * x, (half * w).sqrt()))
+        })
+        .collect();
+    matrix(space, points.into_iter(), order)
+}
