@@ -56,23 +56,28 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }
-    print(&describe(&model));
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
+        print(&describe(&model));
         return Ok(OK);
     }
+    // Whatever is wrong with the input is said before anything is printed or made.
+    let refined = node_counts(arguments)
+        .into_iter()
+        .map(|nodes| build(&file, Purpose::Check { nodes }))
+        .collect::<Result<Vec<_>, _>>()?;
     let folder = arguments
         .out
         .as_deref()
         .map(OutputFolder::prepare)
         .transpose()?;
     let mut curves = Vec::new();
+    print(&describe(&model));
     print(&format!(
         "{:>8}  {:<10}  {:>12}  {:>9}\n",
         "nodes", "adjoint", "least error", "at step"
     ));
-    for nodes in node_counts(arguments) {
-        let model = build(&file, Purpose::Check { nodes })?;
-        for curve in check(&model)? {
+    for model in &refined {
+        for curve in check(model)? {
             let (step, error) = curve.best();
             print(&format!(
                 "{:>8}  {:<10}  {error:>12.1e}  {step:>9.1e}\n",
@@ -134,7 +139,7 @@ fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
 
 fn verdict(curves: &[Curve]) -> u8 {
     let failed: Vec<&Curve> = (curves.iter())
-        .filter(|c| c.kind == GradientKind::Discrete && c.best().1.is_nan() || c.best().1 > PASS)
+        .filter(|c| c.kind == GradientKind::Discrete && c.best().1 > PASS)
         .collect();
     if failed.is_empty() {
         print(&format!(
