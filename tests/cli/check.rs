@@ -53,3 +53,18 @@ fn what_is_all_fixed_has_no_gradient() {
         "warning: every function is fixed, so there is nothing to fit\n"
     );
 }
+
+/// The steps follow the unit of the cost: a chi-square of a million is checked as well as an
+/// integral of a hundred.
+#[test]
+fn steps_follow_the_size_of_the_cost() {
+    let bench = Workbench::with_shipped_models();
+    let model = bench.read("models/paper-lbfgs.yaml");
+    let sigma = |sigma: &str| format!("    sigma: {{displacement: {sigma}}}\n    initial:");
+    for value in ["1e-4", "0.1", "1e4"] {
+        let spoilt = model.replace("    initial:", &sigma(value));
+        bench.write("models/sigma.yaml", &spoilt);
+        let stdout = bench.run_to(0, &["check", "models/sigma.yaml"]);
+        assert!(stdout.contains("exact"), "{value}: {stdout}");
+    }
+}
