@@ -16,7 +16,7 @@ fn times() -> Vec<f64> {
 }
 
 /// m_i = 1 - 0.5 (i + 1)/N, c = 0, k = 1.
-fn paper_truth() -> CsvTable {
+pub fn paper_truth() -> CsvTable {
     let mass = (0..NODES).map(|i| 1.0 - 0.5 * (i + 1) as f64 / NODES as f64);
     CsvTable::new()
         .column("t_s", times())
@@ -27,7 +27,7 @@ fn paper_truth() -> CsvTable {
 
 /// The motion for m = 1 - a t, c = 0, k = 1 from y(0) = 3.3, v(0) = 1: with x = 1 - a t and
 /// z = 2 sqrt(x)/a, y = sqrt(x) [A J1(z) + B Y1(z)].
-fn bessel() -> CsvTable {
+pub fn bessel() -> CsvTable {
     const A: f64 = -43.2406529071;
     const B: f64 = 1.75804247628;
     const RATE: f64 = 0.02;

@@ -11,13 +11,6 @@ const SHORTEST_STEM: usize = 3;
 /// Capitals, `-`, `_` and spaces do not count. A candidate is near when at most one letter in
 /// three was dropped, added, changed or swapped with its neighbour, when one word begins with
 /// the other, or when the candidate is the word and a unit (`y_m` for `y`).
-///
-/// ```
-/// use kmcfit::near::nearest;
-/// assert_eq!(nearest("displacment", ["velocity", "displacement"]), Some("displacement"));
-/// assert_eq!(nearest("Time", ["time", "mass"]), Some("time"));
-/// assert_eq!(nearest("temperature", ["time", "mass"]), None);
-/// ```
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = plain(word);
     if word.is_empty() || word.chars().count() > LONGEST_WORD {

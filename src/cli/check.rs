@@ -2,6 +2,7 @@
 
 use super::{Failure, NOT_CONVERGED, OK, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
+use crate::dynamics::Breakdown;
 use crate::objective::GradientKind;
 use crate::report::figures::{self, GradientCurve};
 use crate::report::{CsvTable, OutputFolder, render};
@@ -23,9 +24,23 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Step sizes of the check: two per decade from 1 to 1e-10.
-fn steps() -> Vec<f64> {
-    (0..=20).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect()
+/// Step sizes of the check: two per decade over ten decades, the largest being the power of ten
+/// nearest to `10 J/G^2`. A step `a` lowers J by `a G^2` to first order, so the same part of J is
+/// lowered whatever the unit of J; for the paper's run the steps are 1 to 1e-10.
+fn steps(model: &Model) -> Result<Vec<f64>, Failure> {
+    let problem = &model.problem;
+    let start = (problem.evaluate(&problem.functions.start())).map_err(no_motion)?;
+    let norm_squared = problem
+        .gradient(&start, GradientKind::Discrete)
+        .norm_squared;
+    let decade = (10.0 * start.cost / norm_squared).log10().round();
+    let decade = if decade.is_finite() { decade } else { 0.0 };
+    let step = |i| 10f64.powf(decade - 0.5 * f64::from(i));
+    Ok((0..=20).map(step).collect())
+}
+
+fn no_motion(breakdown: Breakdown) -> Failure {
+    Failure::Numerical(format!("the start has no motion: {breakdown}"))
 }
 
 /// The discrete gradient passes if its error falls below this at some step. An error in the
@@ -56,23 +71,29 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }
-    print(&describe(&model));
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
+        print(&describe(&model));
         return Ok(OK);
     }
+    // Whatever is wrong with the input is said before anything is printed or made.
+    let refined = node_counts(arguments)
+        .into_iter()
+        .map(|nodes| build(&file, Purpose::Check { nodes }))
+        .collect::<Result<Vec<_>, _>>()?;
+    let steps = steps(&model)?;
     let folder = arguments
         .out
         .as_deref()
         .map(OutputFolder::prepare)
         .transpose()?;
     let mut curves = Vec::new();
+    print(&describe(&model));
     print(&format!(
         "{:>8}  {:<10}  {:>12}  {:>9}\n",
         "nodes", "adjoint", "least error", "at step"
     ));
-    for nodes in node_counts(arguments) {
-        let model = build(&file, Purpose::Check { nodes })?;
-        for curve in check(&model)? {
+    for model in &refined {
+        for curve in check(model, &steps)? {
             let (step, error) = curve.best();
             print(&format!(
                 "{:>8}  {:<10}  {error:>12.1e}  {step:>9.1e}\n",
@@ -83,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         }
     }
     if let Some(folder) = folder {
-        write(&folder, &curves).map_err(|error| unwritable(folder.path(), &error))?;
+        write(&folder, &steps, &curves).map_err(|error| unwritable(folder.path(), &error))?;
         print(&format!("results in {}\n", folder.path().display()));
     }
     Ok(verdict(&curves))
@@ -109,7 +130,7 @@ fn describe(model: &Model) -> String {
     )
 }
 
-fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
+fn check(model: &Model, steps: &[f64]) -> Result<Vec<Curve>, Failure> {
     let problem = &model.problem;
     let mut kinds = vec![GradientKind::Discrete];
     if problem.supports_continuous() {
@@ -120,8 +141,8 @@ fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
         .into_iter()
         .map(|kind| {
             let errors = problem
-                .gradient_error(&theta, kind, &steps())
-                .map_err(|b| Failure::Numerical(format!("the start has no motion: {b}")))?;
+                .gradient_error(&theta, kind, steps)
+                .map_err(no_motion)?;
             Ok(Curve {
                 nodes: problem.oscillator.grid.nodes(),
                 kind,
@@ -134,7 +155,7 @@ fn check(model: &Model) -> Result<Vec<Curve>, Failure> {
 
 fn verdict(curves: &[Curve]) -> u8 {
     let failed: Vec<&Curve> = (curves.iter())
-        .filter(|c| c.kind == GradientKind::Discrete && c.best().1.is_nan() || c.best().1 > PASS)
+        .filter(|c| c.kind == GradientKind::Discrete && c.best().1 > PASS)
         .collect();
     if failed.is_empty() {
         print(&format!(
@@ -152,7 +173,7 @@ fn verdict(curves: &[Curve]) -> u8 {
     NOT_CONVERGED
 }
 
-fn write(folder: &OutputFolder, curves: &[Curve]) -> std::io::Result<()> {
+fn write(folder: &OutputFolder, steps: &[f64], curves: &[Curve]) -> std::io::Result<()> {
     let drawn: Vec<GradientCurve> = (curves.iter())
         .map(|c| GradientCurve {
             nodes: c.nodes,
@@ -165,7 +186,7 @@ fn write(folder: &OutputFolder, curves: &[Curve]) -> std::io::Result<()> {
         "figures/gradient.svg",
         &render(&figures::gradient_error(&drawn)),
     )?;
-    let mut table = CsvTable::new().column("step", steps());
+    let mut table = CsvTable::new().column("step", steps.to_vec());
     for curve in curves {
         // Steps that broke down are missing from a curve.
         let error_at = |step: &f64| {
@@ -174,7 +195,7 @@ fn write(folder: &OutputFolder, curves: &[Curve]) -> std::io::Result<()> {
         };
         table = table.column(
             format!("error_{}_{}", curve.kind.name(), curve.nodes),
-            steps().iter().map(error_at).collect(),
+            steps.iter().map(error_at).collect(),
         );
     }
     folder.write("gradient.csv", &table.to_csv())

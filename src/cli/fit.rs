@@ -26,11 +26,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = ModelFile::read(&arguments.model)?;
     let mut model = build(&file, Purpose::Fit)?;
+    model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(&output_path(arguments))?;
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }
-    model.settings.interrupt = Some(interrupt::flag());
     let found = search(&model)?;
     let predictions = predictions(&model, &found)?;
     let run = Run {

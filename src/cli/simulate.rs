@@ -3,19 +3,23 @@
 use super::{Failure, OK, print, unwritable};
 use crate::config::{ModelFile, Purpose, build};
 use crate::error::{InputError, Place};
+use crate::input::{one_of, quote};
 use crate::problem::Experiment;
-use crate::report::{CsvTable, write_whole};
-use rand::{Rng, SeedableRng};
+use crate::report::{CsvTable, json, write_whole};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use std::path::PathBuf;
+use serde::Serialize;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// Compute the motion of a model's device (its fixed and start values) and write it as readings.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Model file (YAML).
     model: PathBuf,
-    /// CSV file for the readings [default: standard output].
+    /// CSV file for the readings; how they were made goes to OUT.json beside it [default: standard
+    /// output].
     #[arg(long)]
     out: Option<PathBuf>,
     /// Number of nodes instead of the model's.
@@ -46,27 +50,84 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .forward(&device, experiment.initial, experiment.force.as_deref())
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     let mut readings = motion.displacement;
-    if let Some((sigma, mut random)) = noise {
-        for y in &mut readings {
-            *y += sigma * standard_normal(&mut random);
-        }
+    if let Some(noise) = &noise {
+        noise.add_to(&mut readings);
     }
+    let record = Record {
+        made_by: "kmcfit simulate",
+        version: env!("CARGO_PKG_VERSION"),
+        model: arguments.model.display().to_string(),
+        experiment: &experiment.name,
+        nodes: problem.oscillator.grid.nodes(),
+        duration: problem.oscillator.grid.duration(),
+        stepper: problem.oscillator.method.name(),
+        noise,
+    };
     let table = CsvTable::new()
         .column("t_s", problem.oscillator.grid.times())
         .column("y_m", readings)
         .to_csv();
     match &arguments.out {
-        None => print(&table),
-        Some(path) => write_whole(path, &table).map_err(|error| unwritable(path, &error))?,
+        None => {
+            print(&table);
+            if let Some(Noise { sigma, seed, .. }) = record.noise {
+                eprintln!("noise: sigma {sigma} m, seed {seed}");
+            }
+        }
+        Some(path) => {
+            write(path, &table, &record).map_err(|error| unwritable(path, &error))?;
+        }
     }
     Ok(OK)
 }
 
-fn standard_normal(random: &mut impl Rng) -> f64 {
-    StandardNormal.sample(random)
+/// How a file of readings was made: `OUT.json` beside `OUT`.
+#[derive(Debug, Serialize)]
+struct Record<'a> {
+    made_by: &'static str,
+    version: &'static str,
+    /// The model file as it was given.
+    model: String,
+    experiment: &'a str,
+    nodes: usize,
+    /// s.
+    duration: f64,
+    stepper: &'static str,
+    /// `null` for readings without noise.
+    noise: Option<Noise>,
 }
 
-fn noise(arguments: &Arguments) -> Result<Option<(f64, ChaCha8Rng)>, InputError> {
+/// Gaussian noise that can be made again.
+#[derive(Debug, Serialize)]
+struct Noise {
+    /// Standard deviation, m.
+    sigma: f64,
+    seed: u64,
+    generator: &'static str,
+}
+
+impl Noise {
+    fn add_to(&self, readings: &mut [f64]) {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        for y in readings {
+            let z: f64 = StandardNormal.sample(&mut random);
+            *y += self.sigma * z;
+        }
+    }
+}
+
+/// The readings and, before them, their record: readings with noise are never without a seed.
+fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
+    if path.is_dir() {
+        return Err(io::Error::other("this is a folder, not a file"));
+    }
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".json");
+    write_whole(Path::new(&beside), &json(record))?;
+    write_whole(path, table)
+}
+
+fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {
     match (arguments.noise, arguments.seed) {
         (Some(sigma), _) if !(sigma.is_finite() && sigma >= 0.0) => Err(InputError::new(
             Place::Argument("--noise".into()),
@@ -74,7 +135,11 @@ fn noise(arguments: &Arguments) -> Result<Option<(f64, ChaCha8Rng)>, InputError>
         )
         .found(sigma)
         .expected("a finite number, 0 or greater, in m")),
-        (Some(sigma), Some(seed)) => Ok(Some((sigma, ChaCha8Rng::seed_from_u64(seed)))),
+        (Some(sigma), Some(seed)) => Ok(Some(Noise {
+            sigma,
+            seed,
+            generator: "ChaCha8, standard normal by the ziggurat method",
+        })),
         _ => Ok(None),
     }
 }
@@ -88,12 +153,12 @@ fn chosen<'a>(
         Some(name) => experiments.iter().find(|e| e.name == *name),
     };
     found.ok_or_else(|| {
-        let names: Vec<&str> = experiments.iter().map(|e| e.name.as_str()).collect();
+        let names = experiments.iter().map(|e| e.name.as_str());
         InputError::new(
             Place::Argument("--experiment".into()),
             "the model has no such experiment",
         )
-        .found(arguments.experiment.clone().unwrap_or_default())
-        .expected(format!("one of {}", names.join(", ")))
+        .found(quote(arguments.experiment.as_deref().unwrap_or_default()))
+        .expected(one_of(names))
     })
 }

@@ -135,6 +135,9 @@ impl Failure<'_> {
             .expected(one_of(known.iter().copied()));
         match key {
             "<<" => error.hint("merging maps by `<<` is not supported: write the keys out"),
+            "dt" if parent == "grid" => {
+                error.hint("the step follows from the others: dt = duration/(nodes - 1)")
+            }
             key => match did_you_mean(key, known) {
                 Some(hint) => error.hint(hint),
                 None => error,

@@ -22,8 +22,7 @@ impl OutputFolder {
                 .found(format!("{}: {error}", path.display()))
                 .expected("a folder that can be written to")
         };
-        std::fs::create_dir_all(path)
-            .map_err(|e| refuse("the output folder cannot be made", &e))?;
+        make_folder(path).map_err(|e| refuse("the output folder cannot be made", &e))?;
         tempfile::NamedTempFile::new_in(path)
             .map_err(|e| refuse("the output folder cannot be written to", &e))?;
         Ok(Self {
@@ -55,12 +54,23 @@ pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(folder)?;
+    make_folder(folder)?;
     let mut file = whole_file(folder)?;
     file.write_all(contents.as_bytes())?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
+}
+
+/// Makes a folder and those above it; where a file is in the way, the error says which.
+fn make_folder(folder: &Path) -> io::Result<()> {
+    match folder.ancestors().find(|above| above.is_file()) {
+        Some(file) => Err(io::Error::other(format!(
+            "{} is a file, not a folder",
+            file.display()
+        ))),
+        None => std::fs::create_dir_all(folder),
+    }
 }
 
 /// A temporary file that, once renamed, has the permissions of an ordinary new file.

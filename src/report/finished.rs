@@ -30,6 +30,10 @@ impl FinishedRun {
     /// # Errors
     /// If there is no complete run of this format in the folder.
     pub fn open(folder: &Path) -> Result<Self, InputError> {
+        if !folder.is_dir() {
+            return Err(InputError::file(folder, "there is no such folder")
+                .expected("the folder of a finished run, as written by `kmcfit fit`"));
+        }
         let document = document(folder)?;
         let path = folder.join("result.json");
         let unusable = |found: String| {

@@ -1,4 +1,4 @@
-//! Solvers: each is a direction and a step rule ([`Descend`]); the loop, the stopping test and the
+//! Solvers: each is a direction and a step rule (`Descend`); the loop, the stopping test and the
 //! record of what happened are shared.
 
 mod equation_error;

@@ -1,6 +1,6 @@
 //! Experiments: readings from files, put on the grid.
 
-use super::Purpose;
+use super::{Purpose, asked_for};
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::dynamics::{Grid, State};
@@ -48,7 +48,8 @@ fn read_one(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> Result<Record,
         file.error_at(&key, "this experiment has no data")
             .expected("`data`, a CSV file with the readings")
     })?;
-    let table = Table::read(file.resolve(&data.0))?;
+    let asked = |key: &str| asked_for(file, format!("experiments[{i}].{key}"));
+    let table = Table::read(file.resolve(&data.0)).map_err(asked("data"))?;
     let named = |name: Option<&crate::config::Text>, default: &str| {
         name.map_or(default.to_string(), |name| name.0.clone())
     };
@@ -58,14 +59,21 @@ fn read_one(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> Result<Record,
         columns.and_then(|c| c.displacement.as_ref()),
         DISPLACEMENT_COLUMN,
     );
-    let spacing = equally_spaced(&table, &time)?;
-    let times = table.column(&time)?;
-    let values = table.column(&displacement)?.to_vec();
-    if values.len() < Grid::FEWEST_NODES {
-        return Err(InputError::file(table.path(), "there are too few readings")
-            .found(format!("{} rows", values.len()))
-            .expected(format!("at least {}", Grid::FEWEST_NODES)));
+    if table.rows() < Grid::FEWEST_NODES {
+        let few = InputError::file(table.path(), "there are too few readings")
+            .found(match table.rows() {
+                1 => "1 row".to_string(),
+                rows => format!("{rows} rows"),
+            })
+            .expected(format!("at least {}", Grid::FEWEST_NODES));
+        return Err(asked("data")(few));
     }
+    let spacing = equally_spaced(&table, &time).map_err(asked("columns.time"))?;
+    let times = table.column(&time)?;
+    let values = table
+        .column(&displacement)
+        .map_err(asked("columns.displacement"))?
+        .to_vec();
     Ok(Record {
         start: times[0],
         duration: times[times.len() - 1] - times[0],

@@ -5,7 +5,7 @@ mod limits;
 mod start;
 
 use super::QUANTITIES;
-use super::on_grid::column_on_grid;
+use super::on_grid::{Wanted, column_on_grid};
 use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
@@ -93,8 +93,15 @@ fn values(
 ) -> Result<Vec<f64>, InputError> {
     match given {
         NumberOrColumn::Number(value) => Ok(vec![value.0; grid.nodes()]),
-        NumberOrColumn::Column(c) => column_on_grid(file, &c.data.0, &c.column.0, grid)
-            .map_err(|error| error.hint(format!("asked for by {key} of the model"))),
+        NumberOrColumn::Column(c) => {
+            let wanted = Wanted {
+                data: &c.data.0,
+                data_key: &format!("{key}.data"),
+                column: &c.column.0,
+                column_key: &format!("{key}.column"),
+            };
+            column_on_grid(file, &wanted, grid)
+        }
     }
 }
 
@@ -106,11 +113,10 @@ fn positive_mass(
     values: &[f64],
 ) -> Result<(), InputError> {
     let broken = values.iter().position(|m| *m <= 0.0);
-    let same = values.iter().all(|m| *m == values[0]);
     match broken {
         Some(i) if quantity == Quantity::Mass => Err(file
             .error_at(key, "the mass must be positive at all times")
-            .found(match same {
+            .found(match values.iter().all(|m| m == &values[i]) {
                 true => values[i].to_string(),
                 false => format!("{} at node {i}", values[i]),
             })
@@ -136,7 +142,13 @@ pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, Inp
             Quantity::Stiffness => c.stiffness.as_ref(),
         });
         let name = named.map_or(quantity.column(), |name| name.0.as_str());
-        column_on_grid(file, &spec.data.0, name, grid)
+        let wanted = Wanted {
+            data: &spec.data.0,
+            data_key: "truth.data",
+            column: name,
+            column_key: &format!("truth.columns.{}", quantity.name()),
+        };
+        column_on_grid(file, &wanted, grid)
     };
     Ok(Some(Device {
         mass: column(Quantity::Mass)?,

@@ -5,7 +5,7 @@ use super::experiments::Record;
 use crate::config::ModelFile;
 use crate::config::spec::StepMethod;
 use crate::dynamics::{Grid, Method};
-use crate::error::InputError;
+use crate::error::{InputError, Place};
 
 /// Most nodes: a trajectory and its functions then take about 10 GB.
 const MOST_NODES: usize = 100_000_000;
@@ -24,8 +24,12 @@ pub(super) fn build(
             .expected("`nodes`, since there are no readings to take it from")
     })?;
     if !(Grid::FEWEST_NODES..=MOST_NODES).contains(&nodes) {
-        return Err(file
-            .error_at("grid.nodes", "this number of nodes cannot be used")
+        let problem = "this number of nodes cannot be used";
+        let error = match purpose.nodes() {
+            Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
+            None => file.error_at("grid.nodes", problem),
+        };
+        return Err(error
             .found(nodes)
             .expected(format!("{} to {MOST_NODES}", Grid::FEWEST_NODES)));
     }

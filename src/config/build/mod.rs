@@ -8,7 +8,7 @@ mod on_grid;
 
 use super::ModelFile;
 use crate::dynamics::{Device, Oscillator, State, Term};
-use crate::error::InputError;
+use crate::error::{InputError, Place};
 use crate::functions::{Functions, Quantity};
 use crate::problem::Problem;
 use crate::solvers::FitSettings;
@@ -53,6 +53,25 @@ impl Purpose {
             Purpose::Fit => None,
             Purpose::Simulate { nodes } | Purpose::Check { nodes } => nodes,
         }
+    }
+}
+
+/// An error about a file as a whole, said at the key of the model that names the file; errors about
+/// its rows stay where they are.
+fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) -> InputError {
+    let key = key.into();
+    move |error| match &error.place {
+        Place::File(path) => {
+            let problem = format!("{}: {}", path.display(), error.problem);
+            let here = file.error_at(&key, problem);
+            InputError {
+                place: here.place,
+                key: here.key,
+                problem: here.problem,
+                ..error
+            }
+        }
+        _ => error,
     }
 }
 

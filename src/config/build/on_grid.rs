@@ -1,5 +1,6 @@
 //! A function given as a CSV column, read at the nodes.
 
+use super::asked_for;
 use crate::config::ModelFile;
 use crate::dynamics::Grid;
 use crate::error::InputError;
@@ -10,17 +11,26 @@ const TIME_COLUMN: &str = "t_s";
 /// How near a row must be to a node, in steps, to be taken as it stands.
 const SAME_TIME: f64 = 1e-6;
 
-/// The column `column` of `data` at the nodes: as it stands where its rows are the nodes, linear
-/// in between otherwise.
+/// Which column of which file, and the keys of the model that say so.
+pub(super) struct Wanted<'a> {
+    pub data: &'a str,
+    pub data_key: &'a str,
+    pub column: &'a str,
+    pub column_key: &'a str,
+}
+
+/// A column at the nodes: as it stands where its rows are the nodes, linear in between otherwise.
 pub(super) fn column_on_grid(
     file: &ModelFile,
-    data: &str,
-    column: &str,
+    wanted: &Wanted<'_>,
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
-    let table = Table::read(file.resolve(data))?;
-    let times = increasing(&table, TIME_COLUMN)?;
-    let values = table.column(column)?;
+    let about_data = asked_for(file, wanted.data_key);
+    let table = Table::read(file.resolve(wanted.data)).map_err(&about_data)?;
+    let times = increasing(&table, TIME_COLUMN).map_err(&about_data)?;
+    let values = table
+        .column(wanted.column)
+        .map_err(asked_for(file, wanted.column_key))?;
     let same = |(i, t): (usize, &f64)| (t - grid.time(i)).abs() <= SAME_TIME * grid.step();
     if times.len() == grid.nodes() && times.iter().enumerate().all(same) {
         return Ok(values.to_vec());
@@ -34,11 +44,10 @@ pub(super) fn column_on_grid(
             (Some(a), Some(b)) => format!("{a} s to {b} s"),
             _ => "no rows".into(),
         };
-        return Err(
-            InputError::file(table.path(), "the times do not cover the record")
-                .found(span(times.first(), times.last()))
-                .expected(format!("at least {first} s to {last} s")),
-        );
+        let short = InputError::file(table.path(), "the times do not cover the record")
+            .found(span(times.first(), times.last()))
+            .expected(format!("at least {first} s to {last} s"));
+        return Err(about_data(short));
     }
     Ok(grid
         .times()

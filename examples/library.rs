@@ -1,0 +1,27 @@
+// A fit from Rust: the model file becomes a problem, the problem a device.
+
+use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::solvers::fit;
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let file = ModelFile::read("models/paper-lbfgs.yaml")?;
+    let model = build(&file, Purpose::Fit)?;
+    let start = model.problem.functions.start();
+    let found = fit(&model.problem, &start, &model.settings, &mut |_| {})
+        .map_err(|breakdown| breakdown.to_string())?;
+    let (device, motion) = (
+        &found.best.evaluation.device,
+        &found.best.evaluation.trajectories[0],
+    );
+    println!(
+        "{}, J/J0 = {:.1e}",
+        found.outcome.reason,
+        found.cost_ratio()
+    );
+    println!(
+        "m(0) = {:.3} kg, y(25) = {:.3} m",
+        device.mass[0], motion.displacement[1999]
+    );
+    Ok(())
+}

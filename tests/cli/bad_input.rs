@@ -1,0 +1,543 @@
+//! Every mistake in the input: exit code 2, a message that says where and what, nothing written.
+
+use crate::workbench::{MODEL, Workbench, readings};
+use insta::assert_snapshot;
+
+/// The message of a command that refuses its input and leaves nothing behind.
+fn refused(bench: &Workbench, arguments: &[&str]) -> String {
+    let before = bench.contents();
+    let (code, stdout, stderr) = bench.run(arguments);
+    assert_eq!(code, 2, "{arguments:?}\n{stdout}\n{stderr}");
+    assert_eq!(stdout, "", "{arguments:?}");
+    assert_eq!(bench.contents(), before, "{arguments:?} left something");
+    stderr
+}
+
+/// The message about a model and its readings; `fit` and `check` say the same.
+fn message(bench: &Workbench) -> String {
+    let message = refused(bench, &["fit", "model.yaml", "--out", "out"]);
+    assert_eq!(
+        refused(bench, &["check", "model.yaml", "--out", "out"]),
+        message
+    );
+    message
+}
+
+/// The message about the small model with one place changed.
+fn changed(from: &str, to: &str) -> String {
+    assert!(MODEL.contains(from), "{from}");
+    let bench = Workbench::with_small_model();
+    bench.write("model.yaml", &MODEL.replacen(from, to, 1));
+    message(&bench)
+}
+
+/// The message about the small model with other readings.
+fn with_readings(text: &str) -> String {
+    let bench = Workbench::with_small_model();
+    bench.write("readings.csv", text);
+    message(&bench)
+}
+
+/// The readings with a row, counted from 1, replaced.
+fn with_row(row: usize, by: &str) -> String {
+    let text = readings(21);
+    let lines = text.lines().enumerate();
+    let lines: Vec<&str> = lines.map(|(i, l)| if i == row { by } else { l }).collect();
+    with_readings(&(lines.join("\n") + "\n"))
+}
+
+#[test]
+fn keys() {
+    assert_snapshot!(changed("title:", "titel:"), @"
+    error: model.yaml:2:1: unknown key
+      found: `titel`
+      expected: one of: format, title, experiments, grid, functions, fit, truth, predict
+      hint: did you mean `title`?
+    ");
+    assert_snapshot!(changed("start: 2.0", "strat: 2.0"), @"
+    error: model.yaml:10:29: functions.mass: unknown key
+      found: `strat`
+      expected: one of: basis, start, fixed
+      hint: did you mean `start`?
+    ");
+    assert_snapshot!(changed("method: midpoint", "method: midpoint, dt: 0.1"), @"
+    error: model.yaml:8:37: grid: unknown key
+      found: `dt`
+      expected: one of: nodes, method, duration
+      hint: the step follows from the others: dt = duration/(nodes - 1)
+    ");
+    assert_snapshot!(changed("  - name:", "  - colour: red\n    name:"), @"
+    error: model.yaml:4:5: experiments[0]: unknown key
+      found: `colour`
+      expected: one of: name, data, columns, sigma, initial
+    ");
+    assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
+    error: model.yaml:4:5: experiments[0]: the key `initial` is missing
+      expected: for instance `initial: {displacement: 3.3, velocity: 1.0}`
+    ");
+    assert_snapshot!(changed("  mass:      {basis: nodal, start: 2.0}\n", ""), @"
+    error: model.yaml:9:1: functions: the key `mass` is missing
+      expected: for instance `mass: {basis: nodal, start: 2.0}`
+    ");
+    assert_snapshot!(changed("    data: readings.csv\n", ""), @"
+    error: model.yaml:4:5: experiments[0]: this experiment has no data
+      expected: `data`, a CSV file with the readings
+    ");
+    assert_snapshot!(changed("fit:\n", "fit:\n  method: lbfgs\n"), @"
+    error: model.yaml:15:3: fit: duplicate key `method`
+      found: `method` again; it is first given in line 14
+      expected: every key once
+    ");
+    assert_snapshot!(changed("grid:", "title: Again\ngrid:"), @"
+    error: model.yaml:8:1: duplicate key `title`
+      found: `title` again; it is first given in line 2
+      expected: every key once
+    ");
+}
+
+#[test]
+fn kinds_of_value() {
+    assert_snapshot!(changed("start: 2.0", "start: heavy"), @"
+    error: model.yaml:10:36: functions.mass.start: not a number
+      found: text `heavy`
+      expected: a finite number, or a column: {data: file.csv, column: name}
+    ");
+    assert_snapshot!(changed("start: 2.0", "start: [2.0]"), @"
+    error: model.yaml:10:36: functions.mass.start: not a number
+      found: a list
+      expected: a finite number, or a column: {data: file.csv, column: name}
+    ");
+    assert_snapshot!(changed("nodes: 21", "nodes: 2e3"), @"
+    error: model.yaml:8:15: grid.nodes: not an integer
+      found: the floating-point number 2000
+      expected: an integer
+      hint: write 2000
+    ");
+    assert_snapshot!(changed("nodes: 21", "nodes: -21"), @"
+    error: model.yaml:8:15: grid.nodes: a count cannot be negative
+      found: the integer -21
+      expected: an integer, 0 or more
+    ");
+    assert_snapshot!(changed("start: 2.0", "start: .nan"), @"
+    error: model.yaml:10:36: functions.mass.start: not a finite number
+      found: .nan, which is not a number
+      expected: a finite number, or a column: {data: file.csv, column: name}
+    ");
+    assert_snapshot!(changed("velocity: 0.0", "velocity: .inf"), @"
+    error: model.yaml:7:44: experiments[0].initial.velocity: not a finite number
+      found: an infinite number
+      expected: a finite number
+    ");
+    assert_snapshot!(changed("method: lbfgs", "method: l-bgfs"), @"
+    error: model.yaml:14:11: fit.method: unknown choice
+      found: `l-bgfs`
+      expected: one of: steepest-descent, lbfgs
+      hint: did you mean `lbfgs`?
+    ");
+    assert_snapshot!(changed("basis: nodal", "basis: nodes"), @"
+    error: model.yaml:10:22: functions.mass.basis: unknown choice
+      found: `nodes`
+      expected: one of: nodal, constant
+    ");
+    assert_snapshot!(changed("format: 1", "format: 2"), @"
+    error: model.yaml:1:9: format: this version of the program cannot read that format
+      found: the integer 2
+      expected: 1
+      hint: a newer version of the program may
+    ");
+    assert_snapshot!(changed("fit:", "fit: lbfgs\nfitting:"), @"
+    error: model.yaml:13:6: fit: this is the wrong kind of value
+      found: text `lbfgs`
+      expected: a map such as {method: lbfgs, gradient: discrete}
+    ");
+    assert_snapshot!(changed("columns: {time", "columns: {time: t_s, [time"), @"
+    error: model.yaml:6:55: the file is not valid YAML: a `[` is not closed, or a comma is missing
+      found: `}`
+      hint: separate the elements of [ … ] by commas and close the bracket
+    ");
+}
+
+#[test]
+fn meaning() {
+    assert_snapshot!(changed("start: 2.0", "start: 0"), @"
+    error: model.yaml:10:36: functions.mass.start: the mass must be positive at all times
+      found: 0
+      expected: a number greater than 0, in kg
+    ");
+    assert_snapshot!(changed("{basis: nodal, start: 2.0}", "{fixed: -1.0}"), @"
+    error: model.yaml:10:22: functions.mass.fixed: the mass must be positive at all times
+      found: -1
+      expected: a number greater than 0, in kg
+    ");
+    assert_snapshot!(changed("start: 2.0", "start: 2.0, fixed: 2.0"), @"
+    error: model.yaml:10:36: functions.mass.start: a fixed function has no start
+      expected: either `fixed` or `start`
+    ");
+    assert_snapshot!(changed("basis: nodal, start: 2.0", "basis: nodal"), @"
+    error: model.yaml:10:14: functions.mass: this function has neither a start nor a fixed value
+      expected: `start` for a function to be fitted, `fixed` for a known one
+    ");
+    assert_snapshot!(changed("basis: nodal, start: 2.0", "start: 2.0"), @"
+    error: model.yaml:10:14: functions.mass: a function to be fitted needs a basis
+      expected: `basis`, one of nodal, constant
+    ");
+    assert_snapshot!(
+        changed("basis: constant, start: 1.0", "basis: constant, start: {data: readings.csv, column: y_m}"),
+        @"
+        error: model.yaml:11:39: functions.damping.start: the basis `constant` has one value, not a column of them
+          found: a column of a file
+          expected: a number
+        "
+    );
+    assert_snapshot!(changed("method: lbfgs", "method: steepest-descent\n  memory: 10"), @"
+    error: model.yaml:15:11: fit.memory: steepest descent has no memory
+      expected: no `memory`, or `method: lbfgs`
+    ");
+    assert_snapshot!(changed("method: lbfgs", "method: lbfgs\n  memory: 0"), @"
+    error: model.yaml:15:11: fit.memory: L-BFGS needs a memory
+      found: 0
+      expected: 1 or more pairs
+    ");
+    assert_snapshot!(changed("{iterations: 5}", "{iterations: 5, seconds: -1}"), @"
+    error: model.yaml:16:34: fit.stop.seconds: this limit must be positive
+      found: -1
+      expected: a number greater than 0
+    ");
+}
+
+#[test]
+fn sigma() {
+    let sigma = |value: &str| format!("    sigma: {{displacement: {value}}}\n    initial");
+    assert_snapshot!(changed("    initial", &sigma("0")), @"
+    error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
+      found: 0
+      expected: a number greater than 0, in m
+    ");
+    assert_snapshot!(changed("    initial", &sigma("-0.1")), @"
+    error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
+      found: -0.1
+      expected: a number greater than 0, in m
+    ");
+    let bench = Workbench::with_small_model();
+    let model = MODEL.replace("    initial", &sigma("0.1"));
+    bench.write("model.yaml", &model.replace("discrete", "continuous"));
+    assert_snapshot!(message(&bench), @"
+    error: model.yaml:16:13: fit.gradient: the continuous adjoint is that of the integral cost with a reading at every node
+      found: `continuous` with a sigma or with fewer readings than nodes
+      expected: `discrete`, which has no such limits
+    ");
+}
+
+#[test]
+fn grid() {
+    assert_snapshot!(changed("nodes: 21", "nodes: 21, duration: -2.0"), @"
+    error: model.yaml:8:29: grid.duration: the duration is not positive
+      found: -2
+      expected: a length of time in s, greater than 0
+    ");
+    assert_snapshot!(changed("nodes: 21", "nodes: 21, duration: 3.0"), @"
+    error: model.yaml:8:29: grid.duration: the duration is not that of the readings
+      found: 3
+      expected: 2 (or leave it out)
+    ");
+    assert_snapshot!(changed("nodes: 21", "nodes: 2"), @"
+    error: model.yaml:8:15: grid.nodes: this number of nodes cannot be used
+      found: 2
+      expected: 3 to 100000000
+    ");
+    assert_snapshot!(changed("nodes: 21", "nodes: 30"), @"
+    error: model.yaml:8:15: grid.nodes: the readings do not fall on nodes
+      found: 30 nodes, 21 readings
+      expected: 21 nodes or 1 + a multiple of 20
+    ");
+}
+
+#[test]
+fn readings_files() {
+    assert_snapshot!(changed("data: readings.csv", "data: reading.csv"), @"
+    error: model.yaml:5:11: experiments[0].data: reading.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+      hint: did you mean `readings.csv`?
+    ");
+    assert_snapshot!(changed("data: readings.csv", "data: data/readings.csv"), @"
+    error: model.yaml:5:11: experiments[0].data: data/readings.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+      hint: the folder data does not exist
+    ");
+    assert_snapshot!(changed("data: readings.csv", "data: ."), @"
+    error: model.yaml:5:11: experiments[0].data: .: this is a folder, not a file
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(with_readings(""), @"
+    error: model.yaml:5:11: experiments[0].data: readings.csv: the file is empty
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(with_readings("t_s,y_m\n"), @"
+    error: model.yaml:5:11: experiments[0].data: readings.csv: the file has no data
+      found: a row of column names only
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    assert_snapshot!(with_readings(&readings(2)), @"
+    error: model.yaml:5:11: experiments[0].data: readings.csv: there are too few readings
+      found: 2 rows
+      expected: at least 3
+    ");
+    assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
+    error: model.yaml:5:11: experiments[0].data: readings.csv: there are too few readings
+      found: 1 row
+      expected: at least 3
+    ");
+    assert_snapshot!(changed("displacement: y_m", "displacement: y_mm"), @"
+    error: model.yaml:6:40: experiments[0].columns.displacement: readings.csv: there is no such column
+      found: `y_mm`
+      expected: one of: t_s, y_m
+      hint: did you mean `y_m`?
+    ");
+    assert_snapshot!(changed("time: t_s", "time: seconds"), @"
+    error: model.yaml:6:21: experiments[0].columns.time: readings.csv: there is no such column
+      found: `seconds`
+      expected: one of: t_s, y_m
+    ");
+}
+
+#[test]
+fn rows() {
+    assert_snapshot!(with_row(17, "1.6,off"), @"
+    error: readings.csv:18: row 17, column `y_m`: not a number
+      found: `off`
+      expected: a finite number
+    ");
+    assert_snapshot!(with_row(17, "1.6,"), @"
+    error: readings.csv:18: row 17, column `y_m`: a number is missing
+      found: nothing
+      expected: a finite number
+    ");
+    assert_snapshot!(with_row(17, "1.6"), @"
+    error: readings.csv:18: row 17: the row does not fit the column names
+      found: 1 field
+      expected: 2 fields, one per column
+    ");
+    assert_snapshot!(with_row(17, "1.6,NaN"), @"
+    error: readings.csv:18: row 17, column `y_m`: not a finite number
+      found: `NaN`
+      expected: a finite number
+    ");
+    assert_snapshot!(with_row(17, "1.4,0.1"), @"
+    error: readings.csv:18: row 17, column `t_s`: the times do not increase
+      found: 1.4 after 1.5 in line 17
+      expected: a time greater than 1.5
+    ");
+    assert_snapshot!(with_row(17, "1.5,0.1"), @"
+    error: readings.csv:18: row 17, column `t_s`: two rows with the same time
+      found: 1.5 after 1.5 in line 17
+      expected: a time greater than 1.5
+    ");
+    assert_snapshot!(with_row(17, "1.61,0.1"), @"
+    error: readings.csv:18: row 17, column `t_s`: the times are not equally spaced
+      found: 1.61 after 1.5, a spacing of 0.11
+      expected: a spacing of 0.1, as between most rows
+    ");
+}
+
+#[test]
+fn files_of_functions() {
+    let column = "{data: device.csv, column: mass_kg}";
+    let model = MODEL.replace("start: 2.0", &format!("start: {column}"));
+    let bench = Workbench::with_small_model();
+    bench.write("model.yaml", &model);
+    assert_snapshot!(message(&bench), @"
+    error: model.yaml:10:43: functions.mass.start.data: device.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    bench.write("device.csv", "t_s,mass_kg\n0,1\n1,1\n");
+    assert_snapshot!(message(&bench), @"
+    error: model.yaml:10:43: functions.mass.start.data: device.csv: the times do not cover the record
+      found: 0 s to 1 s
+      expected: at least 0 s to 2 s
+    ");
+    bench.write("device.csv", "t_s,m\n0,1\n2,1\n");
+    assert_snapshot!(message(&bench), @"
+    error: model.yaml:10:63: functions.mass.start.column: device.csv: there is no such column
+      found: `mass_kg`
+      expected: one of: t_s, m
+    ");
+    bench.write("device.csv", "t_s,mass_kg\n0,1\n1,0\n2,1\n");
+    assert_snapshot!(message(&bench), @"
+    error: model.yaml:10:36: functions.mass.start: the mass must be positive at all times
+      found: 0 at node 10
+      expected: a number greater than 0, in kg
+    ");
+}
+
+#[test]
+fn model_files() {
+    let bench = Workbench::with_small_model();
+    assert_snapshot!(refused(&bench, &["fit", "modle.yaml"]), @"
+    error: modle.yaml: there is no such file
+      expected: a model file (YAML)
+      hint: did you mean `model.yaml`?
+    ");
+    assert_snapshot!(refused(&bench, &["simulate", "readings.csv"]), @"
+    error: readings.csv:1:1: this is the wrong kind of value
+      found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
+      expected: a map with the keys format, experiments, functions, fit, …
+    ");
+    bench.write("empty.yaml", "");
+    assert_snapshot!(refused(&bench, &["check", "empty.yaml"]), @"
+    error: empty.yaml: the file is empty
+      expected: a model file (YAML)
+      hint: begin with `format: 1`
+    ");
+}
+
+/// Below a regular file nobody can make a folder, not even root.
+#[test]
+fn output_folders() {
+    let bench = Workbench::with_small_model();
+    assert_snapshot!(refused(&bench, &["fit", "model.yaml", "--out", "model.yaml/out"]), @"
+    error: --out: the output folder cannot be made
+      found: model.yaml/out: model.yaml is a file, not a folder
+      expected: a folder that can be written to
+    ");
+    assert_snapshot!(refused(&bench, &["fit", "model.yaml", "--out", "model.yaml"]), @"
+    error: --out: the output folder cannot be made
+      found: model.yaml: model.yaml is a file, not a folder
+      expected: a folder that can be written to
+    ");
+    assert_snapshot!(
+        refused(&bench, &["simulate", "model.yaml", "--out", "model.yaml/motion.csv"]),
+        @"
+        error: --out: the results cannot be written
+          found: model.yaml/motion.csv: model.yaml is a file, not a folder
+          expected: a place that can be written to
+        "
+    );
+    assert_snapshot!(refused(&bench, &["simulate", "model.yaml", "--out", "."]), @"
+    error: --out: the results cannot be written
+      found: .: this is a folder, not a file
+      expected: a place that can be written to
+    ");
+}
+
+#[test]
+fn simulate_arguments() {
+    let bench = Workbench::with_small_model();
+    let with = |more: &[&str]| refused(&bench, &[&["simulate", "model.yaml"], more].concat());
+    assert_snapshot!(with(&["--noise", "0.1"]), @"
+    error: the following required arguments were not provided:
+      --seed <SEED>
+
+    Usage: kmcfit simulate --noise <SIGMA> --seed <SEED> <MODEL>
+
+    For more information, try '--help'.
+    ");
+    assert_snapshot!(with(&["--seed", "1"]), @"
+    error: the following required arguments were not provided:
+      --noise <SIGMA>
+
+    Usage: kmcfit simulate --seed <SEED> --noise <SIGMA> <MODEL>
+
+    For more information, try '--help'.
+    ");
+    assert_snapshot!(with(&["--noise=-1", "--seed", "1"]), @"
+    error: --noise: a standard deviation cannot be this
+      found: -1
+      expected: a finite number, 0 or greater, in m
+    ");
+    assert_snapshot!(with(&["--experiment", "forced"]), @"
+    error: --experiment: the model has no such experiment
+      found: `forced`
+      expected: `free decay`
+    ");
+    assert_snapshot!(with(&["--nodes", "2"]), @"
+    error: --nodes: this number of nodes cannot be used
+      found: 2
+      expected: 3 to 100000000
+    ");
+    assert_snapshot!(with(&["--nodes", "many"]), @"
+    error: invalid value 'many' for '--nodes <NODES>': invalid digit found in string
+
+    For more information, try '--help'.
+    ");
+    bench.write("model.yaml", &MODEL.replace("    data: readings.csv\n", ""));
+    assert_snapshot!(with(&[]), @"
+    error: model.yaml:7:7: grid: the length of the motion is missing
+      expected: `duration` in s, since there are no readings to take it from
+    ");
+}
+
+#[test]
+fn check_arguments() {
+    let bench = Workbench::with_small_model();
+    let with = |more: &[&str]| refused(&bench, &[&["check", "model.yaml"], more].concat());
+    assert_snapshot!(with(&["--nodes", "1"]), @"
+    error: --nodes: this number of nodes cannot be used
+      found: 1
+      expected: 3 to 100000000
+    ");
+    assert_snapshot!(with(&["--out", "model.yaml/out"]), @"
+    error: --out: the output folder cannot be made
+      found: model.yaml/out: model.yaml is a file, not a folder
+      expected: a folder that can be written to
+    ");
+}
+
+#[test]
+fn predict_arguments() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    let from = |run: &str, state: &str| refused(&bench, &["predict", run, "--initial", state]);
+    assert_snapshot!(from("run", "3.3"), @"
+    error: --initial: this is no initial state
+      found: `3.3`
+      expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
+    ");
+    assert_snapshot!(from("run", "-3.3,fast"), @"
+    error: --initial: this is no initial state
+      found: `-3.3,fast`
+      expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
+    ");
+    assert_snapshot!(from("run", "1,2,3"), @"
+    error: --initial: this is no initial state
+      found: `1,2,3`
+      expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
+    ");
+    assert_snapshot!(from("run", "nan,0"), @"
+    error: --initial: this is no initial state
+      found: `nan,0`
+      expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
+    ");
+    assert_snapshot!(from("rum", "1,0"), @"
+    error: rum: there is no such folder
+      expected: the folder of a finished run, as written by `kmcfit fit`
+    ");
+    assert_snapshot!(from("model.yaml", "1,0"), @"
+    error: model.yaml: there is no such folder
+      expected: the folder of a finished run, as written by `kmcfit fit`
+    ");
+    assert_snapshot!(refused(&bench, &["predict", "run"]), @"
+    error: the following required arguments were not provided:
+      --initial <Y,V>
+
+    Usage: kmcfit predict --initial <Y,V> <RUN>
+
+    For more information, try '--help'.
+    ");
+    bench.write("other/result.json", "{}");
+    assert_snapshot!(from("other", "1,0"), @"
+    error: other/result.json: format: the result has another format version
+      found: none
+      expected: 1
+    ");
+    bench.write("other/result.json", &bench.read("run/result.json"));
+    assert_snapshot!(from("other", "1,0"), @"
+    error: other/functions.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+    bench.write("other/functions.csv", "t_s,mass_kg\n0,1\n");
+    assert_snapshot!(from("other", "1,0"), @"
+    error: other/functions.csv: the table does not belong to this result
+      found: 1 rows
+      expected: 21 rows, one per node
+    ");
+}

@@ -1,0 +1,70 @@
+//! `kmcfit check`.
+
+use crate::workbench::{MODEL, Workbench, column};
+
+/// On coarse grids the continuous gradient stops at its floor, which is no failure: the discrete
+/// one is judged.
+#[test]
+fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
+    let bench = Workbench::with_shipped_models();
+    let check = ["check", "models/paper.yaml", "--nodes", "1000,2000"];
+    let stdout = bench.run_to(0, &[&check[..], &["--out", "checked"]].concat());
+    assert!(
+        stdout.ends_with(
+            "results in checked\nthe discrete gradient is exact: least error below 1e-6\n"
+        )
+    );
+    assert_eq!(stdout.matches("discrete  ").count(), 2, "{stdout}");
+    assert_eq!(stdout.matches("continuous  ").count(), 2, "{stdout}");
+    let table = bench.read("checked/gradient.csv");
+    for (kind, nodes, below) in [("discrete", 1000, 1.2e-7), ("discrete", 2000, 1.2e-7)] {
+        let errors = column(&table, &format!("error_{kind}_{nodes}"));
+        let least = errors.into_iter().fold(f64::INFINITY, f64::min);
+        assert!(least < below, "{kind} {nodes}: {least}");
+    }
+    roxmltree::Document::parse(&bench.read("checked/figures/gradient.svg")).expect("XML");
+}
+
+#[test]
+fn without_gradient_it_only_reads() {
+    let bench = Workbench::with_small_model();
+    let before = bench.contents();
+    let stdout = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
+    assert_eq!(
+        stdout,
+        "Small: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n"
+    );
+    assert_eq!(bench.contents(), before);
+}
+
+#[test]
+fn what_is_all_fixed_has_no_gradient() {
+    let bench = Workbench::with_small_model();
+    let model = MODEL.replace("basis: nodal, start", "fixed");
+    bench.write(
+        "model.yaml",
+        &model.replace("basis: constant, start", "fixed"),
+    );
+    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
+    assert_eq!(code, 0);
+    assert!(stdout.contains("0 parameters"), "{stdout}");
+    assert_eq!(
+        stderr,
+        "warning: every function is fixed, so there is nothing to fit\n"
+    );
+}
+
+/// The steps follow the unit of the cost: a chi-square of a million is checked as well as an
+/// integral of a hundred.
+#[test]
+fn steps_follow_the_size_of_the_cost() {
+    let bench = Workbench::with_shipped_models();
+    let model = bench.read("models/paper-lbfgs.yaml");
+    let sigma = |sigma: &str| format!("    sigma: {{displacement: {sigma}}}\n    initial:");
+    for value in ["1e-4", "0.1", "1e4"] {
+        let spoilt = model.replace("    initial:", &sigma(value));
+        bench.write("models/sigma.yaml", &spoilt);
+        let stdout = bench.run_to(0, &["check", "models/sigma.yaml"]);
+        assert!(stdout.contains("exact"), "{value}: {stdout}");
+    }
+}

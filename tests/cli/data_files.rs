@@ -1,0 +1,64 @@
+//! The files of `data/` are what the program and the example make.
+
+use crate::workbench::{Workbench, column, repository};
+use std::fs;
+
+#[allow(dead_code, reason = "the example's main is not needed here")]
+#[path = "../../examples/make_data.rs"]
+mod make_data;
+
+fn shipped(name: &str) -> String {
+    fs::read_to_string(repository("data").join(name)).expect("a file of data/")
+}
+
+#[test]
+fn paper() {
+    let bench = Workbench::with_shipped_models();
+    let record = bench.read("data/paper.csv.json");
+    for name in ["data/paper.csv", "data/paper.csv.json"] {
+        fs::remove_file(bench.path(name)).expect("a file can be removed");
+    }
+    let simulate = [
+        "simulate",
+        "models/paper-device.yaml",
+        "--out",
+        "data/paper.csv",
+    ];
+    assert_eq!(bench.run_to(0, &simulate), "");
+    assert!(bench.read("data/paper.csv") == shipped("paper.csv"));
+    assert_eq!(bench.read("data/paper.csv.json"), record);
+}
+
+#[test]
+fn paper_truth() {
+    assert!(make_data::paper_truth().to_csv() == shipped("paper_truth.csv"));
+}
+
+/// The last digits of Bessel functions depend on the library that computes them.
+#[test]
+fn bessel() {
+    let (made, shipped) = (make_data::bessel().to_csv(), shipped("bessel.csv"));
+    assert_eq!(column(&made, "t_s"), column(&shipped, "t_s"));
+    let pairs = column(&made, "y_m")
+        .into_iter()
+        .zip(column(&shipped, "y_m"));
+    for (made, shipped) in pairs {
+        assert!((made - shipped).abs() <= 1e-12, "{made} {shipped}");
+    }
+}
+
+#[test]
+fn every_file_is_described() {
+    let about = shipped("README.md");
+    for entry in fs::read_dir(repository("data")).expect("a folder can be listed") {
+        let name = entry
+            .expect("an entry")
+            .file_name()
+            .into_string()
+            .expect("a name");
+        assert!(
+            name == "README.md" || about.contains(&format!("`{name}`")),
+            "{name}"
+        );
+    }
+}

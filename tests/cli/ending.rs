@@ -1,0 +1,112 @@
+//! How runs end: exit codes, statuses, and results in any case.
+
+use crate::workbench::{MODEL, Workbench, column};
+use serde_json::Value;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The paper's problem with another end.
+fn paper_until(stop: &str) -> Workbench {
+    let bench = Workbench::with_shipped_models();
+    let model = bench.read("models/paper.yaml");
+    assert!(model.contains("{iterations: 1000}"));
+    bench.write(
+        "models/paper.yaml",
+        &model.replace("{iterations: 1000}", stop),
+    );
+    bench
+}
+
+/// A complete run: every iteration has its row, and the last cost is that of the result.
+fn status(bench: &Workbench, run: &str) -> String {
+    let text = bench.read(&format!("{run}/result.json"));
+    let result: Value = serde_json::from_str(&text).expect("JSON");
+    let costs = column(&bench.read(&format!("{run}/history.csv")), "cost");
+    assert_eq!(
+        Some(costs.len() as u64),
+        result["counts"]["iterations"].as_u64()
+    );
+    if let Some(cost) = costs.last() {
+        assert_eq!(Some(*cost), result["cost"]["final"].as_f64());
+    }
+    assert!(bench.path(&format!("{run}/figures/motion.svg")).exists());
+    result["outcome"]["status"]
+        .as_str()
+        .expect("a word")
+        .to_owned()
+}
+
+#[test]
+fn the_papers_rule() {
+    let bench = paper_until("{iterations: 30, cost_ratio: 0.5, gradient_ratio: 0.5}");
+    bench.run_to(0, &["fit", "models/paper.yaml"]);
+    assert_eq!(status(&bench, "runs/paper"), "converged");
+}
+
+#[test]
+fn too_few_iterations() {
+    let bench = paper_until("{iterations: 3, cost_ratio: 1e-4}");
+    bench.run_to(3, &["fit", "models/paper.yaml"]);
+    assert_eq!(status(&bench, "runs/paper"), "max-iterations");
+}
+
+#[test]
+fn time_limit() {
+    let bench = paper_until("{iterations: 100000000, seconds: 0.3}");
+    let begin = Instant::now();
+    let stdout = bench.run_to(3, &["fit", "models/paper.yaml"]);
+    assert!(begin.elapsed() < Duration::from_secs(30));
+    assert!(
+        stdout.contains("time-limit: the limit of 0.3 s is reached"),
+        "{stdout}"
+    );
+    assert_eq!(status(&bench, "runs/paper"), "time-limit");
+}
+
+/// Ctrl-C ends a run in order, with the best so far.
+#[test]
+#[cfg(unix)]
+fn interrupt() {
+    let bench = paper_until("{iterations: 100000000}");
+    let child = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        .args(["fit", "models/paper.yaml"])
+        .current_dir(bench.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    // The folder is made when Ctrl-C is already looked after.
+    let begin = Instant::now();
+    while !bench.path("runs/paper").exists() {
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "the run does not begin"
+        );
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_millis(200));
+    let killed = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill runs");
+    assert!(killed.success());
+    let output = child.wait_with_output().expect("the program ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(stdout.contains("interrupted: "), "{stdout}");
+    assert_eq!(status(&bench, "runs/paper"), "interrupted");
+}
+
+/// A motion that leaves the numbers is no bad input, but there is nothing to write.
+#[test]
+fn a_start_without_motion() {
+    let bench = Workbench::with_small_model();
+    let model = MODEL.replace("start: 2.0", "start: 1e-200");
+    bench.write("model.yaml", &model);
+    let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--out", "run"]);
+    assert_eq!((code, stdout.as_str()), (3, ""));
+    assert!(
+        stderr.starts_with("failed: the start has no motion: "),
+        "{stderr}"
+    );
+}

@@ -1,0 +1,10 @@
+//! The program as a program: arguments in; exit code, text and files out.
+
+mod bad_input;
+mod check;
+mod data_files;
+mod ending;
+mod models;
+mod predict;
+mod simulate;
+mod workbench;

@@ -1,0 +1,199 @@
+//! Every shipped model, and what a run leaves behind.
+
+use crate::workbench::{MODEL, Workbench, column, paper_run, repository, table};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+
+fn result(bench: &Workbench, run: &str) -> Value {
+    serde_json::from_str(&bench.read(&format!("{run}/result.json"))).expect("JSON")
+}
+
+/// Fits a shipped model: its folder and result.
+fn fitted(name: &str, code: i32) -> (Workbench, Value) {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(code, &["fit", &format!("models/{name}.yaml")]);
+    let result = result(&bench, &format!("runs/{name}"));
+    (bench, result)
+}
+
+#[test]
+fn every_shipped_model_is_run_here() {
+    let files = fs::read_dir(repository("models")).expect("a folder can be listed");
+    let found: BTreeSet<String> = files
+        .map(|file| {
+            file.expect("an entry")
+                .file_name()
+                .into_string()
+                .expect("a name")
+        })
+        .collect();
+    let run_here = [
+        "paper.yaml",
+        "paper-ones.yaml",
+        "paper-device.yaml",
+        "paper-lbfgs.yaml",
+    ];
+    assert_eq!(found, run_here.map(str::to_owned).into());
+}
+
+#[test]
+fn paper() {
+    let (bench, stdout) = paper_run();
+    let result = result(bench, "runs/paper");
+    assert_eq!(result["outcome"]["status"], "completed");
+    assert_eq!(result["counts"]["iterations"], 1000);
+    assert_eq!(result["counts"]["forward"], 50_001);
+    assert!(stdout.starts_with(
+        "The paper's run, start (2, 1, 1)\ncompleted: ran the 1000 iterations asked for\n"
+    ));
+    let ratio = result["cost"]["ratio"].as_f64().expect("a number");
+    assert!((ratio / 8.130_155_3e-5 - 1.0).abs() < 1e-7, "{ratio}");
+    left_behind(bench, "runs/paper");
+}
+
+#[test]
+fn paper_ones() {
+    let (bench, result) = fitted("paper-ones", 0);
+    assert_eq!(result["outcome"]["status"], "completed");
+    assert_eq!(result["counts"]["iterations"], 1000);
+    left_behind(&bench, "runs/paper-ones");
+}
+
+#[test]
+fn paper_lbfgs() {
+    let (bench, result) = fitted("paper-lbfgs", 0);
+    assert_eq!(result["outcome"]["status"], "converged");
+    assert!(result["cost"]["ratio"].as_f64().expect("a number") <= 1e-6);
+    left_behind(&bench, "runs/paper-lbfgs");
+}
+
+/// It has no readings: it is there to make them.
+#[test]
+fn paper_device() {
+    let bench = Workbench::with_shipped_models();
+    let stdout = bench.run_to(
+        0,
+        &["simulate", "models/paper-device.yaml", "--nodes", "100"],
+    );
+    let (names, rows) = table(&stdout);
+    assert_eq!(names, ["t_s", "y_m"]);
+    assert_eq!(rows.len(), 100);
+}
+
+/// The files of a run, their columns and keys.
+fn left_behind(bench: &Workbench, run: &str) {
+    let result = result(bench, run);
+    stable_keys(&result);
+    let read = |name: &str| bench.read(&format!("{run}/{name}"));
+    let nodes = result["model"]["nodes"].as_u64().expect("a count") as usize;
+
+    let history = read("history.csv");
+    let first = "iteration,cost,cost_ratio,gradient_norm_squared_ratio,step";
+    assert!(history.starts_with(first), "{history}");
+    let numbers: Vec<f64> = (1..=result["counts"]["iterations"].as_u64().expect("a count"))
+        .map(|i| i as f64)
+        .collect();
+    assert_eq!(column(&history, "iteration"), numbers);
+    let costs = column(&history, "cost");
+    assert!(costs.windows(2).all(|pair| pair[1] < pair[0]));
+    assert_eq!(costs.last().copied(), result["cost"]["final"].as_f64());
+
+    let (names, rows) = table(&read("functions.csv"));
+    let expected = "t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m,k_over_m_per_s2,\
+                    c_over_m_per_s,natural_frequency_Hz,damping_ratio,\
+                    true_mass_kg,true_damping_N_s_per_m,true_stiffness_N_per_m";
+    assert_eq!(names.join(","), expected);
+    assert_eq!(rows.len(), nodes);
+
+    let (names, rows) = table(&read("trajectory.csv"));
+    assert_eq!(names, ["t_s", "y_m", "v_m_per_s", "observed_y_m"]);
+    assert_eq!(rows.len(), nodes);
+
+    for figure in [
+        "convergence",
+        "functions",
+        "motion",
+        "observation",
+        "ratios",
+    ] {
+        let svg = read(&format!("figures/{figure}.svg"));
+        let document = roxmltree::Document::parse(&svg).expect("XML");
+        assert!(
+            document
+                .root_element()
+                .has_tag_name(("http://www.w3.org/2000/svg", "svg"))
+        );
+    }
+}
+
+fn stable_keys(result: &Value) {
+    let keys = [
+        "/format",
+        "/title",
+        "/version",
+        "/outcome/status",
+        "/outcome/reason",
+        "/cost/initial",
+        "/cost/final",
+        "/cost/ratio",
+        "/cost/misfit",
+        "/cost/regularisation",
+        "/counts/iterations",
+        "/counts/forward",
+        "/counts/adjoint",
+        "/counts/tangent",
+        "/counts/qp",
+        "/seconds",
+        "/functions/mass/min",
+        "/functions/mass/max",
+        "/functions/mass/truth_max_error",
+        "/functions/mass/truth_rms_error",
+        "/functions/damping/min",
+        "/functions/stiffness/min",
+    ];
+    for key in keys {
+        assert!(result.pointer(key).is_some_and(|v| !v.is_null()), "{key}");
+    }
+    assert_eq!(result["format"], 1);
+}
+
+#[test]
+fn two_runs_are_identical_but_for_the_seconds() {
+    let run = || {
+        let (bench, mut result) = fitted("paper-lbfgs", 0);
+        result["seconds"] = Value::Null;
+        let mut files = bench.contents();
+        files.insert("runs/paper-lbfgs/result.json".into(), result.to_string());
+        files
+    };
+    assert_eq!(run(), run());
+}
+
+/// A second run replaces the results of the first; without a report there are no figures.
+#[test]
+fn options() {
+    let bench = Workbench::with_small_model();
+    let stdout = bench.run_to(
+        0,
+        &["fit", "model.yaml", "--out", "run", "--json", "--no-report"],
+    );
+    assert_eq!(stdout, bench.read("run/result.json"));
+    assert!(!bench.path("run/figures").exists());
+    bench.write(
+        "model.yaml",
+        &MODEL.replace("iterations: 5", "iterations: 3"),
+    );
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    assert_eq!(result(&bench, "run")["counts"]["iterations"], 3);
+    assert!(bench.path("run/figures/motion.svg").exists());
+}
+
+/// Results may go into a pipe that nobody reads to its end; progress is for terminals.
+#[test]
+fn nothing_but_results_when_piped() {
+    let bench = Workbench::with_small_model();
+    let (_, _, stderr) = bench.run(&["fit", "model.yaml"]);
+    assert_eq!(stderr, "");
+    assert!(bench.path("runs/model/result.json").exists());
+}

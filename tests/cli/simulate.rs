@@ -1,0 +1,68 @@
+//! `kmcfit simulate`: noise that can be made again.
+
+use crate::workbench::{Workbench, column};
+use serde_json::Value;
+
+const SIGMA: f64 = 0.1;
+
+fn noisy(bench: &Workbench, seed: &str, out: &str) -> String {
+    let model = ["simulate", "models/paper-device.yaml", "--noise", "0.1"];
+    bench.run_to(0, &[&model[..], &["--seed", seed, "--out", out]].concat());
+    bench.read(out)
+}
+
+#[test]
+fn one_seed_one_noise() {
+    let bench = Workbench::with_shipped_models();
+    let first = noisy(&bench, "7", "a.csv");
+    assert!(first == noisy(&bench, "7", "b.csv"));
+    assert!(first != noisy(&bench, "8", "c.csv"));
+    assert_eq!(bench.read("a.csv.json"), bench.read("b.csv.json"));
+}
+
+#[test]
+fn the_noise_has_the_standard_deviation_asked_for() {
+    let bench = Workbench::with_shipped_models();
+    let clean = column(&bench.read("data/paper.csv"), "y_m");
+    let noisy = column(&noisy(&bench, "1", "a.csv"), "y_m");
+    let noise: Vec<f64> = noisy.iter().zip(&clean).map(|(a, b)| a - b).collect();
+    let mean = noise.iter().sum::<f64>() / noise.len() as f64;
+    let squares = noise.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    let deviation = (squares / (noise.len() - 1) as f64).sqrt();
+    assert!((deviation / SIGMA - 1.0).abs() < 0.05, "{deviation}");
+    // Four standard errors.
+    assert!(
+        mean.abs() < 4.0 * SIGMA / (noise.len() as f64).sqrt(),
+        "{mean}"
+    );
+}
+
+#[test]
+fn the_record_tells_how_to_make_it_again() {
+    let bench = Workbench::with_shipped_models();
+    // More than a double holds: a seed must not be rounded.
+    noisy(&bench, "9007199254740993", "deep/a.csv");
+    let record: Value = serde_json::from_str(&bench.read("deep/a.csv.json")).expect("JSON");
+    assert_eq!(record["made_by"], "kmcfit simulate");
+    assert_eq!(record["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(record["model"], "models/paper-device.yaml");
+    assert_eq!(record["experiment"], "free decay");
+    assert_eq!(record["nodes"], 2000);
+    assert_eq!(record["noise"]["sigma"], 0.1);
+    assert_eq!(record["noise"]["seed"], 9_007_199_254_740_993_u64);
+}
+
+/// On standard output there is no place for a record, so the seed is said beside it.
+#[test]
+fn readings_on_standard_output() {
+    let bench = Workbench::with_shipped_models();
+    let model = ["simulate", "models/paper-device.yaml"];
+    let (code, stdout, stderr) = bench.run(&model);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    assert!(stdout == bench.read("data/paper.csv"));
+    let (code, stdout, stderr) =
+        bench.run(&[&model[..], &["--noise", "0.1", "--seed", "7"]].concat());
+    assert_eq!(code, 0);
+    assert!(stdout == noisy(&bench, "7", "a.csv"));
+    assert_eq!(stderr, "noise: sigma 0.1 m, seed 7\n");
+}
