@@ -340,6 +340,7 @@ fn the_run_hangs_on_its_rounding() {
     let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
+        initial: kmcfit::solvers::Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping: Stopping::exactly(1000),
         interrupt: None,

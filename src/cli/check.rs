@@ -29,11 +29,11 @@ pub struct Arguments {
 /// lowered whatever the unit of J; for the paper's run the steps are 1 to 1e-10.
 fn steps(model: &Model) -> Result<Vec<f64>, Failure> {
     let problem = &model.problem;
-    let start = (problem.evaluate(&problem.functions.start())).map_err(no_motion)?;
-    let norm_squared = problem
-        .gradient(&start, GradientKind::Discrete)
-        .norm_squared;
-    let decade = (10.0 * start.cost / norm_squared).log10().round();
+    let start = problem.functions.start();
+    let here = problem.evaluate(&start).map_err(no_motion)?;
+    let gradient = problem.gradient(&start, &here, GradientKind::Discrete);
+    let norm_squared = gradient.norm_squared;
+    let decade = (10.0 * here.cost / norm_squared).log10().round();
     let decade = if decade.is_finite() { decade } else { 0.0 };
     let step = |i| 10f64.powf(decade - 0.5 * f64::from(i));
     Ok((0..=20).map(step).collect())

@@ -9,7 +9,7 @@ use super::on_grid::{Wanted, column_on_grid};
 use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
-use crate::config::spec::{Basis, FunctionSpec};
+use crate::config::spec::{Basis, ColumnSpec, FunctionSpec};
 use crate::dynamics::{Device, Grid};
 use crate::error::InputError;
 use crate::functions::{self, CoefficientFunction, Quantity};
@@ -93,16 +93,24 @@ fn values(
 ) -> Result<Vec<f64>, InputError> {
     match given {
         NumberOrColumn::Number(value) => Ok(vec![value.0; grid.nodes()]),
-        NumberOrColumn::Column(c) => {
-            let wanted = Wanted {
-                data: &c.data.0,
-                data_key: &format!("{key}.data"),
-                column: &c.column.0,
-                column_key: &format!("{key}.column"),
-            };
-            column_on_grid(file, &wanted, grid)
-        }
+        NumberOrColumn::Column(c) => column(file, grid, key, c),
     }
+}
+
+/// The nodal values of a column that `key` names.
+fn column(
+    file: &ModelFile,
+    grid: &Grid,
+    key: &str,
+    given: &ColumnSpec,
+) -> Result<Vec<f64>, InputError> {
+    let wanted = Wanted {
+        data: &given.data.0,
+        data_key: &format!("{key}.data"),
+        column: &given.column.0,
+        column_key: &format!("{key}.column"),
+    };
+    column_on_grid(file, &wanted, grid)
 }
 
 /// The equation of motion needs a positive mass everywhere.

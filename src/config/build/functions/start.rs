@@ -1,6 +1,5 @@
 //! From `start` to the parameters of a basis.
 
-use super::super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::config::scalar::{Number, Start};
 use crate::dynamics::Grid;
@@ -20,8 +19,7 @@ pub(super) fn parameters(
         Start::Number(value) => Ok(basis.constant(grid, value.0)),
         Start::List(values) => listed(file, grid, key, basis, values),
         Start::Column(c) => {
-            let values = column_on_grid(file, &c.data.0, &c.column.0, grid)
-                .map_err(|error| error.hint(format!("asked for by {key} of the model")))?;
+            let values = super::column(file, grid, key, c)?;
             basis.project(grid, &values).ok_or_else(|| {
                 file.error_at(key, "the column cannot be turned into this basis")
                     .found(format!("`{}`", basis.name()))
