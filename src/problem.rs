@@ -2,7 +2,7 @@
 
 use crate::constraints::Constraints;
 use crate::dynamics::{Oscillator, State};
-use crate::functions::{Functions, Penalty};
+use crate::functions::{Functions, Penalty, Variation};
 use crate::objective::{Readings, Weighting};
 
 /// One record of the device's motion.
@@ -29,6 +29,8 @@ pub struct Problem {
     pub experiments: Vec<Experiment>,
     /// What the functions pay for being rough.
     pub penalties: Vec<Penalty>,
+    /// What the functions pay for jumping.
+    pub variations: Vec<Variation>,
     /// What the functions must satisfy.
     pub constraints: Constraints,
 }
@@ -41,6 +43,7 @@ impl Problem {
             functions,
             experiments,
             penalties: Vec::new(),
+            variations: Vec::new(),
             constraints: Constraints::default(),
         }
     }

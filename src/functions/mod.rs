@@ -11,6 +11,7 @@ mod gram;
 mod penalty;
 mod quantity;
 mod ratios;
+mod variation;
 
 pub use basis::Basis;
 pub use collection::Functions;
@@ -19,6 +20,7 @@ pub use gram::Gram;
 pub use penalty::Penalty;
 pub use quantity::Quantity;
 pub use ratios::Ratios;
+pub use variation::Variation;
 
 use crate::dynamics::Grid;
 

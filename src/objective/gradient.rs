@@ -51,7 +51,7 @@ impl Problem {
             }
             GradientKind::Continuous => self.continuous_gradient(evaluation),
         };
-        if !self.penalties.is_empty() {
+        if !(self.penalties.is_empty() && self.variations.is_empty()) {
             let push = self.penalty_gradient(theta);
             let push_l2 = self.functions.gram_solve(&push);
             euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
@@ -70,6 +70,10 @@ impl Problem {
         for penalty in &self.penalties {
             let range = self.functions.ranges()[penalty.function].clone();
             penalty.add_gradient(&theta[range.clone()], &mut gradient[range]);
+        }
+        for variation in &self.variations {
+            let range = self.functions.ranges()[variation.function].clone();
+            variation.add_gradient(&theta[range.clone()], &mut gradient[range]);
         }
         gradient
     }

@@ -42,7 +42,8 @@ impl Problem {
     /// Cost, device and motions for the parameters `theta`.
     ///
     /// The cost is the sum over the experiments of [`Readings::cost`] plus the sum over the penalties
-    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]).
+    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
+    /// of `weight sum |D theta|` ([`crate::functions::Variation`]).
     ///
     /// # Errors
     /// A [`Breakdown`] if a motion does not exist: the mass is not positive, or it overflows.
@@ -80,12 +81,16 @@ impl Problem {
         Ok(())
     }
 
-    /// `sum_j weight_j |L_j theta_j - target_j|^2`.
+    /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
+    /// `weight sum |D theta|`.
     pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
-        let paid = self.penalties.iter().map(|penalty| {
+        let smooth = self.penalties.iter().map(|penalty| {
             penalty.weight * penalty.roughness(&theta[ranges[penalty.function].clone()])
         });
-        paid.sum()
+        let jumps = self.variations.iter().map(|variation| {
+            variation.weight * variation.total(&theta[ranges[variation.function].clone()])
+        });
+        smooth.sum::<f64>() + jumps.sum::<f64>()
     }
 }

@@ -74,7 +74,8 @@ pub struct Solution {
 /// One row of Clarabel's `A x + s = b`, and where its multiplier goes.
 #[derive(Clone, Copy)]
 enum Origin {
-    Residual,
+    /// A definition of an auxiliary variable, whose multiplier nobody asks for.
+    Auxiliary,
     Equality(usize),
     Upper(usize),
     Lower(usize),
@@ -112,10 +113,14 @@ impl Subproblem {
     /// The residuals are variables of their own, so `F^T F` is never formed; rows are scaled to size
     /// 1 and infinite bounds are left out.
     pub fn solve(&self) -> Solution {
-        let conic = self.conic();
-        let n = self.variables + self.residuals.len();
-        let quadratic = self.quadratic();
-        let linear = vec![0.0; n];
+        // The cost at zero becomes 1: the tolerances mean the same for every problem.
+        let at_zero = self.value(&vec![0.0; self.variables]);
+        let scale = if at_zero > 0.0 && at_zero.is_finite() { 1.0 / at_zero } else { 1.0 };
+        let conic = self.conic(scale.sqrt());
+        let n = self.variables + self.residuals.len() + self.absolute.len();
+        let quadratic = self.quadratic(scale);
+        let mut linear = vec![0.0; n - self.absolute.len()];
+        linear.extend(self.absolute_weights.iter().map(|w| 0.5 * scale * w));
         let matrix = columns(&conic.rows, n);
         let settings = DefaultSettings {
             verbose: false,
@@ -133,12 +138,11 @@ impl Subproblem {
             return self.nothing();
         };
         solver.solve();
-        self.read(
-            &solver.solution.x,
-            &solver.solution.z,
-            solver.solution.status,
-            &conic,
-        )
+        let found = &solver.solution;
+        let mut solution = self.read(&found.x, &found.z, found.status, &conic);
+        let duals = solution.multipliers.iter_mut().chain(&mut solution.equality_multipliers);
+        duals.for_each(|m| *m /= scale);
+        solution
     }
 
     fn nothing(&self) -> Solution {
@@ -150,11 +154,19 @@ impl Subproblem {
         }
     }
 
-    /// Half the Hessian's diagonal: `d` for the variables, 1 for the residuals. The cost is taken
-    /// as `1/2 |rho|^2 + 1/2 sum d z^2`.
-    fn quadratic(&self) -> CscMatrix<f64> {
+    /// The Hessian's diagonal: `d` for the variables, 1 for the residuals, 0 for the bounds of the
+    /// absolute values. The cost is halved and scaled: `1/2 |rho|^2 + scale/2 (sum d z^2 +
+    /// sum w t)` with `rho = sqrt(scale) (F z - f)`.
+    fn quadratic(&self, scale: f64) -> CscMatrix<f64> {
         let ones = std::iter::repeat_n(1.0, self.residuals.len());
-        let diagonal: Vec<f64> = self.proximal.iter().copied().chain(ones).collect();
+        let zeros = std::iter::repeat_n(0.0, self.absolute.len());
+        let diagonal: Vec<f64> = self
+            .proximal
+            .iter()
+            .map(|d| d * scale)
+            .chain(ones)
+            .chain(zeros)
+            .collect();
         let places: Vec<usize> = (0..diagonal.len()).collect();
         CscMatrix::new_from_triplets(
             diagonal.len(),
@@ -165,12 +177,14 @@ impl Subproblem {
         )
     }
 
-    fn conic(&self) -> Conic {
+    /// All rows; the residuals are multiplied by `root`.
+    fn conic(&self, root: f64) -> Conic {
         let mut conic = Conic::new();
         for i in 0..self.residuals.len() {
-            let mut row: Vec<(usize, f64)> = self.residuals.row(i).collect();
+            let mut row: Vec<(usize, f64)> =
+                self.residuals.row(i).map(|(j, a)| (j, root * a)).collect();
             row.push((self.variables + i, -1.0));
-            conic.push(&row, self.residuals.right()[i], 1.0, Origin::Residual);
+            conic.push(&row, root * self.residuals.right()[i], 1.0, Origin::Auxiliary);
         }
         for i in 0..self.equalities.len() {
             let row: Vec<(usize, f64)> = self.equalities.row(i).collect();
@@ -185,6 +199,17 @@ impl Subproblem {
             }
             if lower.is_finite() {
                 conic.push(&row, lower, -1.0, Origin::Lower(i));
+            }
+        }
+        for i in 0..self.absolute.len() {
+            // -t <= a z - b <= t.
+            let bound = self.variables + self.residuals.len() + i;
+            let right = self.absolute.right()[i];
+            for sign in [1.0, -1.0] {
+                let mut row: Vec<(usize, f64)> =
+                    self.absolute.row(i).map(|(j, a)| (j, sign * a)).collect();
+                row.push((bound, -1.0));
+                conic.push(&row, sign * right, 1.0, Origin::Auxiliary);
             }
         }
         let bounds = conic.rows.len() - zeros;
@@ -222,7 +247,7 @@ impl Subproblem {
             match *origin {
                 Origin::Equality(i) => solution.equality_multipliers[i] = multiplier,
                 Origin::Upper(i) | Origin::Lower(i) => solution.multipliers[i] += multiplier,
-                Origin::Residual | Origin::Cone => {}
+                Origin::Auxiliary | Origin::Cone => {}
             }
         }
         solution

@@ -32,9 +32,9 @@ impl Symmetric {
         self.entries.push((i.min(j), i.max(j), value));
     }
 
-    /// The solution of `A x = b`, and the size of its residual relative to `b`; `None` if the matrix
-    /// cannot be factored.
-    pub fn solve(mut self, b: &[f64]) -> Option<(Vec<f64>, f64)> {
+    /// The solutions of `A x = b` for several right-hand sides, each with the size of its residual
+    /// relative to `b`; `None` if the matrix cannot be factored.
+    pub fn solve(mut self, sides: &[Vec<f64>]) -> Option<Vec<(Vec<f64>, f64)>> {
         let n = self.signs.len();
         let scale = self.equilibrate();
         let shifts = self.signs.iter().enumerate();
@@ -46,10 +46,13 @@ impl Symmetric {
             .build()
             .ok()?;
         let mut factor = QDLDLFactorisation::new(&triangle, Some(settings)).ok()?;
-        let right: Vec<f64> = b.iter().zip(&scale).map(|(b, s)| b * s).collect();
-        let (mut x, residual) = self.refine(&mut factor, &right);
-        x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
-        x.iter().all(|x| x.is_finite()).then_some((x, residual))
+        let solution = |b: &Vec<f64>| {
+            let right: Vec<f64> = b.iter().zip(&scale).map(|(b, s)| b * s).collect();
+            let (mut x, residual) = self.refine(&mut factor, &right);
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+            x.iter().all(|x| x.is_finite()).then_some((x, residual))
+        };
+        sides.iter().map(solution).collect()
     }
 
     /// Scales rows and columns alike until their largest entries are near 1; returns the scales.

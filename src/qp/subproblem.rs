@@ -3,7 +3,7 @@
 use super::factor::Symmetric;
 use crate::constraints::{Cone, Rows};
 
-/// Minimise `|F z - f|^2 + sum_j d_j z_j^2` subject to `E z = e`, `l <= G z <= u` and second-order
+/// Minimise `|F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
 /// cones.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Subproblem {
@@ -13,6 +13,10 @@ pub struct Subproblem {
     pub residuals: Rows,
     /// `d`, one per variable, not negative.
     pub proximal: Vec<f64>,
+    /// `T` and `t`.
+    pub absolute: Rows,
+    /// `w`, one per row of `T`, not negative.
+    pub absolute_weights: Vec<f64>,
     /// `E` and `e`.
     pub equalities: Rows,
     /// `G` and `l`; minus infinity where there is no lower bound.
@@ -30,6 +34,8 @@ impl Subproblem {
             variables,
             residuals: Rows::new(),
             proximal: vec![0.0; variables],
+            absolute: Rows::new(),
+            absolute_weights: Vec::new(),
             equalities: Rows::new(),
             inequalities: Rows::new(),
             upper: Vec::new(),
@@ -48,20 +54,36 @@ impl Subproblem {
         self.upper.push(upper);
     }
 
-    /// `|F z - f|^2 + sum d z^2`.
+    /// `|F z - f|^2 + sum d z^2 + sum w |T z - t|`.
     pub fn value(&self, z: &[f64]) -> f64 {
+        let tz = self.absolute.multiply(z);
+        let jumps = tz
+            .iter()
+            .zip(self.absolute.right())
+            .zip(&self.absolute_weights);
+        let jumps: f64 = jumps.map(|((a, b), w)| w * (a - b).abs()).sum();
         let fz = self.residuals.multiply(z);
         let fit = fz.iter().zip(self.residuals.right());
         let near = self.proximal.iter().zip(z);
-        fit.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() + near.map(|(d, z)| d * z * z).sum::<f64>()
+        let squares: f64 = fit.map(|(a, b)| (a - b) * (a - b)).sum();
+        jumps + squares + near.map(|(d, z)| d * z * z).sum::<f64>()
     }
 
     /// The minimiser without the inequalities and cones; `None` if it cannot be found to
-    /// [`Subproblem::PLAIN_RESIDUAL`].
+    /// [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
     ///
     /// Solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
     /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, so that `F^T F` is never formed.
     pub fn solve_plain(&self) -> Option<Vec<f64>> {
+        if !self.absolute.is_empty() {
+            return None;
+        }
+        self.solve_plain_for(&[self.residuals.right().to_vec()])?.pop()
+    }
+
+    /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
+    /// factorisation; absolute values are left out.
+    pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let (n, r, e) = (self.variables, self.residuals.len(), self.equalities.len());
         let signs = [vec![1i8; n], vec![-1; r + e]].concat();
         let mut matrix = Symmetric::new(signs);
@@ -78,15 +100,15 @@ impl Subproblem {
             let row = self.equalities.row(i);
             row.for_each(|(j, a)| matrix.add(j, n + r + i, a));
         }
-        let right = [
-            &vec![0.0; n],
-            self.residuals.right(),
-            self.equalities.right(),
-        ]
-        .concat();
-        let (mut solution, residual) = matrix.solve(&right)?;
-        solution.truncate(n);
-        (residual <= Self::PLAIN_RESIDUAL).then_some(solution)
+        let zeros = vec![0.0; n];
+        let side = |f: &Vec<f64>| [&zeros, f.as_slice(), self.equalities.right()].concat();
+        let sides: Vec<Vec<f64>> = targets.iter().map(side).collect();
+        let solutions = matrix.solve(&sides)?.into_iter();
+        let exact = solutions.map(|(mut solution, residual)| {
+            solution.truncate(n);
+            (residual <= Self::PLAIN_RESIDUAL).then_some(solution)
+        });
+        exact.collect()
     }
 
     /// Whether all inequalities and cones hold at `z`, to `tolerance` relative to each row's size.

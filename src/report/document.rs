@@ -30,6 +30,12 @@ pub struct ResultDocument {
     pub seconds: f64,
     /// The functions found, by name.
     pub functions: BTreeMap<String, FunctionSummary>,
+    /// The constraints at the best point.
+    #[serde(default)]
+    pub constraints: ConstraintSummary,
+    /// The starts that were tried, in order.
+    #[serde(default)]
+    pub rungs: Vec<RungSummary>,
     /// How well each experiment is matched.
     pub experiments: Vec<ExperimentSummary>,
     /// The motion of the found device from other initial states.
@@ -157,4 +163,45 @@ pub struct Prediction {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
+}
+
+/// The constraints at the best point.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ConstraintSummary {
+    /// Largest violation relative to its row's scale; 0 if all hold or there are none.
+    pub max_violation: f64,
+    /// The groups with rows at their bounds.
+    pub active: Vec<ActiveSummary>,
+}
+
+/// A group of constraints with rows at their bounds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ActiveSummary {
+    /// What the constraint says.
+    pub name: String,
+    /// Number of active rows.
+    pub rows: usize,
+    /// Spans of time on which rows are active, s.
+    pub spans: Vec<[f64; 2]>,
+    /// Sum of the multipliers' sizes.
+    pub multiplier: f64,
+    /// In words.
+    pub sentence: String,
+}
+
+/// One attempt of the start ladder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RungSummary {
+    /// Where it started.
+    pub start: String,
+    /// J at its start; absent if the start had no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial_cost: Option<f64>,
+    /// J at its end; absent if the start had no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<f64>,
+    /// Iterations it took.
+    pub iterations: u64,
+    /// How it ended.
+    pub status: String,
 }

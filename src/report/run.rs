@@ -2,8 +2,9 @@
 
 use super::csv::CsvTable;
 use super::document::{
-    CostSummary, CountsSummary, ExperimentSummary, FORMAT, FunctionSummary, GradientSummary,
-    ModelSummary, OutcomeSummary, Prediction, ResultDocument,
+    ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
+    FunctionSummary, GradientSummary, ModelSummary, OutcomeSummary, Prediction, ResultDocument,
+    RungSummary,
 };
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
@@ -13,7 +14,7 @@ use crate::config::Model;
 use crate::dynamics::Device;
 use crate::functions::{Quantity, Ratios};
 use crate::objective::Weighting;
-use crate::solvers::{Fit, Row};
+use crate::solvers::{ActiveGroup, Fit, Row, Rung, active_constraints};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -81,6 +82,8 @@ impl Run<'_> {
             },
             seconds: fit.elapsed.as_secs_f64(),
             functions: self.function_summaries(),
+            constraints: self.constraint_summary(),
+            rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -116,6 +119,18 @@ impl Run<'_> {
             _ => {
                 "J = integral (y - y_obs)^2 dt over records without sigma + chi-square over the others"
             }
+        }
+    }
+
+    fn constraint_summary(&self) -> ConstraintSummary {
+        let problem = &self.model.problem;
+        let worst = problem
+            .constraints
+            .largest_violation(&self.fit.best.parameters);
+        let active = active_constraints(problem, &self.fit.best);
+        ConstraintSummary {
+            max_violation: worst.map_or(0.0, |v| v.relative),
+            active: active.into_iter().map(active_summary).collect(),
         }
     }
 
@@ -300,6 +315,27 @@ impl Run<'_> {
             &curves(&found),
             truth.as_ref().map(curves).as_ref(),
         )
+    }
+}
+
+fn active_summary(group: ActiveGroup) -> ActiveSummary {
+    ActiveSummary {
+        sentence: group.sentence(),
+        name: group.name,
+        rows: group.rows,
+        spans: group.spans,
+        multiplier: group.multiplier,
+    }
+}
+
+fn rung_summary(rung: &Rung) -> RungSummary {
+    let known = |x: f64| x.is_finite().then_some(x);
+    RungSummary {
+        start: rung.name.into(),
+        initial_cost: known(rung.initial_cost),
+        cost: known(rung.cost),
+        iterations: rung.iterations,
+        status: rung.outcome.status.name().into(),
     }
 }
 

@@ -39,6 +39,8 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     }
     writeln!(text)?;
     write_functions(text, document)?;
+    write_constraints(text, document)?;
+    write_rungs(text, document)?;
     if !document.predictions.is_empty() {
         write!(text, "\n{}", prediction_table(&document.predictions))?;
     }
@@ -68,6 +70,31 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
         writeln!(text)?;
+    }
+    Ok(())
+}
+
+fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    for active in &document.constraints.active {
+        writeln!(text, "{}", active.sentence)?;
+    }
+    Ok(())
+}
+
+/// The ladder, where more than one start was tried.
+fn write_rungs(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    if document.rungs.len() < 2 {
+        return Ok(());
+    }
+    for rung in &document.rungs {
+        let cost = rung
+            .cost
+            .map_or("no motion".into(), |cost| format!("J {cost:.4e}"));
+        writeln!(
+            text,
+            "from the {}: {cost} after {} iterations ({})",
+            rung.start, rung.iterations, rung.status
+        )?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 //! penalties and constraints make it one convex problem. It needs no start and knows no local minima
 //! of a wrong period; noise biases it, which the fit that follows removes.
 
-use super::gauss_newton::add_penalties;
+use super::gauss_newton::{add_penalties, add_variations};
 use crate::constraints::{Constraints, RowGroup};
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::objective::{Readings, Weighting};
@@ -37,6 +37,7 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
         add_experiment(problem, experiment, start, &mut sub);
     }
     add_penalties(problem, start, &mut sub);
+    add_variations(problem, start, &mut sub);
     let held = with_scale_held(problem, start);
     sub.constrain(&held, start);
     let sizes: Vec<f64> = (problem.functions.device(start).functions())

@@ -1,6 +1,7 @@
 //! Solvers: each is a direction and a step rule (`Descend`); the loop, the stopping test and the
 //! record of what happened are shared.
 
+mod activity;
 mod equation_error;
 mod executor;
 mod gauss_newton;
@@ -15,6 +16,7 @@ mod start;
 mod steepest_descent;
 mod stopping;
 
+pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::equation_error;
 pub use executor::Fit;
 pub use ladder::{Initial, Rung, fit};

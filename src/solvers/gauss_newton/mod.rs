@@ -239,6 +239,7 @@ fn linearise(work: &mut Work, point: &Point) -> Subproblem {
         structured::subproblem(problem, &point.evaluation)
     };
     add_penalties(problem, &point.parameters, &mut sub);
+    add_variations(problem, &point.parameters, &mut sub);
     sub.constrain(&problem.constraints, &point.parameters);
     sub
 }
@@ -255,6 +256,19 @@ pub(super) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Sub
                 .row(i)
                 .map(|(j, a)| (range.start + j, root * a));
             sub.residuals.push(row, -root * r);
+        }
+    }
+}
+
+/// `weight |D (theta + delta)|` as absolute values.
+pub(super) fn add_variations(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+    for variation in &problem.variations {
+        let range = problem.functions.ranges()[variation.function].clone();
+        let changes = variation.changes(&parameters[range.clone()], variation.count());
+        for (i, change) in changes.iter().enumerate() {
+            let row = variation.rows.row(i).map(|(j, a)| (range.start + j, a));
+            sub.absolute.push(row, -change);
+            sub.absolute_weights.push(variation.weight);
         }
     }
 }

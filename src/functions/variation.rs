@@ -1,0 +1,52 @@
+//! Total variation: what a function pays for its jumps, however sharp.
+
+use super::Design;
+
+/// `weight * sum_i |(D theta_j)_i|` for one function `j`, where the rows of `D` are the changes from
+/// one knot, cell or node to the next: the total variation of the function. Unlike squared
+/// smoothness it does not charge a jump more than a slow change of the same height.
+#[derive(Debug, Clone)]
+pub struct Variation {
+    /// Index of the function, mass 0.
+    pub function: usize,
+    /// Weight, in the unit of J per unit of the function.
+    pub weight: f64,
+    /// `D`, rows x parameters of the function.
+    pub rows: Design,
+}
+
+impl Variation {
+    /// The changes `D theta`.
+    pub fn changes(&self, theta: &[f64], count: usize) -> Vec<f64> {
+        self.rows.multiply(theta, count)
+    }
+
+    /// Number of changes.
+    pub fn count(&self) -> usize {
+        match &self.rows {
+            Design::Sparse(matrix) => matrix.nrows(),
+            Design::Empty | Design::Identity => 0,
+        }
+    }
+
+    /// `sum_i |(D theta)_i|`, without the weight.
+    pub fn total(&self, theta: &[f64]) -> f64 {
+        self.changes(theta, self.count())
+            .iter()
+            .map(|c| c.abs())
+            .sum()
+    }
+
+    /// Adds a subgradient, `weight D^T sign(D theta)`.
+    pub fn add_gradient(&self, theta: &[f64], gradient: &mut [f64]) {
+        let sign = |c: &f64| {
+            if *c == 0.0 {
+                0.0
+            } else {
+                self.weight * c.signum()
+            }
+        };
+        let signs: Vec<f64> = self.changes(theta, self.count()).iter().map(sign).collect();
+        self.rows.transpose_multiply_add(&signs, gradient);
+    }
+}

@@ -1,0 +1,147 @@
+//! Which constraints are active at a point, and how hard the data push against them.
+
+use crate::constraints::RowGroup;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::Point;
+
+/// A row is active if it is this near to its bound, relative to its scale: nearer than a quadratic
+/// program brings a row that it does not mean to touch.
+const NEAR: f64 = 1e-6;
+/// A push counts if giving way by one per cent of the row's scale would lower J by more than this
+/// share of it.
+const PUSH: f64 = 1e-6;
+
+/// A group of constraints with active rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveGroup {
+    /// Name of the group.
+    pub name: String,
+    /// Number of active rows.
+    pub rows: usize,
+    /// Spans of time on which rows are active, s.
+    pub spans: Vec<[f64; 2]>,
+    /// Spans on which the data push against the bound, s.
+    pub pushed: Vec<[f64; 2]>,
+    /// Sum of the sizes of the rows' multipliers: what J would lose per unit by which all bounds
+    /// give way.
+    pub multiplier: f64,
+}
+
+impl ActiveGroup {
+    /// In words.
+    pub fn sentence(&self) -> String {
+        let list = |spans: &[[f64; 2]]| -> String {
+            let words: Vec<String> = spans.iter().take(MOST_SPANS).map(span).collect();
+            let more = spans.len().saturating_sub(MOST_SPANS);
+            match more {
+                0 => words.join(", "),
+                _ => format!("{} and {more} more spans", words.join(", ")),
+            }
+        };
+        match self.pushed.as_slice() {
+            [] => format!(
+                "`{}` is touched but not pushed on {}",
+                self.name,
+                list(&self.spans)
+            ),
+            pushed => format!("the data push against `{}` on {}", self.name, list(pushed)),
+        }
+    }
+}
+
+/// Most spans that a sentence lists.
+const MOST_SPANS: usize = 4;
+
+fn span(&[from, to]: &[f64; 2]) -> String {
+    if from == to {
+        format!("t = {from:.3}")
+    } else {
+        format!("[{from:.3}, {to:.3}]")
+    }
+}
+
+/// The active constraints at `point`.
+///
+/// The multipliers solve the optimality conditions `dJ + G^T lambda = 0` in the least-squares sense
+/// of a projection: they are those of the step of steepest descent that the constraints stop.
+pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> {
+    let constraints = &problem.constraints;
+    let near: Vec<Vec<usize>> = constraints
+        .groups
+        .iter()
+        .map(|g| near_rows(g, point))
+        .collect();
+    if near.iter().all(Vec::is_empty) {
+        return Vec::new();
+    }
+    let multipliers = multipliers(problem, point);
+    let groups = constraints.groups.iter().zip(near).enumerate();
+    groups
+        .filter(|(_, (_, rows))| !rows.is_empty())
+        .map(|(g, (group, rows))| {
+            let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m[g][i].abs());
+            let counts = |&i: &usize| {
+                let gain = 0.01 * group.scale(i, &point.parameters) * multiplier(i);
+                gain > PUSH * point.evaluation.cost
+            };
+            let pushed: Vec<usize> = rows.iter().copied().filter(counts).collect();
+            ActiveGroup {
+                name: group.name.clone(),
+                rows: rows.len(),
+                spans: spans(group, &rows),
+                pushed: spans(group, &pushed),
+                multiplier: rows.iter().map(|&i| multiplier(i)).sum(),
+            }
+        })
+        .collect()
+}
+
+fn near_rows(group: &RowGroup, point: &Point) -> Vec<usize> {
+    let is_near = |&i: &usize| group.relative_violation(i, &point.parameters) >= -NEAR;
+    (0..group.rows.len()).filter(is_near).collect()
+}
+
+/// Joins the time spans of rows that follow each other.
+fn spans(group: &RowGroup, rows: &[usize]) -> Vec<[f64; 2]> {
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    let mut last = None;
+    for &i in rows {
+        let [from, to] = group.times[i];
+        match joined.last_mut() {
+            Some(span) if last.is_some_and(|last| last + 1 == i) && from >= span[0] => {
+                span[1] = span[1].max(to);
+            }
+            _ => joined.push([from, to]),
+        }
+        last = Some(i);
+    }
+    joined
+}
+
+/// Multipliers of J by group and row; `None` if the quadratic program fails.
+fn multipliers(problem: &Problem, point: &Point) -> Option<Vec<Vec<f64>>> {
+    let sizes = problem.natural_sizes(&point.evaluation);
+    let duration = problem.oscillator.grid.duration();
+    let metric = problem.functions.relative_metric(&sizes, duration);
+    let gradient = &point.gradient.euclidean;
+    // Scaled so that the largest entry of the right-hand side is near 1.
+    let steepest = gradient
+        .iter()
+        .zip(&metric)
+        .map(|(g, m)| (g / m.sqrt()).abs());
+    let scale = steepest.fold(f64::MIN_POSITIVE.sqrt(), f64::max);
+    let mut sub = Subproblem::new(metric.len());
+    for (j, (m, g)) in metric.iter().zip(gradient).enumerate() {
+        let root = m.sqrt();
+        sub.residuals.push([(j, root)], -g / (root * scale));
+    }
+    let places = sub.constrain(&problem.constraints, &point.parameters);
+    let solution = sub.solve();
+    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
+    solved.then(|| {
+        let mut multipliers = solution.by_group(&places);
+        multipliers.iter_mut().flatten().for_each(|m| *m *= scale);
+        multipliers
+    })
+}
