@@ -60,6 +60,11 @@ impl Rows {
         &self.right
     }
 
+    /// Sets all right-hand sides to zero.
+    pub fn clear_right(&mut self) {
+        self.right.fill(0.0);
+    }
+
     /// `a_i^T z` for all rows.
     pub fn multiply(&self, z: &[f64]) -> Vec<f64> {
         (0..self.len())

@@ -84,6 +84,16 @@ impl Subproblem {
     /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
     /// factorisation; absolute values are left out.
     pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        let solutions = self.solve_conditions(targets)?.into_iter();
+        let variables = solutions.map(|mut solution| {
+            solution.truncate(self.variables);
+            solution
+        });
+        Some(variables.collect())
+    }
+
+    /// `(z, rho, lambda)` of the optimality conditions for each `f`.
+    fn solve_conditions(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let (n, r, e) = (self.variables, self.residuals.len(), self.equalities.len());
         let signs = [vec![1i8; n], vec![-1; r + e]].concat();
         let mut matrix = Symmetric::new(signs);
@@ -91,9 +101,7 @@ impl Subproblem {
             matrix.add(j, j, *d);
         }
         for i in 0..r {
-            self.residuals
-                .row(i)
-                .for_each(|(j, a)| matrix.add(j, n + i, a));
+            self.residuals.row(i).for_each(|(j, a)| matrix.add(j, n + i, a));
             matrix.add(n + i, n + i, -1.0);
         }
         for i in 0..e {
@@ -104,11 +112,13 @@ impl Subproblem {
         let side = |f: &Vec<f64>| [&zeros, f.as_slice(), self.equalities.right()].concat();
         let sides: Vec<Vec<f64>> = targets.iter().map(side).collect();
         let solutions = matrix.solve(&sides)?.into_iter();
-        let exact = solutions.map(|(mut solution, residual)| {
-            solution.truncate(n);
-            (residual <= Self::PLAIN_RESIDUAL).then_some(solution)
-        });
-        exact.collect()
+        let exact = |(solution, residual)| (residual <= Self::PLAIN_RESIDUAL).then_some(solution);
+        solutions.map(exact).collect()
+    }
+
+    /// Sets the right-hand sides of the equalities to zero.
+    pub fn homogeneous(&mut self) {
+        self.equalities.clear_right();
     }
 
     /// Whether all inequalities and cones hold at `z`, to `tolerance` relative to each row's size.

@@ -15,6 +15,7 @@ mod recorder;
 mod start;
 mod steepest_descent;
 mod stopping;
+mod weight_path;
 
 pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::equation_error;
@@ -25,6 +26,7 @@ pub use point::{Counts, Point};
 pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
 pub use start::Start;
 pub use stopping::Stopping;
+pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight};
 
 use crate::objective::GradientKind;
 use point::Work;

@@ -80,3 +80,71 @@ pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
     let row = |line: &str| line.split(',').map(|x| x.parse().unwrap()).collect();
     text.lines().skip(1).map(row).collect()
 }
+
+/// Simulated displacement of `device` with Gaussian noise.
+pub fn noisy(oscillator: &Oscillator, device: &Device, sigma: f64, seed: u64) -> Vec<f64> {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let motion = oscillator.forward(device, INITIAL, None).unwrap();
+    let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+    motion.displacement.iter().map(|y| y + sigma * noise()).collect()
+}
+
+/// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
+pub fn problem_of(
+    oscillator: Oscillator,
+    list: Vec<CoefficientFunction>,
+    observed: Vec<f64>,
+    sigma: Option<f64>,
+) -> Problem {
+    let (nodes, step) = (oscillator.grid.nodes(), oscillator.grid.step());
+    let weighting = match sigma {
+        Some(sigma) => Weighting::Sigma(sigma),
+        None => Weighting::Integral { spacing: step },
+    };
+    let experiment = Experiment {
+        name: "free decay".into(),
+        initial: INITIAL,
+        force: None,
+        readings: Some(Readings::new(observed, 1, weighting)),
+    };
+    let functions = Functions::new(list, nodes, step).unwrap();
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// Adds the smoothness of the paper's recovery, weight on the curvature of m and the slopes of c
+/// and k, and `k(0) = 1`; with bounds `m >= 0.05, c >= 0, k >= 0` at every parameter of a nodal or
+/// piecewise linear basis if asked for.
+pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
+    use kmcfit::constraints::RowGroup;
+    use kmcfit::functions::Penalty;
+    let grid = problem.oscillator.grid;
+    let orders = [2, 1, 1];
+    let ranges = problem.functions.ranges().to_vec();
+    let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();
+    for (f, basis) in bases.iter().enumerate() {
+        let Some(basis) = basis else { continue };
+        let rows = basis.roughness(&grid, orders[f]);
+        problem.penalties.push(Penalty::new(f, orders[f], weight, rows));
+        if positive {
+            let low = if f == 0 { 0.05 } else { 0.0 };
+            let mut group = RowGroup::new(format!("function {f} >= {low}"));
+            for j in ranges[f].clone() {
+                group.push([(j, 1.0)], [low, f64::INFINITY], [0.0, DURATION]);
+            }
+            problem.constraints.groups.push(group);
+        }
+    }
+    let mut group = RowGroup::new("k(0) = 1");
+    group.push([(ranges[2].start, 1.0)], [1.0, 1.0], [0.0, 0.0]);
+    problem.constraints.groups.push(group);
+}
+
+/// Largest distance of each function from the truth over the nodes, mass first.
+pub fn errors(found: &Device, truth: &Device) -> Vec<f64> {
+    let largest = |(a, b): (&[f64], &[f64])| {
+        a.iter().zip(b).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()))
+    };
+    found.functions().zip(truth.functions()).map(largest).collect()
+}

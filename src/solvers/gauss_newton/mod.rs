@@ -36,8 +36,9 @@ const CLIPPED: f64 = 0.9;
 /// square of the precision of its terms.
 const NO_DECREASE: f64 = 1e-30;
 
-/// Relative rounding of a cost: a sum of some thousand squares.
-const ROUNDING: f64 = 1e-13;
+/// A predicted decrease below this share of J that does not come true is within the accuracy to
+/// which a quadratic program is solved.
+const ROUNDING: f64 = 1e-9;
 /// A relative change of the functions below this is not a step but rounding.
 const SMALLEST_CHANGE: f64 = 1e-9;
 
@@ -173,7 +174,8 @@ fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
         ConicStatus::Solved | ConicStatus::Almost => {
             let parameters = moved(&solution.z);
             if constraints.hold(&parameters, constraints::TOLERANCE) {
-                let predicted = cost - sub.value(&solution.z);
+                // Not the program's own value: its solution satisfies the steps only to its accuracy.
+                let predicted = cost - model_cost(work, sub, point, &parameters);
                 Answer::Step(Proposal {
                     parameters,
                     predicted,
@@ -229,19 +231,24 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
 
 /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
-    let problem = work.problem();
-    let parameters = problem.functions.parameters();
-    let mut sub = if parameters <= FEW_PARAMETERS {
-        work.count_tangents(parameters as u64);
+    let parameters = work.problem().functions.parameters();
+    work.count_tangents(if parameters <= FEW_PARAMETERS { parameters as u64 } else { 1 });
+    linearise_at(work.problem(), point).0
+}
+
+/// [`linearise`] without counting, and the number of residual rows that belong to the readings:
+/// they come first.
+pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usize) {
+    let mut sub = if problem.functions.parameters() <= FEW_PARAMETERS {
         dense::subproblem(problem, &point.evaluation)
     } else {
-        work.count_tangents(1);
         structured::subproblem(problem, &point.evaluation)
     };
+    let readings = sub.residuals.len();
     add_penalties(problem, &point.parameters, &mut sub);
     add_variations(problem, &point.parameters, &mut sub);
     sub.constrain(&problem.constraints, &point.parameters);
-    sub
+    (sub, readings)
 }
 
 /// `sqrt(weight) (L (theta + delta) - target)` as residual rows.

@@ -1,0 +1,296 @@
+//! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
+
+use super::gauss_newton::linearise_at;
+use super::{Fit, FitSettings, Initial, Row, Status, fit};
+use crate::dynamics::Breakdown;
+use crate::objective::Weighting;
+use crate::problem::Problem;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Which rule chooses the weight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WeightRule {
+    /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
+    Discrepancy,
+    /// The corner of misfit against roughness on log axes (Hansen).
+    LCurve,
+    /// The least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
+    Gcv,
+}
+
+impl WeightRule {
+    /// All rules.
+    pub const ALL: [Self; 3] = [Self::Discrepancy, Self::LCurve, Self::Gcv];
+
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Discrepancy => "discrepancy",
+            Self::LCurve => "l-curve",
+            Self::Gcv => "gcv",
+        }
+    }
+}
+
+/// The fit at one weight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPoint {
+    /// Factor on the penalties.
+    pub weight: f64,
+    /// Misfit of the readings; chi-square where they have a sigma.
+    pub misfit: f64,
+    /// `sum |L theta - target|^2` of the penalties, without the weight.
+    pub roughness: f64,
+    /// Effective number of parameters that the data determine.
+    pub degrees_of_freedom: f64,
+    /// `n misfit / (n - dof)^2`.
+    pub gcv: f64,
+    /// The parameters found.
+    pub parameters: Vec<f64>,
+}
+
+/// The path, from the largest weight to the smallest, and what each rule picks on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightPath {
+    /// Fits, by falling weight.
+    pub points: Vec<PathPoint>,
+    /// Index that each rule of [`WeightRule::ALL`] picks; `None` where it picks none.
+    pub picks: [Option<usize>; 3],
+    /// Seed of the random vectors behind the degrees of freedom.
+    pub seed: u64,
+    /// What the user should know about the choice.
+    pub remark: Option<String>,
+}
+
+/// Largest weight of the path, relative to the misfit of no motion over a roughness of one.
+const LARGEST: f64 = 1e4;
+/// Decades that the path spans, and points per decade.
+const DECADES: f64 = 8.0;
+const PER_DECADE: f64 = 1.0;
+/// Halvings of the interval in which the discrepancy rule's weight lies.
+const REFINEMENTS: u32 = 4;
+/// Random vectors of the trace estimate (Hutchinson); its error is about sqrt(2 dof / 16).
+const PROBES: usize = 16;
+/// Seed of those vectors.
+const SEED: u64 = 1;
+
+impl Problem {
+    /// The same problem with all penalties multiplied by `factor`.
+    #[must_use]
+    pub fn with_penalty_factor(&self, factor: f64) -> Self {
+        let mut problem = self.clone();
+        problem.penalties.iter_mut().for_each(|p| p.weight *= factor);
+        problem
+    }
+
+    /// Number of readings of all experiments.
+    pub fn reading_count(&self) -> usize {
+        let readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
+        readings.map(|r| r.values().len()).sum()
+    }
+}
+
+/// Fits `problem` for a path of factors on its penalties, each from its neighbour, and once more at
+/// the factor that `rule` picks.
+///
+/// # Errors
+/// A [`Breakdown`] if the fit at the largest weight has no motion at its start.
+pub fn choose_weight(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    rule: WeightRule,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<(WeightPath, Problem, Fit), Breakdown> {
+    let mut walk = Walk {
+        problem,
+        settings: settings.clone(),
+        observe,
+        from: start.to_vec(),
+        last: None,
+    };
+    let mut points = Vec::new();
+    for weight in weights(problem) {
+        points.push(walk.visit(weight)?);
+        if walk.ended() {
+            break;
+        }
+    }
+    refine_discrepancy(problem, &mut walk, &mut points)?;
+    let picks = [discrepancy(problem, &points), l_curve(&points), gcv(&points)];
+    let index = WeightRule::ALL.iter().position(|r| *r == rule).and_then(|i| picks[i]);
+    let remark = remark(problem, rule, index, &points);
+    // Without a pick the weakest smoothing comes nearest to what the rule asks for.
+    let chosen = index.unwrap_or(points.len() - 1);
+    let weighted = problem.with_penalty_factor(points[chosen].weight);
+    let found = fit(&weighted, &points[chosen].parameters, &walk.settings, walk.observe)?;
+    let path = WeightPath {
+        points,
+        picks,
+        seed: SEED,
+        remark,
+    };
+    Ok((path, weighted, found))
+}
+
+/// A walk along the path: every fit starts where the last one ended.
+struct Walk<'a> {
+    problem: &'a Problem,
+    settings: FitSettings,
+    observe: &'a mut dyn FnMut(&Row),
+    from: Vec<f64>,
+    last: Option<Status>,
+}
+
+impl Walk<'_> {
+    fn visit(&mut self, weight: f64) -> Result<PathPoint, Breakdown> {
+        let problem = self.problem.with_penalty_factor(weight);
+        let found = fit(&problem, &self.from, &self.settings, self.observe)?;
+        // From here on every fit starts where its neighbour ended.
+        self.settings.initial = Initial::Functions;
+        if std::env::var_os("GN_TRACE").is_some() { eprintln!("{weight:.2e} {:?} its {} {:?} {:?}", found.elapsed, found.history.len(), found.counts, found.outcome); }
+        self.last = Some(found.outcome.status);
+        self.from.clone_from(&found.best.parameters);
+        let misfit = found.best.evaluation.misfit;
+        let n = problem.reading_count() as f64;
+        let degrees_of_freedom = degrees_of_freedom(&problem, &found);
+        Ok(PathPoint {
+            weight,
+            misfit,
+            roughness: roughness(&problem, &self.from),
+            degrees_of_freedom,
+            gcv: n * misfit / (n - degrees_of_freedom).powi(2),
+            parameters: self.from.clone(),
+        })
+    }
+
+    fn ended(&self) -> bool {
+        matches!(self.last, Some(Status::Interrupted | Status::TimeLimit))
+    }
+}
+
+fn weights(problem: &Problem) -> Vec<f64> {
+    let silence = vec![0.0; problem.oscillator.grid.nodes()];
+    let readings = problem.experiments.iter().filter_map(|e| e.readings.as_ref());
+    let reference: f64 = readings.map(|r| r.cost(&silence)).sum();
+    let count = (DECADES * PER_DECADE) as i32 + 1;
+    let factor = |i: i32| 10f64.powf(-f64::from(i) / PER_DECADE);
+    (0..count).map(|i| LARGEST * reference * factor(i)).collect()
+}
+
+fn roughness(problem: &Problem, theta: &[f64]) -> f64 {
+    let ranges = problem.functions.ranges();
+    let each = problem.penalties.iter().map(|p| p.roughness(&theta[ranges[p.function].clone()]));
+    each.sum()
+}
+
+/// Trace of the matrix that takes the readings to their fitted values, by random signs.
+fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
+    let (mut sub, readings) = linearise_at(problem, &found.best);
+    // The proximal term of a fit that has ended is gone.
+    sub.proximal.fill(0.0);
+    let rows = sub.residuals.len();
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let mut sign = || if random.random_bool(0.5) { 1.0 } else { -1.0 };
+    let probes: Vec<Vec<f64>> = (0..PROBES)
+        .map(|_| (0..rows).map(|i| if i < readings { sign() } else { 0.0 }).collect())
+        .collect();
+    sub.homogeneous();
+    let Some(solutions) = sub.solve_plain_for(&probes) else {
+        return f64::NAN;
+    };
+    let traces = solutions.iter().zip(&probes).map(|(z, probe)| {
+        let fitted = sub.residuals.multiply(z);
+        fitted.iter().zip(probe).take(readings).map(|(a, b)| a * b).sum::<f64>()
+    });
+    traces.sum::<f64>() / PROBES as f64
+}
+
+/// The largest chi-square that noise alone explains: its mean plus two standard deviations.
+fn largest_chi_square(problem: &Problem) -> f64 {
+    let n = problem.reading_count() as f64;
+    n + 2.0 * (2.0 * n).sqrt()
+}
+
+fn has_sigma(problem: &Problem) -> bool {
+    let mut readings = problem.experiments.iter().filter_map(|e| e.readings.as_ref());
+    readings.all(|r| matches!(r.weighting(), Weighting::Sigma(_)))
+}
+
+fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usize> {
+    let limit = largest_chi_square(problem);
+    has_sigma(problem).then_some(())?;
+    points.iter().position(|p| p.misfit <= limit)
+}
+
+/// Halves, on the log scale, the interval between the first weight that satisfies the rule and the
+/// last that does not.
+fn refine_discrepancy(
+    problem: &Problem,
+    walk: &mut Walk,
+    points: &mut Vec<PathPoint>,
+) -> Result<(), Breakdown> {
+    for _ in 0..REFINEMENTS {
+        let Some(first) = discrepancy(problem, points).filter(|i| *i > 0) else {
+            return Ok(());
+        };
+        if walk.ended() {
+            return Ok(());
+        }
+        let weight = (points[first].weight * points[first - 1].weight).sqrt();
+        walk.from.clone_from(&points[first].parameters);
+        let point = walk.visit(weight)?;
+        points.insert(first, point);
+    }
+    Ok(())
+}
+
+/// The point of largest curvature of (log misfit, log roughness) along the path.
+fn l_curve(points: &[PathPoint]) -> Option<usize> {
+    let place = |p: &PathPoint| (p.misfit.ln(), p.roughness.ln());
+    let curvature = |w: &[PathPoint]| {
+        let [(x0, y0), (x1, y1), (x2, y2)] = [place(&w[0]), place(&w[1]), place(&w[2])];
+        // Menger's curvature with the sign of the turn; the corner turns left as the weight falls.
+        let cross = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
+        let side = |ax: f64, ay: f64, bx: f64, by: f64| (ax - bx).hypot(ay - by);
+        let sides = side(x0, y0, x1, y1) * side(x1, y1, x2, y2) * side(x0, y0, x2, y2);
+        -2.0 * cross / sides
+    };
+    let turns = points.windows(3).map(curvature).enumerate();
+    let finite = turns.filter(|(_, c)| c.is_finite() && *c > 0.0);
+    finite.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i + 1)
+}
+
+fn gcv(points: &[PathPoint]) -> Option<usize> {
+    let scores = points.iter().enumerate().filter(|(_, p)| p.gcv.is_finite());
+    scores.min_by(|a, b| a.1.gcv.total_cmp(&b.1.gcv)).map(|(i, _)| i)
+}
+
+fn remark(
+    problem: &Problem,
+    rule: WeightRule,
+    index: Option<usize>,
+    points: &[PathPoint],
+) -> Option<String> {
+    match (rule, index) {
+        (WeightRule::Discrepancy, Some(0)) => Some(
+            "every weight on the path explains the readings, so the largest is taken: the data \
+             ask for no roughness at all"
+                .into(),
+        ),
+        (WeightRule::Discrepancy, None) => {
+            let least = points.iter().map(|p| p.misfit).fold(f64::INFINITY, f64::min);
+            Some(format!(
+                "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
+                 sigma may be too small, or the model cannot explain the readings",
+                largest_chi_square(problem)
+            ))
+        }
+        (rule, None) => Some(format!(
+            "the rule `{}` picks no weight on this path; the smallest is taken",
+            rule.name()
+        )),
+        _ => None,
+    }
+}
