@@ -48,6 +48,13 @@ impl Problem {
         }
     }
 
+    /// The misfit of no motion at all: what there is to explain.
+    pub fn misfit_of_silence(&self) -> f64 {
+        let silence = vec![0.0; self.oscillator.grid.nodes()];
+        let readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
+        readings.map(|r| r.cost(&silence)).sum()
+    }
+
     /// The same problem with only the first part of the readings, `share` of each record.
     #[must_use]
     pub fn first_part(&self, share: f64) -> Self {

@@ -115,7 +115,11 @@ impl Subproblem {
     pub fn solve(&self) -> Solution {
         // The cost at zero becomes 1: the tolerances mean the same for every problem.
         let at_zero = self.value(&vec![0.0; self.variables]);
-        let scale = if at_zero > 0.0 && at_zero.is_finite() { 1.0 / at_zero } else { 1.0 };
+        let scale = if at_zero > 0.0 && at_zero.is_finite() {
+            1.0 / at_zero
+        } else {
+            1.0
+        };
         let conic = self.conic(scale.sqrt());
         let n = self.variables + self.residuals.len() + self.absolute.len();
         let quadratic = self.quadratic(scale);
@@ -140,7 +144,10 @@ impl Subproblem {
         solver.solve();
         let found = &solver.solution;
         let mut solution = self.read(&found.x, &found.z, found.status, &conic);
-        let duals = solution.multipliers.iter_mut().chain(&mut solution.equality_multipliers);
+        let duals = solution
+            .multipliers
+            .iter_mut()
+            .chain(&mut solution.equality_multipliers);
         duals.for_each(|m| *m /= scale);
         solution
     }
@@ -184,7 +191,12 @@ impl Subproblem {
             let mut row: Vec<(usize, f64)> =
                 self.residuals.row(i).map(|(j, a)| (j, root * a)).collect();
             row.push((self.variables + i, -1.0));
-            conic.push(&row, root * self.residuals.right()[i], 1.0, Origin::Auxiliary);
+            conic.push(
+                &row,
+                root * self.residuals.right()[i],
+                1.0,
+                Origin::Auxiliary,
+            );
         }
         for i in 0..self.equalities.len() {
             let row: Vec<(usize, f64)> = self.equalities.row(i).collect();

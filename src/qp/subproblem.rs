@@ -78,7 +78,8 @@ impl Subproblem {
         if !self.absolute.is_empty() {
             return None;
         }
-        self.solve_plain_for(&[self.residuals.right().to_vec()])?.pop()
+        self.solve_plain_for(&[self.residuals.right().to_vec()])?
+            .pop()
     }
 
     /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
@@ -101,7 +102,9 @@ impl Subproblem {
             matrix.add(j, j, *d);
         }
         for i in 0..r {
-            self.residuals.row(i).for_each(|(j, a)| matrix.add(j, n + i, a));
+            self.residuals
+                .row(i)
+                .for_each(|(j, a)| matrix.add(j, n + i, a));
             matrix.add(n + i, n + i, -1.0);
         }
         for i in 0..e {

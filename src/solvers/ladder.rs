@@ -151,13 +151,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
 }
 
 fn explains(problem: &Problem, fit: &Fit) -> bool {
-    let silence = vec![0.0; problem.oscillator.grid.nodes()];
-    let readings = problem
-        .experiments
-        .iter()
-        .filter_map(|e| e.readings.as_ref());
-    let of_silence: f64 = readings.map(|r| r.cost(&silence)).sum();
-    fit.best.evaluation.misfit <= EXPLAINED * of_silence
+    fit.best.evaluation.misfit <= EXPLAINED * problem.misfit_of_silence()
 }
 
 fn run(

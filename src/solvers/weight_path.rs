@@ -80,7 +80,10 @@ impl Problem {
     #[must_use]
     pub fn with_penalty_factor(&self, factor: f64) -> Self {
         let mut problem = self.clone();
-        problem.penalties.iter_mut().for_each(|p| p.weight *= factor);
+        problem
+            .penalties
+            .iter_mut()
+            .for_each(|p| p.weight *= factor);
         problem
     }
 
@@ -118,13 +121,25 @@ pub fn choose_weight(
         }
     }
     refine_discrepancy(problem, &mut walk, &mut points)?;
-    let picks = [discrepancy(problem, &points), l_curve(&points), gcv(&points)];
-    let index = WeightRule::ALL.iter().position(|r| *r == rule).and_then(|i| picks[i]);
+    let picks = [
+        discrepancy(problem, &points),
+        l_curve(&points),
+        gcv(&points),
+    ];
+    let index = WeightRule::ALL
+        .iter()
+        .position(|r| *r == rule)
+        .and_then(|i| picks[i]);
     let remark = remark(problem, rule, index, &points);
     // Without a pick the weakest smoothing comes nearest to what the rule asks for.
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(points[chosen].weight);
-    let found = fit(&weighted, &points[chosen].parameters, &walk.settings, walk.observe)?;
+    let found = fit(
+        &weighted,
+        &points[chosen].parameters,
+        &walk.settings,
+        walk.observe,
+    )?;
     let path = WeightPath {
         points,
         picks,
@@ -149,7 +164,14 @@ impl Walk<'_> {
         let found = fit(&problem, &self.from, &self.settings, self.observe)?;
         // From here on every fit starts where its neighbour ended.
         self.settings.initial = Initial::Functions;
-        if std::env::var_os("GN_TRACE").is_some() { eprintln!("{weight:.2e} {:?} its {} {:?} {:?}", found.elapsed, found.history.len(), found.counts, found.outcome); }
+            eprintln!(
+                "{weight:.2e} {:?} its {} {:?} {:?}",
+                found.elapsed,
+                found.history.len(),
+                found.counts,
+                found.outcome
+            );
+        }
         self.last = Some(found.outcome.status);
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
@@ -171,17 +193,20 @@ impl Walk<'_> {
 }
 
 fn weights(problem: &Problem) -> Vec<f64> {
-    let silence = vec![0.0; problem.oscillator.grid.nodes()];
-    let readings = problem.experiments.iter().filter_map(|e| e.readings.as_ref());
-    let reference: f64 = readings.map(|r| r.cost(&silence)).sum();
+    let reference = problem.misfit_of_silence();
     let count = (DECADES * PER_DECADE) as i32 + 1;
     let factor = |i: i32| 10f64.powf(-f64::from(i) / PER_DECADE);
-    (0..count).map(|i| LARGEST * reference * factor(i)).collect()
+    (0..count)
+        .map(|i| LARGEST * reference * factor(i))
+        .collect()
 }
 
 fn roughness(problem: &Problem, theta: &[f64]) -> f64 {
     let ranges = problem.functions.ranges();
-    let each = problem.penalties.iter().map(|p| p.roughness(&theta[ranges[p.function].clone()]));
+    let each = problem
+        .penalties
+        .iter()
+        .map(|p| p.roughness(&theta[ranges[p.function].clone()]));
     each.sum()
 }
 
@@ -194,7 +219,11 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let mut sign = || if random.random_bool(0.5) { 1.0 } else { -1.0 };
     let probes: Vec<Vec<f64>> = (0..PROBES)
-        .map(|_| (0..rows).map(|i| if i < readings { sign() } else { 0.0 }).collect())
+        .map(|_| {
+            (0..rows)
+                .map(|i| if i < readings { sign() } else { 0.0 })
+                .collect()
+        })
         .collect();
     sub.homogeneous();
     let Some(solutions) = sub.solve_plain_for(&probes) else {
@@ -202,7 +231,12 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
     };
     let traces = solutions.iter().zip(&probes).map(|(z, probe)| {
         let fitted = sub.residuals.multiply(z);
-        fitted.iter().zip(probe).take(readings).map(|(a, b)| a * b).sum::<f64>()
+        fitted
+            .iter()
+            .zip(probe)
+            .take(readings)
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
     });
     traces.sum::<f64>() / PROBES as f64
 }
@@ -214,7 +248,10 @@ fn largest_chi_square(problem: &Problem) -> f64 {
 }
 
 fn has_sigma(problem: &Problem) -> bool {
-    let mut readings = problem.experiments.iter().filter_map(|e| e.readings.as_ref());
+    let mut readings = problem
+        .experiments
+        .iter()
+        .filter_map(|e| e.readings.as_ref());
     readings.all(|r| matches!(r.weighting(), Weighting::Sigma(_)))
 }
 
@@ -259,12 +296,16 @@ fn l_curve(points: &[PathPoint]) -> Option<usize> {
     };
     let turns = points.windows(3).map(curvature).enumerate();
     let finite = turns.filter(|(_, c)| c.is_finite() && *c > 0.0);
-    finite.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i + 1)
+    finite
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(i, _)| i + 1)
 }
 
 fn gcv(points: &[PathPoint]) -> Option<usize> {
     let scores = points.iter().enumerate().filter(|(_, p)| p.gcv.is_finite());
-    scores.min_by(|a, b| a.1.gcv.total_cmp(&b.1.gcv)).map(|(i, _)| i)
+    scores
+        .min_by(|a, b| a.1.gcv.total_cmp(&b.1.gcv))
+        .map(|(i, _)| i)
 }
 
 fn remark(
@@ -280,7 +321,10 @@ fn remark(
                 .into(),
         ),
         (WeightRule::Discrepancy, None) => {
-            let least = points.iter().map(|p| p.misfit).fold(f64::INFINITY, f64::min);
+            let least = points
+                .iter()
+                .map(|p| p.misfit)
+                .fold(f64::INFINITY, f64::min);
             Some(format!(
                 "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
                  sigma may be too small, or the model cannot explain the readings",

@@ -88,7 +88,11 @@ pub fn noisy(oscillator: &Oscillator, device: &Device, sigma: f64, seed: u64) ->
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let motion = oscillator.forward(device, INITIAL, None).unwrap();
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
-    motion.displacement.iter().map(|y| y + sigma * noise()).collect()
+    motion
+        .displacement
+        .iter()
+        .map(|y| y + sigma * noise())
+        .collect()
 }
 
 /// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
@@ -126,7 +130,9 @@ pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
     for (f, basis) in bases.iter().enumerate() {
         let Some(basis) = basis else { continue };
         let rows = basis.roughness(&grid, orders[f]);
-        problem.penalties.push(Penalty::new(f, orders[f], weight, rows));
+        problem
+            .penalties
+            .push(Penalty::new(f, orders[f], weight, rows));
         if positive {
             let low = if f == 0 { 0.05 } else { 0.0 };
             let mut group = RowGroup::new(format!("function {f} >= {low}"));
@@ -144,7 +150,13 @@ pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
 /// Largest distance of each function from the truth over the nodes, mass first.
 pub fn errors(found: &Device, truth: &Device) -> Vec<f64> {
     let largest = |(a, b): (&[f64], &[f64])| {
-        a.iter().zip(b).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()))
+        a.iter()
+            .zip(b)
+            .fold(0.0f64, |most, (a, b)| most.max((a - b).abs()))
     };
-    found.functions().zip(truth.functions()).map(largest).collect()
+    found
+        .functions()
+        .zip(truth.functions())
+        .map(largest)
+        .collect()
 }

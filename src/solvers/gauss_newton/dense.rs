@@ -8,7 +8,7 @@ use crate::qp::Subproblem;
 use nalgebra::{DMatrix, DVector};
 
 /// The subproblem in `delta theta`: `|R delta - b|^2` with the triangular factor `R` of the weighted
-/// Jacobian `sqrt(w) dy/dtheta`, which has the same minimiser and loses nothing but a constant.
+/// Jacobian `sqrt(w) dy/dtheta`, and the rest of the residuals as a row of its own.
 pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
     let n = problem.functions.parameters();
     let (jacobian, residuals) = weighted_jacobian(problem, evaluation);
@@ -26,6 +26,9 @@ pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
         let row = (0..n).map(|j| (j, r[(i, j)])).filter(|(_, a)| *a != 0.0);
         sub.residuals.push(row, -b[i]);
     }
+    // What no step can change, so that the subproblem's value is the whole linearised cost.
+    let rest = b.rows_range(r.nrows()..).norm();
+    sub.residuals.push([], rest);
     sub
 }
 

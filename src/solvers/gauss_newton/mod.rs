@@ -38,7 +38,9 @@ const NO_DECREASE: f64 = 1e-30;
 
 /// A predicted decrease below this share of J that does not come true is within the accuracy to
 /// which a quadratic program is solved.
-const ROUNDING: f64 = 1e-9;
+const PROGRAM_ACCURACY: f64 = 1e-9;
+/// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
+const MOTION_ROUNDING: f64 = 1000.0;
 /// A relative change of the functions below this is not a step but rounding.
 const SMALLEST_CHANGE: f64 = 1e-9;
 
@@ -130,7 +132,11 @@ impl GaussNewton {
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
 /// less than the rounding of the cost, or moves less than rounding moves the motion.
 fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<String> {
-    if proposal.predicted <= ROUNDING * point.evaluation.cost {
+    let cost = point.evaluation.cost;
+    // A motion that is off by its rounding changes a sum of squared residuals by their product.
+    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
+    let unseen = PROGRAM_ACCURACY * cost + 2.0 * rounding * cost.sqrt() + rounding * rounding;
+    if proposal.predicted <= unseen {
         return Some("the linearised cost cannot be lowered any further".into());
     }
     let device = problem.functions.device(&proposal.parameters);
@@ -232,7 +238,11 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
 /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
     let parameters = work.problem().functions.parameters();
-    work.count_tangents(if parameters <= FEW_PARAMETERS { parameters as u64 } else { 1 });
+    work.count_tangents(if parameters <= FEW_PARAMETERS {
+        parameters as u64
+    } else {
+        1
+    });
     linearise_at(work.problem(), point).0
 }
 
