@@ -3,6 +3,7 @@
 use super::Comparison;
 use super::measures::Measures;
 use super::run::ComparedRun;
+use super::table::short;
 use crate::dynamics::Device;
 use crate::functions::Ratios;
 use crate::report::figure::{Axis, Figure, Panel};
@@ -179,7 +180,7 @@ fn reaches(
         let (lowest, highest) = span(values, 0.0);
         let ends = [(lowest < low, lowest), (highest > high, highest)];
         let ends = ends.iter().filter(|(beyond, _)| *beyond);
-        let ends: Vec<String> = ends.map(|(_, x)| format!("{x:.1e} {unit}")).collect();
+        let ends: Vec<String> = ends.map(|(_, x)| format!("{} {unit}", short(*x))).collect();
         (!ends.is_empty()).then(|| format!("{} reaches {}", run.name, ends.join(" and ")))
     };
     let all: Vec<String> = runs.iter().zip(found).filter_map(one).collect();
@@ -310,7 +311,7 @@ mod tests {
     fn spikes_do_not_hide_the_rest() {
         let wave: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.1).sin()).collect();
         let truth = vec![vec![0.5; 1000]];
-        assert_eq!(without_spikes(&truth, &[wave.clone()]), None);
+        assert_eq!(without_spikes(&truth, std::slice::from_ref(&wave)), None);
         let mut spiked = wave.clone();
         spiked[77] = 1e6;
         let (low, high) = without_spikes(&truth, &[wave, spiked]).expect("a spike");

@@ -52,7 +52,7 @@ impl Cell {
 }
 
 /// A number with four digits.
-fn short(x: f64) -> String {
+pub(super) fn short(x: f64) -> String {
     let rounded = format!("{x:.3e}");
     let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse().ok());
     match exponent {
