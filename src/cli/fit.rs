@@ -3,8 +3,9 @@
 use super::progress::Progress;
 use super::{Failure, exit_code, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
+use crate::report::document::{Prediction, ResultDocument};
 use crate::report::{OutputFolder, Run, json, predict, summary};
-use crate::solvers::{Fit, fit};
+use crate::solvers::{Fit, Status, fit};
 use std::path::{Path, PathBuf};
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -31,27 +32,37 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }
-    let found = search(&model)?;
-    let predictions = predictions(&model, &found)?;
-    let run = Run {
-        model: &model,
-        fit: &found,
-        predictions: &predictions,
-    };
-    let document = run.document();
-    run.write(&folder, !arguments.no_report)
-        .map_err(|error| unwritable(folder.path(), &error))?;
+    let progress = Progress::new(model.settings.stopping.iterations);
+    let (document, status) = fit_into(&folder, &model, &progress, !arguments.no_report)?;
     if arguments.json {
         print(&json(&document));
     } else {
         print(&summary(&document));
         print(&format!("results in {}\n", folder.path().display()));
     }
-    Ok(exit_code(found.outcome.status))
+    Ok(exit_code(status))
 }
 
-fn search(model: &Model) -> Result<Fit, Failure> {
-    let progress = Progress::new(model.settings.stopping.iterations);
+/// Fits a model and writes everything that the run leaves behind into a folder.
+pub(super) fn fit_into(
+    folder: &OutputFolder,
+    model: &Model,
+    progress: &Progress,
+    with_figures: bool,
+) -> Result<(ResultDocument, Status), Failure> {
+    let found = search(model, progress)?;
+    let predictions = predictions(model, &found)?;
+    let run = Run {
+        model,
+        fit: &found,
+        predictions: &predictions,
+    };
+    run.write(folder, with_figures)
+        .map_err(|error| unwritable(folder.path(), &error))?;
+    Ok((run.document(), found.outcome.status))
+}
+
+fn search(model: &Model, progress: &Progress) -> Result<Fit, Failure> {
     let start = model.problem.functions.start();
     let result = fit(&model.problem, &start, &model.settings, &mut |row| {
         progress.show(row)
@@ -60,10 +71,7 @@ fn search(model: &Model) -> Result<Fit, Failure> {
     result.map_err(|breakdown| Failure::Numerical(format!("the start has no motion: {breakdown}")))
 }
 
-fn predictions(
-    model: &Model,
-    found: &Fit,
-) -> Result<Vec<crate::report::document::Prediction>, Failure> {
+fn predictions(model: &Model, found: &Fit) -> Result<Vec<Prediction>, Failure> {
     let motions = predict(
         &model.problem.oscillator,
         &found.best.evaluation.device,

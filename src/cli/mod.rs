@@ -1,6 +1,7 @@
 //! The command line: one file per command, no numerics.
 
 mod check;
+mod compare;
 mod fit;
 mod interrupt;
 mod predict;
@@ -28,6 +29,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Check(check::Arguments),
     Predict(predict::Arguments),
+    Compare(compare::Arguments),
 }
 
 /// Everything is as asked for.
@@ -62,6 +64,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
     };
     ExitCode::from(match result {
         Ok(code) => code,

@@ -12,11 +12,17 @@ impl Progress {
     /// A line for a run of at most `iterations`; hidden where standard error is no terminal.
     pub fn new(iterations: u64) -> Self {
         let bar = ProgressBar::new(iterations);
-        let template = "{bar:24} {pos}/{len}  {msg}  {elapsed} ({eta} left at most)";
+        let template = "{prefix}{bar:24} {pos}/{len}  {msg}  {elapsed} ({eta} left at most)";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         Self { bar }
+    }
+
+    /// Puts the name of the run before the line.
+    pub fn named(self, name: &str) -> Self {
+        self.bar.set_prefix(format!("{name}  "));
+        self
     }
 
     /// Shows an iteration.

@@ -6,8 +6,10 @@ use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
 use super::shape::{Frame, Sheet};
 
-/// Width of every figure in pixels: 180 mm, two columns of a journal.
-const WIDTH: f64 = 680.0;
+/// Width of a figure in pixels: 180 mm, two columns of a journal.
+pub(super) const WIDTH: f64 = 680.0;
+/// Width of a figure for a phone, where the wide one would be too small to read.
+pub(super) const NARROW: f64 = 380.0;
 /// Blank edge around everything.
 const EDGE: f64 = 8.0;
 /// Room right of the last column, for a tick label that reaches beyond its axis.
@@ -23,14 +25,14 @@ const ALONE: f64 = 320.0;
 const BESIDE: f64 = 260.0;
 const STACKED: f64 = 165.0;
 
-/// Draws a figure.
-pub(super) fn sheet(figure: &Figure) -> Sheet {
-    let grid = Grid::new(figure);
+/// Draws a figure, `width` pixels wide.
+pub(super) fn sheet(figure: &Figure, width: f64) -> Sheet {
+    let grid = Grid::new(figure, width);
     let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
     let columns = grid.columns(&rulers);
     let left = columns.first().map_or(EDGE, |column| column.left);
     let entries = legend::entries(figure);
-    let (mut shapes, height) = legend::draw(&entries, left, EDGE, WIDTH - RIGHT - EDGE - left);
+    let (mut shapes, height) = legend::draw(&entries, left, EDGE, width - RIGHT - EDGE - left);
     let mut top = EDGE + height + if height > 0.0 { 6.0 } else { 0.0 };
     for row in 0..grid.rows() {
         top += grid.title_height(row);
@@ -45,7 +47,7 @@ pub(super) fn sheet(figure: &Figure) -> Sheet {
         .last()
         .map_or(0.0, |column| column.left + column.width);
     Sheet {
-        width: (right + RIGHT + EDGE).max(WIDTH).ceil(),
+        width: (right + RIGHT + EDGE).max(width).ceil(),
         height: (top + EDGE).ceil(),
         shapes,
     }
@@ -63,6 +65,7 @@ struct Column {
 
 /// The panels in rows and columns, with their ranges.
 struct Grid<'a> {
+    width: f64,
     panels: &'a [Panel],
     columns: usize,
     x: Vec<Option<Range>>,
@@ -70,13 +73,14 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(figure: &'a Figure) -> Self {
+    fn new(figure: &'a Figure, width: f64) -> Self {
         let panels = figure.panels.as_slice();
         let x =
             |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.x_values()).collect() };
         let y =
             |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.y_values()).collect() };
         Self {
+            width,
             panels,
             columns: figure.columns.clamp(1, panels.len().max(1)),
             x: panels
@@ -158,7 +162,7 @@ impl<'a> Grid<'a> {
             *label = label.max(label_width(ruler, self.y_labels(index)));
         }
         let gaps = COLUMN_GAP * (self.columns - 1) as f64;
-        let room = WIDTH - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
+        let room = self.width - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
         let width = (room / self.columns as f64).max(NARROWEST);
         let mut left = EDGE;
         let mut columns = Vec::new();

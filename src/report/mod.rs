@@ -17,6 +17,7 @@
 //! ```
 
 mod axis;
+pub mod compare;
 mod csv;
 mod curve;
 pub mod document;
@@ -24,6 +25,7 @@ pub mod figure;
 pub mod figures;
 mod files;
 mod finished;
+mod html;
 mod layout;
 mod legend;
 pub mod mark;
@@ -35,6 +37,7 @@ mod summary;
 pub mod svg;
 mod text;
 
+pub use compare::Comparison;
 pub use csv::CsvTable;
 pub use figure::{Axis, Figure, Panel, Scale};
 pub use files::{OutputFolder, write_whole};
@@ -43,4 +46,4 @@ pub use mark::{Colour, Dash, Mark, Style};
 pub use predict::{PredictedMotion, predict};
 pub use run::{Run, json};
 pub use summary::{prediction_table, summary};
-pub use svg::render;
+pub use svg::{render, render_narrow};

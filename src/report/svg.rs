@@ -11,7 +11,7 @@ use plotters::style::{ShapeStyle, TextStyle};
 
 use super::figure::Figure;
 use super::layout;
-use super::mark::Dash;
+use super::mark::{Dash, Style};
 use super::shape::{Anchor, Ink, Point, Shape, Sheet, Stroke, Words};
 use super::text;
 
@@ -25,11 +25,19 @@ const FONT: f64 = 1.24;
 /// The same figure always gives the same bytes. Title and description stand in `<title>` and
 /// `<desc>`; all text is escaped.
 pub fn render(figure: &Figure) -> String {
-    let sheet = layout::sheet(figure);
-    let mut svg = head(figure, &sheet);
+    render_sheet(figure, &layout::sheet(figure, layout::WIDTH))
+}
+
+/// The same figure for a narrow screen: 380 pixels wide, its text as large as in [`render`].
+pub fn render_narrow(figure: &Figure) -> String {
+    render_sheet(figure, &layout::sheet(figure, layout::NARROW))
+}
+
+fn render_sheet(figure: &Figure, sheet: &Sheet) -> String {
+    let mut svg = head(figure, sheet);
     for group in sheet.shapes.chunk_by(|a, b| common(a) == common(b)) {
         let common = common(&group[0]);
-        let content = shorten(&round_sizes(&draw(group, &sheet)), &common);
+        let content = shorten(&round_sizes(&draw(group, sheet)), &common);
         svg.push_str(&format!(
             "<g stroke-linejoin=\"round\"{common}>\n{content}</g>\n"
         ));
@@ -184,4 +192,15 @@ fn round_sizes(svg: &str) -> String {
         rounded.push_str(&format!("{KEY}{size}\"{rest}"));
     }
     rounded
+}
+
+/// A short line in a style as a small drawing for the text of a page, where it stands for a run.
+pub(super) fn sample(style: &Style) -> String {
+    let Ink { rgb, .. } = Ink::of(style.colour);
+    let (r, g, b) = rgb;
+    format!(
+        "<svg aria-hidden=\"true\" viewBox=\"0 0 400 100\"><path d=\"M0 50H400\" fill=\"none\" \
+         stroke=\"#{r:02X}{g:02X}{b:02X}\" stroke-width=\"26\"{}/></svg>",
+        pattern(style.dash)
+    )
 }

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod check;
+mod compare;
 mod data_files;
 mod ending;
 mod models;

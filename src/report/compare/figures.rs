@@ -1,0 +1,337 @@
+//! The overlaid figures: every run in its own look, on its own times.
+
+use super::Comparison;
+use super::measures::Measures;
+use super::run::ComparedRun;
+use super::table::short;
+use crate::dynamics::Device;
+use crate::functions::Ratios;
+use crate::report::figure::{Axis, Figure, Panel};
+use crate::report::mark::{Colour, Dash, Mark, Style};
+
+/// The colours of runs; black and grey are left to the truth.
+const COLOURS: [Colour; 6] = [
+    Colour::Blue,
+    Colour::Vermillion,
+    Colour::Green,
+    Colour::Purple,
+    Colour::Orange,
+    Colour::Sky,
+];
+
+/// Truths that differ by less than this share of their size are one and the same on two grids.
+const SAME_TRUTH: f64 = 2e-3;
+
+/// The look of run `index` in all figures: 24 runs differ in colour or dash pattern.
+pub(super) fn style(index: usize) -> Style {
+    let colour = COLOURS[index % COLOURS.len()];
+    let dash = Dash::nth(index + index / 12);
+    // Dots need more ink to be seen.
+    let width = if dash == Dash::Dotted { 2.2 } else { 1.6 };
+    Style::new(colour).dash(dash).width(width)
+}
+
+/// All figures of a comparison.
+pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
+    let runs = &comparison.runs;
+    let mut figures = vec![
+        functions(runs, &comparison.measures),
+        ratios(runs, &comparison.measures),
+    ];
+    figures.extend(residuals(runs, &comparison.measures));
+    figures.extend(convergence(runs, &comparison.measures));
+    figures
+}
+
+fn time() -> Axis {
+    Axis::linear("time t", "s")
+}
+
+/// A curve of each device: its caption, its unit, its values.
+type Curve = (&'static str, &'static str, fn(&Device) -> Vec<f64>);
+
+fn functions(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
+    let curves: [Curve; 3] = [
+        ("mass m", "kg", |d| d.mass.clone()),
+        ("damping c", "N s/m", |d| d.coefficients[0].clone()),
+        ("stiffness k", "N/m", |d| d.coefficients[1].clone()),
+    ];
+    let errors = list(measures, |m| {
+        let e = m.errors?;
+        let (m, c, k) = (e.mass, e.damping, e.stiffness);
+        Some(format!("m {m:.1e} kg, c {c:.1e} N s/m, k {k:.1e} N/m"))
+    });
+    let figure = Figure::new(
+        "functions",
+        "Mass, damping and stiffness",
+        format!(
+            "Three panels, one above the other: mass, damping and stiffness of each run against \
+             time{}",
+            over_the_truth(&errors)
+        ),
+    );
+    overlay(figure, runs, &curves)
+}
+
+fn ratios(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
+    let curves: [Curve; 2] = [
+        ("k/m", "s⁻²", |d| Ratios::of(d).k_over_m),
+        ("c/m", "s⁻¹", |d| Ratios::of(d).c_over_m),
+    ];
+    let errors = list(measures, |m| {
+        let e = m.errors?;
+        let (k, c) = (e.k_over_m, e.c_over_m);
+        Some(format!("k/m {k:.1e} per s², c/m {c:.1e} per s"))
+    });
+    let figure = Figure::new(
+        "ratios",
+        "What a free motion shows: k/m and c/m",
+        format!(
+            "Two panels, one above the other: stiffness over mass and damping over mass of each \
+             run against time{}",
+            over_the_truth(&errors)
+        ),
+    );
+    overlay(figure, runs, &curves)
+}
+
+fn over_the_truth(errors: &str) -> String {
+    match errors {
+        "" => ".".into(),
+        errors => format!(", the truth as a thick grey line below them. Largest errors: {errors}."),
+    }
+}
+
+/// `name: text; name: text` for the runs that have a text.
+fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> String {
+    let one = |m: &Measures| Some(format!("{}: {}", m.name, of(m)?));
+    let all: Vec<String> = measures.iter().filter_map(one).collect();
+    all.join("; ")
+}
+
+fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
+    let truths = truths(runs);
+    curves.iter().fold(figure, |figure, (label, unit, of)| {
+        let found: Vec<Vec<f64>> = runs.iter().map(|run| of(&run.finished.device)).collect();
+        let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
+        let mut axis = Axis::linear(*label, *unit);
+        let mut beyond = String::new();
+        if let Some((low, high)) = without_spikes(&real, &found) {
+            axis = axis.limits(low, high);
+            beyond = format!("cut off: {}", reaches(runs, &found, (low, high), unit));
+        }
+        let mut panel = Panel::new(time(), axis).title(beyond);
+        for ((label, run, _), values) in truths.iter().zip(&real) {
+            let thick = Style::new(Colour::Grey).width(5.0);
+            panel = panel.mark(Mark::line(label, &run.times(), values, thick));
+        }
+        for (i, (run, values)) in runs.iter().zip(&found).enumerate() {
+            panel = panel.mark(Mark::line(&run.name, &run.times(), values, style(i)));
+        }
+        figure.panel(panel)
+    })
+}
+
+/// Share of the nodes at either end of the values of a run that may be spikes.
+const SPIKES: f64 = 0.03;
+/// Spikes that take more than this many times the room of everything else are cut off: what the
+/// figure is for would be a flat line.
+const ROOM: f64 = 3.0;
+
+/// What stays within this share of its size is flat to the eye.
+const FLAT: f64 = 0.1;
+
+/// The range to be shown where a few nodes of some runs would hide everything else; all of `real`
+/// is in it. `None` where everything can be shown.
+fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
+    let empty = (f64::INFINITY, f64::NEG_INFINITY);
+    let union = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let spans = |skip: f64| found.iter().map(move |f| span(f, skip)).fold(empty, union);
+    let truth = real.iter().map(|f| span(f, 0.0)).fold(empty, union);
+    let (all, most) = (union(truth, spans(0.0)), union(truth, spans(SPIKES)));
+    let room = most.1 - most.0;
+    // Where the rest is constant, its own size is its room.
+    let room = room.max(FLAT * most.0.abs().max(most.1.abs()));
+    let pad = 0.25 * room;
+    let hidden = all.1 - all.0 > ROOM * room && room > 0.0;
+    hidden.then_some((all.0.max(most.0 - pad), all.1.min(most.1 + pad)))
+}
+
+/// Lowest and highest finite value, without a share of the values at either end.
+fn span(f: &[f64], skip: f64) -> (f64, f64) {
+    let mut sorted: Vec<f64> = f.iter().copied().filter(|x| x.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let skipped = (skip * sorted.len() as f64) as usize;
+    let kept = &sorted[skipped..sorted.len() - skipped];
+    match (kept.first(), kept.last()) {
+        (Some(low), Some(high)) => (*low, *high),
+        _ => (f64::INFINITY, f64::NEG_INFINITY),
+    }
+}
+
+/// Which runs leave the range, and how far they go.
+fn reaches(
+    runs: &[ComparedRun],
+    found: &[Vec<f64>],
+    (low, high): (f64, f64),
+    unit: &str,
+) -> String {
+    let one = |(run, values): (&ComparedRun, &Vec<f64>)| {
+        let (lowest, highest) = span(values, 0.0);
+        let ends = [(lowest < low, lowest), (highest > high, highest)];
+        let ends = ends.iter().filter(|(beyond, _)| *beyond);
+        let ends: Vec<String> = ends.map(|(_, x)| format!("{} {unit}", short(*x))).collect();
+        (!ends.is_empty()).then(|| format!("{} reaches {}", run.name, ends.join(" and ")))
+    };
+    let all: Vec<String> = runs.iter().zip(found).filter_map(one).collect();
+    all.join(", ")
+}
+
+/// The true devices, each once, with its label and the run whose grid it is on.
+fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &Device)> {
+    let mut found: Vec<(&ComparedRun, &Device)> = Vec::new();
+    for run in runs {
+        let Some(truth) = &run.finished.truth else {
+            continue;
+        };
+        if !found
+            .iter()
+            .any(|(other, known)| same(other, known, run, truth))
+        {
+            found.push((run, truth));
+        }
+    }
+    let several = found.len() > 1;
+    let label = |run: &ComparedRun| match several {
+        true => format!("truth of {}", run.name),
+        false => "truth".to_string(),
+    };
+    found
+        .into_iter()
+        .map(|(run, truth)| (label(run), run, truth))
+        .collect()
+}
+
+/// Whether two true devices agree at the nodes of the second that the first covers.
+fn same(run: &ComparedRun, one: &Device, other_run: &ComparedRun, other: &Device) -> bool {
+    let grid = &run.finished.oscillator.grid;
+    let close = |f: &[f64], g: &[f64]| {
+        let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);
+        other_run.times().iter().zip(g).all(|(t, value)| {
+            let place = (t - grid.start()) / grid.step();
+            interpolate(f, place).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
+        })
+    };
+    one.functions()
+        .zip(other.functions())
+        .all(|(f, g)| close(f, g))
+}
+
+/// The value between two nodes; `None` outside.
+fn interpolate(f: &[f64], place: f64) -> Option<f64> {
+    let i = place.floor();
+    if i < 0.0 || i + 1.0 >= f.len() as f64 {
+        return None;
+    }
+    let (i, share) = (i as usize, place - i);
+    Some(f[i] + share * (f[i + 1] - f[i]))
+}
+
+/// The residuals of the measured motions, one panel for each name of an experiment.
+fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
+    let mut names: Vec<&str> = Vec::new();
+    for motion in runs.iter().flat_map(|run| &run.motions) {
+        if !names.contains(&motion.experiment.as_str()) {
+            names.push(&motion.experiment);
+        }
+    }
+    let misfits = list(measures, |m| Some(format!("J/J0 {:.1e}", m.cost_ratio)));
+    let figure = Figure::new(
+        "residuals",
+        "What is left of the measured motion",
+        format!("Fitted minus measured displacement of each run against time. {misfits}."),
+    );
+    let panels = names.iter().map(|name| {
+        let axis = Axis::linear("y − y_obs", "m");
+        let title = if names.len() > 1 { *name } else { "" };
+        let zero = Mark::horizontal("", 0.0, Style::new(Colour::Grey).width(0.8));
+        let panel = Panel::new(time(), axis).title(title).mark(zero);
+        runs.iter().enumerate().fold(panel, |panel, (i, run)| {
+            let motions = run.motions.iter().filter(|m| m.experiment == *name);
+            motions.fold(panel, |panel, m| {
+                let style = style(i).width(1.2);
+                panel.mark(Mark::line(&run.name, &m.times, &m.residual, style))
+            })
+        })
+    });
+    (!names.is_empty()).then(|| panels.fold(figure, Figure::panel))
+}
+
+/// `J/J0` against the iteration, both logarithmic, so that iteration 0 is not shown.
+fn convergence(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
+    let ends = list(measures, |m| {
+        Some(format!(
+            "{:.1e} after {} iterations",
+            m.cost_ratio, m.iterations
+        ))
+    });
+    let panel = Panel::new(Axis::log("iteration", ""), Axis::log("cost J/J₀", ""));
+    let panel = runs.iter().enumerate().fold(panel, |panel, (i, run)| {
+        panel.mark(Mark::line(
+            &run.name,
+            &run.iterations,
+            &run.cost_ratio,
+            style(i),
+        ))
+    });
+    let some = runs.iter().any(|run| !run.iterations.is_empty());
+    some.then(|| {
+        Figure::new(
+            "convergence",
+            "Convergence of J/J₀",
+            format!("Cost over its first value against the iteration, both logarithmic. {ends}."),
+        )
+        .panel(panel)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twenty_four_runs_look_different() {
+        let styles: Vec<Style> = (0..24).map(style).collect();
+        for (i, one) in styles.iter().enumerate() {
+            assert!(!styles[..i].contains(one), "{i}");
+        }
+    }
+
+    #[test]
+    fn spikes_do_not_hide_the_rest() {
+        let wave: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.1).sin()).collect();
+        let truth = vec![vec![0.5; 1000]];
+        assert_eq!(without_spikes(&truth, std::slice::from_ref(&wave)), None);
+        let mut spiked = wave.clone();
+        spiked[77] = 1e6;
+        let (low, high) = without_spikes(&truth, &[wave, spiked]).expect("a spike");
+        assert!(
+            (-1.6..=-0.9).contains(&low) && (1.0..2.0).contains(&high),
+            "{low} {high}"
+        );
+    }
+
+    #[test]
+    fn what_is_real_is_never_cut_off() {
+        let mut jump = vec![1.0; 1000];
+        jump[500] = 50.0;
+        assert_eq!(without_spikes(&[jump], &[vec![1.0; 1000]]), None);
+    }
+
+    #[test]
+    fn interpolation_keeps_inside() {
+        assert_eq!(interpolate(&[1.0, 3.0], 0.5), Some(2.0));
+        assert_eq!(interpolate(&[1.0, 3.0], 1.5), None);
+        assert_eq!(interpolate(&[1.0, 3.0], -0.5), None);
+    }
+}

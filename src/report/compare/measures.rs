@@ -1,0 +1,255 @@
+//! What is compared: the numbers of one run.
+
+use super::run::ComparedRun;
+use super::verdict;
+use crate::dynamics::Device;
+use crate::functions::Ratios;
+use crate::report::document::Prediction;
+use serde::Serialize;
+
+/// The numbers of one run, and what they mean in one line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measures {
+    /// What the comparison calls the run.
+    pub name: String,
+    /// Title of the model.
+    pub title: String,
+    /// How the run ended, in one word.
+    pub status: String,
+    /// How the run ended, in one sentence.
+    pub reason: String,
+    /// What the numbers mean, in one line.
+    pub verdict: String,
+    /// Whether the truth is known, and reached in `k/m` and `c/m`.
+    pub true_device: Option<bool>,
+    /// Solver.
+    pub method: String,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of free parameters.
+    pub parameters: usize,
+    /// Part of J from the readings, in `misfit_unit`.
+    pub misfit: f64,
+    /// `m^2 s`; `1` for a chi-square.
+    pub misfit_unit: &'static str,
+    /// `J/J0`.
+    pub cost_ratio: f64,
+    /// Iterations of the solver.
+    pub iterations: u64,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+    /// Distances from the truth, where it is known.
+    pub errors: Option<Errors>,
+    /// Smallest mass at a node, kg.
+    pub smallest_mass: f64,
+    /// Smallest damping at a node, N s/m.
+    pub smallest_damping: f64,
+    /// Largest violation of a constraint relative to its scale.
+    pub max_violation: Option<f64>,
+    /// How rough the functions are.
+    pub roughness: Roughness,
+    /// The motion from other initial states.
+    pub predictions: Vec<Prediction>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Measures {
+    /// The numbers of a run.
+    pub fn of(run: &ComparedRun) -> Self {
+        let document = &run.finished.document;
+        let device = &run.finished.device;
+        let errors = (run.finished.truth.as_ref()).map(|truth| Errors::of(device, truth));
+        Self {
+            name: run.name.clone(),
+            title: document.title.clone(),
+            status: document.outcome.status.clone(),
+            reason: document.outcome.reason.clone(),
+            verdict: verdict::verdict(run, errors.as_ref()),
+            true_device: errors.as_ref().map(Errors::within_truth),
+            method: document.model.method.clone(),
+            nodes: document.model.nodes,
+            parameters: document.model.parameters,
+            misfit: document.cost.misfit,
+            misfit_unit: match verdict::is_chi_square(document) {
+                true => "1",
+                false => "m^2 s",
+            },
+            cost_ratio: document.cost.ratio,
+            iterations: document.counts.iterations,
+            seconds: document.seconds,
+            errors,
+            smallest_mass: smallest(&device.mass),
+            smallest_damping: smallest(&device.coefficients[0]),
+            max_violation: run.max_violation,
+            roughness: Roughness::of(device, run.finished.oscillator.grid.step()),
+            predictions: document.predictions.clone(),
+            warnings: document.warnings.clone(),
+        }
+    }
+}
+
+/// Largest distances from the truth over the nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Errors {
+    /// Of the mass, kg.
+    pub mass: f64,
+    /// Of the damping, N s/m.
+    pub damping: f64,
+    /// Of the stiffness, N/m.
+    pub stiffness: f64,
+    /// Of `k/m`, 1/s^2.
+    pub k_over_m: f64,
+    /// Of `c/m`, 1/s.
+    pub c_over_m: f64,
+    /// Of the mass, relative to the largest true mass.
+    pub mass_relative: f64,
+    /// Of `k/m`, relative to the largest true `|k/m|`.
+    pub k_over_m_relative: f64,
+    /// Of `c/m`, relative to the largest true `|c/m|`; where that is below
+    /// [`RECOVERED`](super::RECOVERED) of critical damping `2 sqrt(k/m)`, relative to the latter.
+    pub c_over_m_relative: f64,
+    /// Whether `c_over_m_relative` is relative to critical damping.
+    pub undamped: bool,
+}
+
+impl Errors {
+    /// The distances of `device` from `truth`, on the same grid.
+    pub fn of(device: &Device, truth: &Device) -> Self {
+        let (found, real) = (Ratios::of(device), Ratios::of(truth));
+        let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
+        let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);
+        let mass = largest_error(&device.mass, &truth.mass);
+        let stiffness_scale = largest(&real.k_over_m);
+        let critical = 2.0 * stiffness_scale.sqrt();
+        let undamped = largest(&real.c_over_m) < super::RECOVERED * critical;
+        let damping_scale = match undamped {
+            true => critical,
+            false => largest(&real.c_over_m),
+        };
+        let relative = |error: f64, scale: f64| if error == 0.0 { 0.0 } else { error / scale };
+        Self {
+            mass,
+            damping: largest_error(&device.coefficients[0], &truth.coefficients[0]),
+            stiffness: largest_error(&device.coefficients[1], &truth.coefficients[1]),
+            k_over_m,
+            c_over_m,
+            mass_relative: relative(mass, largest(&truth.mass)),
+            k_over_m_relative: relative(k_over_m, stiffness_scale),
+            c_over_m_relative: relative(c_over_m, damping_scale),
+            undamped,
+        }
+    }
+
+    /// Whether `k/m` and `c/m` are the true ones to [`RECOVERED`](super::RECOVERED).
+    pub fn within_truth(&self) -> bool {
+        self.within(super::RECOVERED)
+    }
+
+    /// Whether `k/m` and `c/m` are the true ones to a relative tolerance.
+    pub fn within(&self, tolerance: f64) -> bool {
+        self.k_over_m_relative < tolerance && self.c_over_m_relative < tolerance
+    }
+}
+
+/// `integral (m'')^2 dt`, `integral (c')^2 dt`, `integral (k')^2 dt` by differences of the values at
+/// the nodes, whatever the basis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Roughness {
+    /// `integral (m'')^2 dt`, kg^2/s^3.
+    pub mass: f64,
+    /// `integral (c')^2 dt`, N^2 s/m^2.
+    pub damping: f64,
+    /// `integral (k')^2 dt`, N^2/(m^2 s).
+    pub stiffness: f64,
+}
+
+impl Roughness {
+    /// The roughness of a device on a grid with this step, s.
+    pub fn of(device: &Device, step: f64) -> Self {
+        let slope = |f: &[f64]| -> f64 {
+            let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
+            squares.sum::<f64>() * step
+        };
+        let curvature = |f: &[f64]| -> f64 {
+            let second = |w: &[f64]| ((w[0] - 2.0 * w[1] + w[2]) / step / step).powi(2);
+            f.windows(3).map(second).sum::<f64>() * step
+        };
+        Self {
+            mass: curvature(&device.mass),
+            damping: slope(&device.coefficients[0]),
+            stiffness: slope(&device.coefficients[1]),
+        }
+    }
+}
+
+fn smallest(f: &[f64]) -> f64 {
+    f.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn largest(f: &[f64]) -> f64 {
+    f.iter().map(|x| x.abs()).fold(0.0, f64::max)
+}
+
+/// Largest distance; infinite where a ratio is not finite, because the mass is zero there.
+fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
+    let distance = |(a, b): (&f64, &f64)| {
+        let distance = (a - b).abs();
+        if distance.is_nan() {
+            f64::INFINITY
+        } else {
+            distance
+        }
+    };
+    found.iter().zip(truth).map(distance).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(mass: &[f64], damping: f64, stiffness: f64) -> Device {
+        let constant = |value| vec![value; mass.len()];
+        Device {
+            mass: mass.to_vec(),
+            coefficients: vec![constant(damping), constant(stiffness)],
+        }
+    }
+
+    /// m = t^2 on [0, 1]: (m'')^2 = 4, counted at the inner nodes.
+    #[test]
+    fn roughness_of_a_parabola() {
+        let step = 1e-3;
+        let mass: Vec<f64> = (0..=1000)
+            .map(|i| 1.0 + (i as f64 * step).powi(2))
+            .collect();
+        let found = Roughness::of(&device(&mass, 0.3, 1.0), step);
+        assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
+        assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_common_factor_is_the_same_device() {
+        let truth = device(&[1.0, 0.5, 0.8], 0.1, 1.0);
+        let doubled = device(&[2.0, 1.0, 1.6], 0.2, 2.0);
+        let errors = Errors::of(&doubled, &truth);
+        assert!(errors.within_truth() && !errors.undamped);
+        assert_eq!(errors.mass_relative, 1.0);
+    }
+
+    #[test]
+    fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
+        let truth = device(&[1.0, 1.0], 0.0, 1.0);
+        let errors = Errors::of(&device(&[1.0, 1.0], 0.02, 1.0), &truth);
+        assert!(errors.undamped);
+        assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
+        assert!(!errors.within_truth());
+    }
+
+    #[test]
+    fn a_device_without_mass_is_no_true_device() {
+        let truth = device(&[1.0, 1.0], 0.0, 1.0);
+        let errors = Errors::of(&device(&[1.0, 0.0], 0.0, 1.0), &truth);
+        assert!(!errors.within_truth());
+    }
+}

@@ -1,0 +1,133 @@
+//! The comparison as a page.
+
+use super::figures::{self, style};
+use super::measures::Measures;
+use super::table::{Row, known_rows};
+use super::{CLOSE, Comparison, MATCHED, RECOVERED};
+use crate::report::html;
+use crate::report::mark::Style;
+use crate::report::svg::sample;
+use crate::report::text::escape;
+
+pub(super) fn page(comparison: &Comparison) -> String {
+    let count = comparison.measures.len() + comparison.left_out.len();
+    let title = match count {
+        1 => "One run".to_string(),
+        count => format!("Comparison of {count} runs"),
+    };
+    let mut body = format!("<p>{}</p>\n", escape(&lead(comparison)));
+    body += "<h2>What each run means</h2>\n";
+    for (i, run) in comparison.measures.iter().enumerate() {
+        body += &card(run, style(i));
+    }
+    for left_out in &comparison.left_out {
+        body += &format!(
+            "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">left out: {}</p>\n</section>\n",
+            escape(&left_out.name),
+            escape(&left_out.reason)
+        );
+    }
+    body += "<h2>In numbers</h2>\n";
+    body += &table(&comparison.measures);
+    body += &format!("<p class=\"soft\">{}</p>\n", escape(&notes()));
+    body += "<h2>In pictures</h2>\n";
+    for figure in figures::all(comparison) {
+        body += &html::figure(&figure);
+    }
+    body += &format!(
+        "<p class=\"soft\">Made by kmcfit {}.</p>\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    html::page(&title, &body)
+}
+
+/// What the reader takes away.
+fn lead(comparison: &Comparison) -> String {
+    let runs = &comparison.measures;
+    let known = runs.iter().filter(|m| m.true_device.is_some()).count();
+    let reached = runs.iter().filter(|m| m.true_device == Some(true)).count();
+    match (known, reached) {
+        (0, _) => "No run names a truth to be compared with.".into(),
+        (1, 0) => "The run that names the truth does not reach it.".into(),
+        (1, _) => "The run that names the truth reaches it.".into(),
+        (_, 0) => format!("None of the {known} runs that name the truth reaches it."),
+        _ if known == reached => format!("All {known} runs that name the truth reach it."),
+        _ => format!(
+            "{reached} of the {known} runs that name the truth reach{} it.",
+            match reached {
+                1 => "es",
+                _ => "",
+            }
+        ),
+    }
+}
+
+fn notes() -> String {
+    format!(
+        "Errors are the largest over the nodes of each run's own grid. The true device is one whose \
+         k/m and c/m are right to {RECOVERED:e} of their largest true values (c/m of critical damping \
+         where the truth has no damping), a close one to {} %. A motion without a sigma is matched \
+         when at most {} % of it is left. Only k/m and c/m show in free motion: a common factor of \
+         m, c and k does not.",
+        100.0 * CLOSE,
+        100.0 * MATCHED
+    )
+}
+
+fn card(run: &Measures, look: Style) -> String {
+    let mut text = format!(
+        "<section class=\"run\">\n<h3>{} {}</h3>\n<p>{}</p>\n<p class=\"verdict\">{}</p>\n\
+         <p class=\"soft\">{}: {}</p>\n",
+        sample(&look),
+        escape(&run.name),
+        escape(&run.title),
+        escape(&capital(&run.verdict)),
+        escape(&run.status),
+        escape(&run.reason),
+    );
+    for warning in &run.warnings {
+        text += &format!("<p class=\"soft\">warning: {}</p>\n", escape(warning));
+    }
+    text + "</section>\n"
+}
+
+/// The text with a capital letter in front.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}
+
+fn table(runs: &[Measures]) -> String {
+    let mut text =
+        String::from("<div class=\"scroll\" tabindex=\"0\">\n<table>\n<thead>\n<tr><td></td>");
+    for (i, run) in runs.iter().enumerate() {
+        let (sample, name) = (sample(&style(i)), escape(&run.name));
+        text += &format!("<th scope=\"col\">{sample} {name}</th>");
+    }
+    text += "</tr>\n</thead>\n<tbody>\n";
+    known_rows(runs)
+        .iter()
+        .for_each(|row| text += &table_row(row));
+    text + "</tbody>\n</table>\n</div>\n"
+}
+
+fn table_row(row: &Row) -> String {
+    let part = if row.label.starts_with(' ') {
+        " class=\"part\""
+    } else {
+        ""
+    };
+    let label = escape(row.label.trim_start()).replace("= -", "= −");
+    let cells = row.cells.iter().map(|cell| {
+        let text = escape(&cell.short()).replace('-', "−");
+        match cell {
+            super::table::Cell::Text(text) => format!("<td>{}</td>", escape(text)),
+            _ => format!("<td>{text}</td>"),
+        }
+    });
+    let cells: String = cells.collect();
+    format!("<tr><th scope=\"row\"{part}>{label}</th>{cells}</tr>\n")
+}

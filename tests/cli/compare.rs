@@ -1,0 +1,539 @@
+//! `kmcfit compare`.
+
+use crate::workbench::Workbench;
+use insta::assert_snapshot;
+use roxmltree::{Document, Node, ParsingOptions};
+use serde_json::Value;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+/// A model of the damped device below: `functions` and `fit` as given.
+fn model(title: &str, nodes: usize, functions: &str, fit: &str) -> String {
+    format!(
+        "format: 1
+title: {title}
+experiments:
+  - name: free decay
+    data: readings.csv
+    columns: {{time: t_s, displacement: y_m}}
+    initial: {{displacement: 1.0, velocity: 0.5}}
+grid: {{nodes: {nodes}, method: midpoint}}
+functions:
+{functions}
+fit: {fit}
+truth: {{data: truth.csv}}
+predict:
+  - {{displacement: 0.0, velocity: 1.0}}
+"
+    )
+}
+
+const DEVICE: &str = "format: 1
+experiments:
+  - initial: {displacement: 1.0, velocity: 0.5}
+grid: {nodes: 200, method: midpoint, duration: 10.0}
+functions:
+  mass: {fixed: 1.0}
+  damping: {fixed: 0.1}
+  stiffness: {fixed: 1.0}
+";
+
+const CONSTANTS: &str = "  mass: {fixed: 1.0}
+  damping: {basis: constant, start: 0.3}
+  stiffness: {basis: constant, start: 1.2}";
+
+const TWICE: &str = "  mass: {fixed: 2.0}
+  damping: {basis: constant, start: 0.3}
+  stiffness: {basis: constant, start: 1.5}";
+
+const FREE: &str = "  mass: {basis: nodal, start: 2.0}
+  damping: {basis: nodal, start: 1.0}
+  stiffness: {basis: nodal, start: 1.0}";
+
+const TO_THE_END: &str = "{method: lbfgs, stop: {iterations: 200, cost_ratio: 1e-12}}";
+const LOOSE: &str = "{method: lbfgs, stop: {iterations: 400, cost_ratio: 1e-6}}";
+
+/// Readings of a damped device with 200 nodes over 10 s, its truth, and models of it:
+/// `constants`, `twice` the mass, and one value per step in `free`.
+fn bench() -> Workbench {
+    let bench = Workbench::empty();
+    bench.write("device.yaml", DEVICE);
+    bench.run_to(0, &["simulate", "device.yaml", "--out", "readings.csv"]);
+    bench.write(
+        "truth.csv",
+        "t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m\n0,1,0.1,1\n10,1,0.1,1\n",
+    );
+    let write = |name: &str, text: &str| bench.write(&format!("{name}.yaml"), text);
+    write("constants", &model("Constants", 200, CONSTANTS, TO_THE_END));
+    write("twice", &model("Twice the mass", 200, TWICE, TO_THE_END));
+    write("free", &model("One value per step", 200, FREE, LOOSE));
+    bench
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON")
+}
+
+/// The rows of a CSV file as maps from header to field.
+fn records(text: &str) -> Vec<std::collections::BTreeMap<String, String>> {
+    // The quoting is undone by a reader that knows nothing of the program.
+    let lines = text.lines().map(|line| {
+        let (mut fields, mut quoted) = (vec![String::new()], false);
+        let mut letters = line.chars().peekable();
+        while let Some(c) = letters.next() {
+            match c {
+                '"' if quoted && letters.peek() == Some(&'"') => {
+                    letters.next();
+                    fields.last_mut().expect("a field").push('"');
+                }
+                '"' => quoted = !quoted,
+                ',' if !quoted => fields.push(String::new()),
+                c => fields.last_mut().expect("a field").push(c),
+            }
+        }
+        fields
+    });
+    let mut lines = lines.collect::<Vec<_>>().into_iter();
+    let headers = lines.next().expect("a header");
+    lines
+        .map(|fields| {
+            assert_eq!(fields.len(), headers.len());
+            headers.iter().cloned().zip(fields).collect()
+        })
+        .collect()
+}
+
+/// The page, which must be well-formed, complete in itself and without scripts.
+fn with_page(bench: &Workbench, file: &str, look: impl Fn(&Document)) {
+    let html = bench.read(file);
+    for forbidden in ["http", "src=", "href", "<script", "@import", "url("] {
+        assert!(!html.contains(forbidden), "{forbidden}");
+    }
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    let page = Document::parse_with_options(&html, options).expect("well-formed");
+    look(&page);
+}
+
+fn text_of(node: Node) -> String {
+    let texts = node.descendants().filter(Node::is_text);
+    texts.filter_map(|n| n.text()).collect()
+}
+
+#[test]
+fn the_table() {
+    let bench = bench();
+    let names = ["compare", "constants.yaml", "twice.yaml", "free.yaml"];
+    let stdout = bench.run_to(0, &names);
+    let mut settings = insta::Settings::clone_current();
+    settings.add_filter(r"(?m)^time \(s\) .*$", "time (s) [seconds]");
+    // What an optimum leaves of the errors is left to the machine.
+    settings.add_filter(r"\d\.\d{3}e-1\d", "   [tiny]");
+    settings.add_filter(r"\d\.\d{3}e-[6-9]", "  [tiny]");
+    settings.add_filter(r"\d\.\de-([6-9]|1\d)", "[tiny]");
+    settings.bind(|| {
+        assert_snapshot!(stdout, @"
+        constants: Constants
+          the true device: k/m and c/m to [tiny]
+        twice: Twice the mass
+          the true device: k/m and c/m to [tiny], but m, c and k off by a common factor (m by 100 %)
+        free: One value per step
+          matches the motion (J/J0 [tiny]) but is another device: k/m off by 77 %, c/m off by 1142 %
+
+                                             constants      twice       free
+        status                               converged  converged  converged
+        method                                   lbfgs      lbfgs      lbfgs
+        nodes                                      200        200        200
+        free values                                  2          2        600
+        misfit (m² s)                           [tiny]     [tiny]     [tiny]
+        J/J0                                    [tiny]     [tiny]     [tiny]
+        iterations                                   9          7         69
+        time (s) [seconds]
+        largest error of m (kg)                      0      1.000      1.926
+          of c (N s/m)                          [tiny]     0.1000      1.259
+          of k (N/m)                            [tiny]      1.000     0.9349
+          of k/m (1/s²)                         [tiny]     [tiny]     0.7749
+          of c/m (1/s)                          [tiny]     [tiny]      1.142
+        smallest m (kg)                          1.000      2.000      1.031
+        smallest c (N s/m)                      0.1000     0.2000     0.1152
+        ∫(m″)² dt (kg²/s³)                           0          0      231.0
+        ∫(c′)² dt (N² s/m²)                          0          0      6.914
+        ∫(k′)² dt (N²/(m² s))                        0          0      3.845
+        cost (m² s) from y = 0 m, v = 1 m/s     [tiny]     [tiny]      1.576
+
+        results in runs/compare, the page is runs/compare/compare.html
+        ");
+    });
+}
+
+#[test]
+fn files() {
+    let bench = bench();
+    bench.run_to(
+        0,
+        &["compare", "constants.yaml", "free.yaml", "--out", "both"],
+    );
+    for file in [
+        "both/compare.csv",
+        "both/compare.html",
+        "both/constants/result.json",
+        "both/constants/figures/motion.svg",
+        "both/free/trajectory.csv",
+        "both/figures/functions.svg",
+        "both/figures/ratios.svg",
+        "both/figures/residuals.svg",
+        "both/figures/convergence.svg",
+    ] {
+        assert!(bench.path(file).is_file(), "{file}");
+    }
+    // What a run leaves behind is what `fit` would have written.
+    bench.run_to(0, &["fit", "constants.yaml", "--out", "alone"]);
+    for file in [
+        "functions.csv",
+        "trajectory.csv",
+        "history.csv",
+        "figures/motion.svg",
+    ] {
+        assert_eq!(
+            bench.read(&format!("both/constants/{file}")),
+            bench.read(&format!("alone/{file}"))
+        );
+    }
+
+    let csv = bench.read("both/compare.csv");
+    assert_snapshot!(csv.lines().next().expect("a header").replace(',', "\n"), @"
+    name
+    title
+    status
+    method
+    nodes
+    parameters
+    misfit
+    misfit_unit
+    cost_ratio
+    iterations
+    seconds_s
+    mass_error_kg
+    damping_error_N_s_per_m
+    stiffness_error_N_per_m
+    k_over_m_error_per_s2
+    c_over_m_error_per_s
+    k_over_m_relative_error
+    c_over_m_relative_error
+    mass_min_kg
+    damping_min_N_s_per_m
+    max_violation
+    mass_roughness_kg2_per_s3
+    damping_roughness_N2_s_per_m2
+    stiffness_roughness_N2_per_m2_s
+    cost_from_0_m_1_m_per_s_m2_s
+    verdict
+    ");
+    let records = records(&csv);
+    let result = json(&bench.read("both/free/result.json"));
+    assert_eq!(records.len(), 2);
+    assert_eq!(records[1]["name"], "free");
+    assert_eq!(records[1]["status"], "converged");
+    let number = |header: &str| records[1][header].parse::<f64>().ok();
+    assert_eq!(number("misfit"), result["cost"]["misfit"].as_f64());
+    assert_eq!(number("cost_ratio"), result["cost"]["ratio"].as_f64());
+    assert_eq!(number("seconds_s"), result["seconds"].as_f64());
+    let mass = &result["functions"]["mass"];
+    assert_eq!(number("mass_min_kg"), mass["min"].as_f64());
+    assert_eq!(number("mass_error_kg"), mass["truth_max_error"].as_f64());
+    let predicted = result["predictions"][0]["cost"].as_f64();
+    assert_eq!(number("cost_from_0_m_1_m_per_s_m2_s"), predicted);
+    assert_eq!(records[1]["max_violation"], "");
+}
+
+#[test]
+fn as_json() {
+    let bench = bench();
+    let stdout = bench.run_to(0, &["compare", "constants.yaml", "twice.yaml", "--json"]);
+    let found = json(&stdout);
+    assert_eq!(found["format"], 1);
+    assert_eq!(found["left_out"], json("[]"));
+    for (run, name) in [(0, "constants"), (1, "twice")] {
+        assert_eq!(found["runs"][run]["name"], name);
+        assert_eq!(found["runs"][run]["true_device"], true);
+    }
+    assert!(
+        found["runs"][1]["errors"]["mass_relative"]
+            .as_f64()
+            .expect("a number")
+            > 0.99
+    );
+}
+
+/// A finished run is taken as it is: nothing in its folder changes, and it is not run again.
+#[test]
+fn models_and_finished_runs() {
+    let bench = bench();
+    bench.run_to(0, &["fit", "free.yaml"]);
+    let result = bench.read("runs/free/result.json");
+    let doctored = result.replacen("\"seconds\": ", "\"seconds\": 1000", 1);
+    let violated = doctored
+        .trim_end()
+        .trim_end_matches('}')
+        .trim_end()
+        .to_owned()
+        + ",\n  \"constraints\": {\"max_violation\": 0.25}\n}\n";
+    bench.write("runs/free/result.json", &violated);
+    bench.run_to(0, &["compare", "runs/free/", "constants.yaml"]);
+    assert_eq!(bench.read("runs/free/result.json"), violated);
+    let records = records(&bench.read("runs/compare/compare.csv"));
+    assert_eq!(records[0]["name"], "free");
+    assert!(records[0]["seconds_s"].parse::<f64>().expect("a number") > 999.0);
+    assert_eq!(records[0]["max_violation"], "0.25");
+    assert_eq!(records[1]["name"], "constants");
+    assert!(!bench.path("runs/compare/free").exists());
+}
+
+#[test]
+fn equal_names() {
+    let bench = bench();
+    for folder in ["a", "b"] {
+        for file in ["constants.yaml", "readings.csv", "truth.csv"] {
+            bench.write(&format!("{folder}/{file}"), &bench.read(file));
+        }
+    }
+    bench.write("figures.yaml", &bench.read("constants.yaml"));
+    let arguments = [
+        "compare",
+        "a/constants.yaml",
+        "b/constants.yaml",
+        "figures.yaml",
+    ];
+    bench.run_to(0, &arguments);
+    for name in ["constants", "constants-2", "figures-2"] {
+        assert!(
+            bench
+                .path(&format!("runs/compare/{name}/result.json"))
+                .exists()
+        );
+    }
+    // A finished run within the folder is compared with, not overwritten.
+    let before = bench.read("runs/compare/constants/result.json");
+    bench.run_to(
+        0,
+        &[
+            "compare",
+            "twice.yaml",
+            "runs/compare/constants",
+            "a/constants.yaml",
+        ],
+    );
+    bench.run_to(
+        0,
+        &["compare", "a/constants.yaml", "runs/compare/constants"],
+    );
+    assert_eq!(bench.read("runs/compare/constants/result.json"), before);
+}
+
+#[test]
+fn a_bad_argument_ends_everything_before_it_begins() {
+    let bench = bench();
+    bench.write(
+        "bad.yaml",
+        &bench.read("free.yaml").replace("nodal", "nodel"),
+    );
+    bench.write("empty/note.txt", "no run");
+    let refused = |last: &str| {
+        let before = bench.contents();
+        let (code, stdout, stderr) = bench.run(&["compare", "constants.yaml", last]);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{last}: {stderr}");
+        assert_eq!(bench.contents(), before, "{last} left something");
+        stderr
+    };
+    let stderr = refused("bad.yaml");
+    assert!(stderr.starts_with("error: bad.yaml:10:"), "{stderr}");
+    assert_snapshot!(refused("constant.yaml"), @"
+    error: constant.yaml: there is no such file
+      expected: a model file (YAML), or the folder of a finished run
+      hint: did you mean `constants.yaml`?
+    ");
+    assert_snapshot!(refused("empty"), @"
+    error: empty/result.json: there is no such file
+      expected: the result of a finished run
+    ");
+    bench.run_to(0, &["fit", "constants.yaml"]);
+    assert_snapshot!(refused("runs/constants/result.json"), @"
+    error: runs/constants/result.json: this is a result, not a model
+      expected: a model file (YAML), or the folder of a finished run
+      hint: give its folder: runs/constants
+    ");
+    assert_eq!(bench.run(&["compare"]).0, 2);
+}
+
+/// Twice the nodes, every second with a reading: each run is drawn on its own times.
+#[test]
+fn different_grids() {
+    let bench = bench();
+    bench.write("fine.yaml", &model("Fine", 399, CONSTANTS, LOOSE));
+    bench.run_to(0, &["compare", "constants.yaml", "fine.yaml"]);
+    let records = records(&bench.read("runs/compare/compare.csv"));
+    let nodes: Vec<&str> = records.iter().map(|r| r["nodes"].as_str()).collect();
+    assert_eq!(nodes, ["200", "399"]);
+    with_page(&bench, "runs/compare/compare.html", |page| {
+        let text = text_of(page.root_element());
+        assert!(!text.contains("truth of"), "one truth on two grids");
+    });
+}
+
+#[test]
+fn the_page() {
+    let bench = bench();
+    let hostile = "'<script>alert(1)</script>&\" =HYPERLINK'";
+    bench.write("hostile.yaml", &model(hostile, 200, CONSTANTS, LOOSE));
+    let stdout = bench.run_to(0, &["compare", "hostile.yaml", "twice.yaml", "free.yaml"]);
+    assert!(stdout.contains("hostile: <script>alert(1)</script>&\" =HYPERLINK\n"));
+    let records = records(&bench.read("runs/compare/compare.csv"));
+    assert_eq!(
+        records[0]["title"],
+        "<script>alert(1)</script>&\" =HYPERLINK"
+    );
+    with_page(&bench, "runs/compare/compare.html", |page| {
+        let all = |name: &'static str| page.descendants().filter(move |n| n.has_tag_name(name));
+        let text = text_of(page.root_element());
+        assert!(text.contains("<script>alert(1)</script>&\" =HYPERLINK"));
+        assert!(text.contains("2 of the 3 runs that name the truth reach it."));
+        for run in &records {
+            assert!(text.to_lowercase().contains(&run["verdict"].to_lowercase()));
+        }
+        assert_eq!(all("section").count(), 3);
+        assert_eq!(all("figure").count(), 4);
+        for figure in all("figure") {
+            assert!(figure.descendants().any(|n| n.has_tag_name("figcaption")));
+            for svg in figure.children().filter_map(|n| n.first_element_child()) {
+                let described = |tag: &str| {
+                    svg.children()
+                        .any(|n| n.has_tag_name(tag) && n.text().is_some())
+                };
+                assert_eq!(svg.attribute("role"), Some("img"));
+                assert!(described("title") && described("desc"));
+            }
+        }
+        let columns = all("th").filter(|n| n.attribute("scope") == Some("col"));
+        assert_eq!(columns.count(), 3);
+    });
+}
+
+/// A run keeps its colour in every figure, in the legend and in the table.
+#[test]
+fn colours() {
+    let bench = bench();
+    bench.run_to(0, &["compare", "constants.yaml", "free.yaml"]);
+    for figure in ["functions", "ratios", "residuals", "convergence"] {
+        let svg = bench.read(&format!("runs/compare/figures/{figure}.svg"));
+        let document = Document::parse(&svg).expect("XML");
+        let strokes: Vec<&str> = (document.descendants())
+            .filter_map(|n| n.attribute("stroke"))
+            .collect();
+        assert!(
+            strokes.contains(&"#0072B2") && strokes.contains(&"#D55E00"),
+            "{figure}"
+        );
+    }
+}
+
+#[test]
+fn a_run_that_does_not_converge() {
+    let bench = bench();
+    let early = "{method: lbfgs, stop: {iterations: 3, cost_ratio: 1e-9}}";
+    bench.write("early.yaml", &model("Early", 200, FREE, early));
+    let stdout = bench.run_to(3, &["compare", "early.yaml", "constants.yaml"]);
+    assert!(stdout.contains("does not match the motion"), "{stdout}");
+    assert!(bench.path("runs/compare/constants/result.json").exists());
+}
+
+/// A run that cannot begin is left out, with its reason; the others are compared.
+#[test]
+fn a_run_without_motion() {
+    let bench = bench();
+    let heavy = FREE.replace("start: 2.0", "start: 1e-200");
+    bench.write("heavy.yaml", &model("No motion", 200, &heavy, LOOSE));
+    let (code, stdout, stderr) = bench.run(&["compare", "heavy.yaml", "constants.yaml"]);
+    assert_eq!(code, 3);
+    assert!(
+        stderr.starts_with("failed: heavy: the start has no motion"),
+        "{stderr}"
+    );
+    assert!(
+        stdout.contains("heavy: left out\n  the start has no motion"),
+        "{stdout}"
+    );
+    assert_eq!(records(&bench.read("runs/compare/compare.csv")).len(), 1);
+    with_page(&bench, "runs/compare/compare.html", |page| {
+        assert!(text_of(page.root_element()).contains("left out: the start has no motion"));
+    });
+}
+
+/// With a sigma the misfit is a chi-square, and its noise is the measure; without a truth nothing is
+/// said about it.
+#[test]
+fn noise_and_no_truth() {
+    let bench = bench();
+    let noise = ["--noise", "0.05", "--seed", "1", "--out", "readings.csv"];
+    bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
+    let loose = "{method: lbfgs, stop: {iterations: 100, tolerance: 1e-10}}";
+    let noisy = model("Noisy", 200, CONSTANTS, loose).replace(
+        "    initial",
+        "    sigma: {displacement: 0.05}\n    initial",
+    );
+    bench.write("noisy.yaml", &noisy);
+    bench.write(
+        "blind.yaml",
+        &noisy.replace("truth: {data: truth.csv}\n", ""),
+    );
+    bench.run_to(0, &["compare", "noisy.yaml", "blind.yaml"]);
+    let records = records(&bench.read("runs/compare/compare.csv"));
+    assert_eq!(records[0]["misfit_unit"], "1");
+    let [noisy, blind] = [0, 1].map(|i| records[i]["verdict"].as_str());
+    assert!(noisy.starts_with("close to the true device: "), "{noisy}");
+    assert!(noisy.contains("within its noise (chi-square "), "{noisy}");
+    assert!(blind.ends_with("; the truth is not known"), "{blind}");
+    assert_eq!(records[1]["mass_error_kg"], "");
+}
+
+/// Ctrl-C keeps what is finished, and the best so far of the run that it ends.
+#[test]
+#[cfg(unix)]
+fn interrupt() {
+    let bench = bench();
+    let endless = "{method: steepest-descent, stop: {iterations: 100000000}}";
+    bench.write("endless.yaml", &model("Endless", 200, FREE, endless));
+    let arguments = ["compare", "constants.yaml", "endless.yaml", "twice.yaml"];
+    let child = std::process::Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        .args(arguments)
+        .current_dir(bench.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let begin = Instant::now();
+    while !bench.path("runs/compare/constants/result.json").exists() {
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "nothing is finished"
+        );
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_millis(200));
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill runs");
+    assert!(killed.success());
+    let output = child.wait_with_output().expect("the program ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        stdout.contains("twice: left out\n  not begun: interrupted"),
+        "{stdout}"
+    );
+    let records = records(&bench.read("runs/compare/compare.csv"));
+    let statuses: Vec<&str> = records.iter().map(|r| r["status"].as_str()).collect();
+    assert_eq!(statuses, ["converged", "interrupted"]);
+}
