@@ -164,14 +164,6 @@ impl Walk<'_> {
         let found = fit(&problem, &self.from, &self.settings, self.observe)?;
         // From here on every fit starts where its neighbour ended.
         self.settings.initial = Initial::Functions;
-            eprintln!(
-                "{weight:.2e} {:?} its {} {:?} {:?}",
-                found.elapsed,
-                found.history.len(),
-                found.counts,
-                found.outcome
-            );
-        }
         self.last = Some(found.outcome.status);
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
