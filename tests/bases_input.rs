@@ -129,7 +129,7 @@ fn limits_and_penalties_are_accepted() {
     for text in [
         "min: 0.1, max: {data: m.csv, column: m_kg}",
         "min: 1, max: 1",
-        "smooth: {order: 2, weight: discrepancy}",
+        "smooth: {order: 2, weight: l-curve}",
         "smooth: [{order: 0, weight: 1, reference: {data: m.csv, column: m_kg}}, {order: 1, weight: 0}]",
         "variation: {weight: 0.5}",
     ] {
@@ -373,10 +373,10 @@ fn starts() {
       expected: a finite number, a list of numbers, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(message("{basis: nodal, start: {data: m.csv, column: m}}"), @"
-    m.csv: there is no such column
+    m.yaml:5:53: functions.mass.start.column: m.csv: there is no such column
       found: `m`
       expected: one of: t_s, m_kg
-      hint: asked for by functions.mass.start of the model
+      hint: did you mean `m_kg`?
     ");
     assert_snapshot!(message("{basis: nodal, start: 0}"), @"
     m.yaml:5:31: functions.mass.start: the mass must be positive at all times
@@ -414,9 +414,9 @@ fn limits() {
       expected: a finite number, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(with("max: {data: x.csv, column: m_kg}"), @"
-    x.csv: there is no such file
+    m.yaml:5:46: functions.mass.max.data: x.csv: there is no such file
       expected: a CSV file with one row of column names and rows of numbers
-      hint: asked for by functions.mass.max of the model
+      hint: did you mean `m.csv`?
     ");
     assert_snapshot!(message("{fixed: 1, min: 0.5}"), @"
     m.yaml:5:25: functions.mass.min: a fixed function cannot be limited or smoothed

@@ -230,7 +230,7 @@ functions:
     assert_eq!(model.problem.oscillator.grid.nodes(), 2000);
     assert_eq!(model.problem.oscillator.grid.duration(), 25.0);
     assert_eq!(model.problem.oscillator.method, Method::Rk4);
-    assert_eq!(model.settings.solver, Solver::Lbfgs { memory: 20 });
+    assert_eq!(model.settings.solver, Solver::GaussNewton);
     assert_eq!(model.settings.gradient, GradientKind::Discrete);
     let stopping = Stopping {
         tolerance: Some(1e-10),

@@ -184,6 +184,7 @@ impl Failure<'_> {
         let (found, expected) = rest.rsplit_once(", expected ")?;
         let expected = match expected {
             "a sequence" => "a list: lines that begin with `- `, or [ … ]",
+            "a boolean" => "true or false",
             other => other,
         };
         Some(

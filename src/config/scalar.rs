@@ -91,9 +91,23 @@ macro_rules! scalar_visits {
     };
 }
 
+/// A value that is read from one scalar.
+pub(super) trait FromScalar: Sized {
+    /// The value, or what is wrong with it.
+    fn from_scalar(scalar: Scalar<'_>) -> Result<Self, Complaint>;
+}
+
 /// `Deserialize` by a function from [`Scalar`] to the value or a complaint.
 macro_rules! deserialize_scalar {
     ($value:ty, $convert:path, $expecting:expr) => {
+        impl $crate::config::scalar::FromScalar for $value {
+            fn from_scalar(
+                scalar: $crate::config::scalar::Scalar<'_>,
+            ) -> Result<Self, $crate::config::complaint::Complaint> {
+                $convert(scalar)
+            }
+        }
+
         impl<'de> Deserialize<'de> for $value {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 struct Reader;
@@ -488,6 +502,61 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<OneOrMany<T>, A::Error> {
                 T::deserialize(MapAccessDeserializer::new(map)).map(OneOrMany::One)
+            }
+        }
+        deserializer.deserialize_any(Reader(std::marker::PhantomData))
+    }
+}
+
+/// One value, or a list of values.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OneOrList<T> {
+    /// One value.
+    One(T),
+    /// A list.
+    List(Vec<T>),
+}
+
+impl<T> OneOrList<T> {
+    /// The values.
+    pub fn values(&self) -> &[T] {
+        match self {
+            Self::One(one) => std::slice::from_ref(one),
+            Self::List(list) => list,
+        }
+    }
+
+    /// The key of value `i` below the key of them all: nothing, or an index such as `[1]`.
+    pub fn place(&self, i: usize) -> String {
+        match self {
+            Self::One(_) => String::new(),
+            Self::List(_) => format!("[{i}]"),
+        }
+    }
+}
+
+fn one_or_list<T: FromScalar>(scalar: Scalar<'_>) -> Result<OneOrList<T>, Complaint> {
+    let value = T::from_scalar(scalar).map(OneOrList::One);
+    value.map_err(|complaint| Complaint {
+        expected: format!("{}, or a list of such", complaint.expected),
+        ..complaint
+    })
+}
+
+impl<'de, T: FromScalar + Deserialize<'de>> Deserialize<'de> for OneOrList<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Reader<T>(std::marker::PhantomData<T>);
+        impl<'de, T: FromScalar + Deserialize<'de>> Visitor<'de> for Reader<T> {
+            type Value = OneOrList<T>;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("one value, or a list of values")
+            }
+            scalar_visits!(OneOrList<T>, one_or_list, but lists);
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<OneOrList<T>, A::Error> {
+                elements(list).map(OneOrList::List)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, _: A) -> Result<OneOrList<T>, A::Error> {
+                one_or_list(Scalar::Map).map_err(A::Error::custom)
             }
         }
         deserializer.deserialize_any(Reader(std::marker::PhantomData))

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-use super::scalar::{Count, Format, Knots, Number, NumberOrColumn, OneOrMany, Scalar, Start};
-use super::scalar::{Text, Weight};
+use super::scalar::{Count, Format, Knots, Number, NumberOrColumn, OneOrList, OneOrMany, Scalar};
+use super::scalar::{Start, Text, Weight};
 use super::scalar::{choice, deserialize_scalar, scalar_visits};
 
 /// A whole model file.
@@ -28,6 +28,8 @@ pub struct ModelSpec {
     pub grid: Option<GridSpec>,
     /// Mass, damping and stiffness over time.
     pub functions: FunctionsSpec,
+    /// What the functions must satisfy, besides their own `min` and `max`.
+    pub constraints: Option<Vec<ConstraintSpec>>,
     /// How to fit.
     pub fit: Option<FitSpec>,
     /// True functions, where they are known; used for reporting only.
@@ -209,6 +211,81 @@ pub struct VariationSpec {
     pub weight: Number,
 }
 
+choice! {
+    /// Name of a coefficient function.
+    pub enum FunctionName {
+        /// Mass m(t).
+        Mass = "mass",
+        /// Damping c(t).
+        Damping = "damping",
+        /// Stiffness k(t).
+        Stiffness = "stiffness",
+    }
+}
+
+/// One constraint: which keys belong together is checked when the problem is built.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {function: mass, shape: non-increasing}"
+)]
+pub struct ConstraintSpec {
+    /// Which function it is about.
+    pub function: Option<FunctionName>,
+    /// Smallest value allowed.
+    pub min: Option<NumberOrColumn>,
+    /// Largest value allowed.
+    pub max: Option<NumberOrColumn>,
+    /// Smallest and largest slope, in the unit of the function per s.
+    pub slope: Option<RangeSpec>,
+    /// Monotone or curved in one direction.
+    pub shape: Option<OneOrList<ShapeName>>,
+    /// Times at which the value is held, in s.
+    pub at: Option<OneOrList<Number>>,
+    /// Values there, one for all times or one each.
+    pub value: Option<OneOrList<Number>>,
+    /// Mean over the record, in the unit of the function.
+    pub mean: Option<Number>,
+    /// Integral over the record, in the unit of the function times s.
+    pub integral: Option<Number>,
+    /// Two functions: the first is `ratio` times the second.
+    pub equal: Option<Vec<FunctionName>>,
+    /// Factor of the second function of `equal`; 1 unless given.
+    pub ratio: Option<Number>,
+    /// Whether the stored energy must never grow.
+    pub passive: Option<bool>,
+    /// Band of the natural frequency, in Hz.
+    pub frequency: Option<RangeSpec>,
+    /// Cap on the damping ratio.
+    pub damping_ratio: Option<RangeSpec>,
+    /// The price of breaking it: a weight. Without it the constraint holds.
+    pub soft: Option<Number>,
+}
+
+choice! {
+    /// Shape that a function must have.
+    pub enum ShapeName {
+        /// It never rises.
+        NonIncreasing = "non-increasing",
+        /// It never falls.
+        NonDecreasing = "non-decreasing",
+        /// Its slope never falls.
+        Convex = "convex",
+        /// Its slope never rises.
+        Concave = "concave",
+    }
+}
+
+/// A range of numbers, open where an end is missing.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a map such as {min: 0.1, max: 0.5}")]
+pub struct RangeSpec {
+    /// Smallest value allowed.
+    pub min: Option<Number>,
+    /// Largest value allowed.
+    pub max: Option<Number>,
+}
+
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(
@@ -226,11 +303,13 @@ pub struct ColumnSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(
     deny_unknown_fields,
-    expecting = "a map such as {method: lbfgs, gradient: discrete}"
+    expecting = "a map such as {method: gauss-newton, initial: data}"
 )]
 pub struct FitSpec {
     /// Solver.
     pub method: Option<FitMethod>,
+    /// Where the fit starts.
+    pub initial: Option<InitialName>,
     /// Which gradient the solver follows.
     pub gradient: Option<Gradient>,
     /// Number of steps that L-BFGS remembers.
@@ -246,6 +325,20 @@ choice! {
         SteepestDescent = "steepest-descent",
         /// Limited-memory BFGS.
         Lbfgs = "lbfgs",
+        /// Along the projected negative gradient, under constraints.
+        ProjectedGradient = "projected-gradient",
+        /// Gauss-Newton steps, under constraints.
+        GaussNewton = "gauss-newton",
+    }
+}
+
+choice! {
+    /// Where a fit starts.
+    pub enum InitialName {
+        /// From the start values of the functions.
+        Functions = "functions",
+        /// From the smoothed readings, put into the equation of motion.
+        Data = "data",
     }
 }
 

@@ -1,9 +1,13 @@
 //! Constraints: named linear rows and second-order cones on the parameters of all functions.
+//!
+//! What is demanded of the functions is a [`Statement`]; [`Statement::build`] turns it into rows.
 
+mod build;
 mod rows;
 mod set;
 mod violation;
 
+pub use build::{Impossible, Limit, Shape, Statement};
 pub use rows::Rows;
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
 pub use violation::{TOLERANCE, Violation};

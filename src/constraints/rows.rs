@@ -24,8 +24,15 @@ impl Rows {
             self.starts.push(0);
         }
         let first = self.columns.len();
+        // Rows usually come with rising columns; only others have to be searched.
+        let mut highest = None;
         for (column, value) in entries {
-            let known = self.columns[first..].iter().position(|c| *c == column);
+            let known = if highest.is_none_or(|h| column > h) {
+                highest = Some(column);
+                None
+            } else {
+                self.columns[first..].iter().position(|c| *c == column)
+            };
             match known {
                 Some(k) => self.values[first + k] += value,
                 None => {

@@ -21,6 +21,9 @@ pub struct RowGroup {
     pub upper: Vec<f64>,
     /// The span of time that each row speaks of, s.
     pub times: Vec<[f64; 2]>,
+    /// For rows that may be broken at a price: the weight of their violation, greater than 0. `None`
+    /// is a constraint that holds.
+    pub soft: Option<f64>,
 }
 
 /// Second-order cones that say one thing about the functions, at many times.
@@ -51,6 +54,7 @@ impl RowGroup {
             rows: Rows::new(),
             upper: Vec::new(),
             times: Vec::new(),
+            soft: None,
         }
     }
 
@@ -85,6 +89,20 @@ impl Constraints {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty() && self.cones.is_empty()
+    }
+
+    /// Adds those of `other`.
+    pub fn extend(&mut self, other: Constraints) {
+        self.groups.extend(other.groups);
+        self.cones.extend(other.cones);
+    }
+
+    /// The constraints that must hold: those without the soft ones.
+    #[must_use]
+    pub fn hard(&self) -> Self {
+        let mut hard = self.clone();
+        hard.groups.retain(|group| group.soft.is_none());
+        hard
     }
 
     /// Whether every constraint bounds or fixes a single parameter, so that clipping projects onto

@@ -67,6 +67,19 @@ impl Functions {
         self.list.iter().flat_map(|f| f.start.clone()).collect()
     }
 
+    /// The same functions with another start of the search.
+    ///
+    /// # Panics
+    /// If `theta` has another number of parameters.
+    #[must_use]
+    pub fn with_start(mut self, theta: &[f64]) -> Self {
+        assert_eq!(theta.len(), self.parameters(), "one start per parameter");
+        for (function, range) in self.list.iter_mut().zip(&self.ranges) {
+            function.start.copy_from_slice(&theta[range.clone()]);
+        }
+        self
+    }
+
     /// A device of the right shape, all zero.
     pub fn empty_device(&self) -> Device {
         Device::zeros(self.nodes, self.list.len() - 1)

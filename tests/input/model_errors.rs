@@ -73,7 +73,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("title:", "titel:"), @"
     m.yaml:2:1: unknown key
       found: `titel`
-      expected: one of: format, title, experiments, grid, functions, fit, truth, predict
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict
       hint: did you mean `title`?
     ");
     assert_snapshot!(changed("velocity: +0.5", "velocity: 0.5\n      acceleration: 1"), @"
@@ -123,7 +123,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("memory: 10", "12: 10"), @"
     m.yaml:22:3: fit: unknown key
       found: `12`
-      expected: one of: method, gradient, memory, stop
+      expected: one of: method, initial, gradient, memory, stop
     ");
 }
 
@@ -325,18 +325,18 @@ fn choices() {
     assert_snapshot!(changed("method: lbfgs", "method: steepest_descent"), @"
     m.yaml:20:11: fit.method: unknown choice
       found: `steepest_descent`
-      expected: one of: steepest-descent, lbfgs
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
       hint: did you mean `steepest-descent`?
     ");
     assert_snapshot!(changed("method: lbfgs", "method: magic"), @"
     m.yaml:20:11: fit.method: unknown choice
       found: `magic`
-      expected: one of: steepest-descent, lbfgs
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
     ");
     assert_snapshot!(changed("method: lbfgs", "method: 3"), @"
     m.yaml:20:11: fit.method: not one of the choices
       found: the integer 3
-      expected: one of: steepest-descent, lbfgs
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
     ");
     assert_snapshot!(changed("gradient: continuous", "gradient: [discrete]"), @"
     m.yaml:21:13: fit.gradient: not one of the choices
@@ -406,7 +406,7 @@ fn wrong_kinds() {
     assert_snapshot!(message(&SHORT.replace("experiments:\n", "experiments: []\nx:\n")), @"
     m.yaml:3:1: unknown key
       found: `x`
-      expected: one of: format, title, experiments, grid, functions, fit, truth, predict
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict
     ");
     assert_snapshot!(message("format: 1\nexperiments: []\nfunctions:\n  mass: {basis: nodal}\n  damping: {basis: nodal}\n  stiffness: {basis: nodal}\n"), @"
     m.yaml:2:14: experiments: there is no experiment

@@ -1,6 +1,6 @@
 //! How to fit.
 
-use crate::config::spec::{FitMethod, Gradient, StopSpec};
+use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use crate::objective::GradientKind;
@@ -15,19 +15,11 @@ const DEFAULT_MEMORY: usize = 20;
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<FitSettings, InputError> {
     let spec = file.spec.fit.as_ref();
     let gradient = gradient(file, problem)?;
-    let memory = memory(file)?;
-    let solver = match spec.and_then(|f| f.method) {
-        Some(FitMethod::SteepestDescent) => match memory {
-            Some(_) => {
-                return Err(file
-                    .error_at("fit.memory", "steepest descent has no memory")
-                    .expected("no `memory`, or `method: lbfgs`"));
-            }
-            None => Solver::SteepestDescent,
-        },
-        Some(FitMethod::Lbfgs) | None => Solver::Lbfgs {
-            memory: memory.unwrap_or(DEFAULT_MEMORY),
-        },
+    let solver = solver(file)?;
+    can_constrain(file, problem, solver)?;
+    let initial = match spec.and_then(|f| f.initial) {
+        Some(InitialName::Functions) | None => Initial::Functions,
+        Some(InitialName::Data) => Initial::Data,
     };
     let stopping = match spec.and_then(|f| f.stop.as_ref()) {
         Some(stop) => stopping(file, stop)?,
@@ -35,11 +27,49 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<FitSettings, 
     };
     Ok(FitSettings {
         solver,
-        initial: Initial::Functions,
+        initial,
         gradient,
         stopping,
         interrupt: None,
     })
+}
+
+fn solver(file: &ModelFile) -> Result<Solver, InputError> {
+    let memory = memory(file)?;
+    let method = file.spec.fit.as_ref().and_then(|f| f.method);
+    let solver = match method.unwrap_or(FitMethod::GaussNewton) {
+        FitMethod::SteepestDescent => Solver::SteepestDescent,
+        FitMethod::Lbfgs => {
+            return Ok(Solver::Lbfgs {
+                memory: memory.unwrap_or(DEFAULT_MEMORY),
+            });
+        }
+        FitMethod::ProjectedGradient => Solver::ProjectedGradient,
+        FitMethod::GaussNewton => Solver::GaussNewton,
+    };
+    match memory {
+        None => Ok(solver),
+        Some(_) => Err(file
+            .error_at(
+                "fit.memory",
+                format!("the method `{}` has no memory", solver.name()),
+            )
+            .expected("no `memory`, or `method: lbfgs`")),
+    }
+}
+
+/// Refuses constraints with the methods that know none.
+fn can_constrain(file: &ModelFile, problem: &Problem, solver: Solver) -> Result<(), InputError> {
+    let constraints = &problem.constraints;
+    let rows = constraints.groups.iter().map(|group| &group.name);
+    let cones = constraints.cones.iter().map(|group| &group.name);
+    match (solver, rows.chain(cones).next()) {
+        (Solver::SteepestDescent | Solver::Lbfgs { .. }, Some(name)) => Err(file
+            .error_at("fit.method", "this method knows no constraints")
+            .found(format!("`{}` with `{name}`", solver.name()))
+            .expected("`gauss-newton` or `projected-gradient`, which do")),
+        _ => Ok(()),
+    }
 }
 
 fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputError> {

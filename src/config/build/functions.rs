@@ -30,7 +30,8 @@ pub(super) fn build(
     Ok(list)
 }
 
-fn spec(file: &ModelFile, quantity: Quantity) -> &FunctionSpec {
+/// What the model says about a function.
+pub(super) fn spec(file: &ModelFile, quantity: Quantity) -> &FunctionSpec {
     match quantity {
         Quantity::Mass => &file.spec.functions.mass,
         Quantity::Damping => &file.spec.functions.damping,
@@ -85,7 +86,8 @@ fn free(
     Ok(function)
 }
 
-fn values(
+/// Values at the nodes: the same number, or a column that `key` names.
+pub(super) fn values(
     file: &ModelFile,
     grid: &Grid,
     key: &str,

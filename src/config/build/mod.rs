@@ -1,10 +1,14 @@
 //! From what was written to what is meant: a [`ModelFile`] becomes a [`Model`].
 
+mod constraints;
 mod experiments;
 mod fit;
 mod functions;
 mod grid;
 mod on_grid;
+mod penalties;
+
+pub use penalties::WeightSearch;
 
 use super::ModelFile;
 use crate::dynamics::{Device, Oscillator, State, Term};
@@ -22,6 +26,11 @@ pub struct Model {
     pub problem: Problem,
     /// How it is fitted.
     pub settings: FitSettings,
+    /// The rule that chooses the weight of some penalties, whose weight in `problem` is 1.
+    pub weight_rule: Option<WeightSearch>,
+    /// Functions that pay for their total variation: index (mass 0) and weight, in the unit of J per
+    /// unit of the function.
+    pub variation: Vec<(usize, f64)>,
     /// The true device on the grid, where it is known.
     pub truth: Option<Device>,
     /// Initial states to predict the motion from.
@@ -97,8 +106,15 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let experiments = experiments::build(file, purpose, &grid, records)?;
-    let problem = Problem::new(oscillator, functions, experiments);
+    let mut problem = Problem::new(oscillator, functions, experiments);
+    let weight_rule = penalties::build(file, &mut problem, &mut warnings)?;
+    let variation = penalties::variation(file);
+    let places = constraints::build(file, &mut problem, &mut warnings)?;
     let settings = fit::build(file, &problem)?;
+    // A simulation is of the functions as they are given.
+    if !matches!(purpose, Purpose::Simulate { .. }) {
+        constraints::move_start(file, &mut problem, &places, &mut warnings)?;
+    }
     let truth = functions::truth(file, &grid)?;
     let state = |s: &super::spec::StateSpec| State {
         displacement: s.displacement.0,
@@ -108,6 +124,8 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         title: title(file),
         problem,
         settings,
+        weight_rule,
+        variation,
         truth,
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
@@ -116,6 +134,16 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
 
 /// The functions of the model, in the order of the problem.
 const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+
+/// Names in a row: `a`, `a and b`, `a, b and c`.
+fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        Some((last, _)) => (*last).to_owned(),
+        None => String::new(),
+    }
+}
 
 fn title(file: &ModelFile) -> String {
     match &file.spec.title {

@@ -1,0 +1,79 @@
+//! A start inside the constraints, or the constraints that leave none.
+
+use super::Place;
+use crate::config::ModelFile;
+use crate::constraints::TOLERANCE;
+use crate::error::{self, InputError};
+use crate::problem::Problem;
+use crate::solvers::Start;
+
+/// Moves the functions' start into the constraints, with a warning unless it only was off by
+/// rounding.
+pub(in crate::config::build) fn move_start(
+    file: &ModelFile,
+    problem: &mut Problem,
+    places: &[Place],
+    warnings: &mut Vec<String>,
+) -> Result<(), InputError> {
+    if problem.constraints.is_empty() {
+        return Ok(());
+    }
+    let start = problem.functions.start();
+    // A soft constraint does not have to hold at the start either.
+    let all = std::mem::take(&mut problem.constraints);
+    problem.constraints = all.hard();
+    let found = problem.feasible_start(&start);
+    let was_inside = problem.constraints.hold(&start, TOLERANCE);
+    problem.constraints = all;
+    match found {
+        Start::Kept(_) => Ok(()),
+        Start::Moved {
+            parameters,
+            constraint,
+        } => {
+            if !was_inside {
+                let moved = format!("the start was moved into the constraints (`{constraint}`)");
+                warnings.push(moved);
+            }
+            problem.functions = problem.functions.clone().with_start(&parameters);
+            Ok(())
+        }
+        Start::Contradiction(names) => Err(contradiction(file, places, &names)),
+        Start::Unsolved(status) => Err(file
+            .error_at("constraints", "no start inside the constraints was found")
+            .found(status.sentence())
+            .expected("constraints of moderate sizes that some functions satisfy")),
+    }
+}
+
+fn contradiction(file: &ModelFile, places: &[Place], names: &[String]) -> InputError {
+    let mut left: Vec<&Place> = places.iter().collect();
+    let mut last: Option<(usize, &str)> = None;
+    let mut rows = Vec::new();
+    for name in names {
+        let Some(i) = left.iter().position(|place| place.name == *name) else {
+            rows.push(format!("`{name}`"));
+            continue;
+        };
+        let key = &left.remove(i).key;
+        match file.error_at(key, "").place {
+            error::Place::Line { line, .. } => {
+                rows.push(format!("`{name}` (line {line})"));
+                if last.is_none_or(|(before, _)| line >= before) {
+                    last = Some((line, key));
+                }
+            }
+            _ => rows.push(format!("`{name}`")),
+        }
+    }
+    let key = last.map_or("constraints", |(_, key)| key);
+    let error = match names.len() {
+        1 => file.error_at(key, "this constraint contradicts itself"),
+        _ => file
+            .error_at(key, "these constraints contradict each other")
+            .hint("leaving out any one of them resolves it"),
+    };
+    error
+        .found(super::listed(rows.iter().map(String::as_str)))
+        .expected("constraints that some functions satisfy together")
+}

@@ -1,0 +1,407 @@
+//! From one map of `constraints` to what it demands.
+
+use crate::config::ModelFile;
+use crate::config::build::functions::values;
+use crate::config::scalar::{Number, NumberOrColumn};
+use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
+use crate::constraints::{Limit, Shape, Statement};
+use crate::dynamics::Grid;
+use crate::error::InputError;
+use crate::functions::Quantity;
+
+/// How far outside the record a time may be, in steps, to be taken for its end.
+const SAME_TIME: f64 = 1e-6;
+
+/// What a constraint can say, by its key.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Bounds,
+    Slope,
+    Shape,
+    Values,
+    Mean,
+    Integral,
+    Equal,
+    Passive,
+    Frequency,
+    DampingRatio,
+}
+
+impl Kind {
+    /// All kinds with the keys that they are written with.
+    const ALL: [(Kind, &'static str); 10] = [
+        (Kind::Bounds, "`min` or `max`"),
+        (Kind::Slope, "`slope`"),
+        (Kind::Shape, "`shape`"),
+        (Kind::Values, "`at` and `value`"),
+        (Kind::Mean, "`mean`"),
+        (Kind::Integral, "`integral`"),
+        (Kind::Equal, "`equal`"),
+        (Kind::Passive, "`passive`"),
+        (Kind::Frequency, "`frequency`"),
+        (Kind::DampingRatio, "`damping_ratio`"),
+    ];
+
+    fn is_given(self, spec: &ConstraintSpec) -> bool {
+        match self {
+            Kind::Bounds => spec.min.is_some() || spec.max.is_some(),
+            Kind::Slope => spec.slope.is_some(),
+            Kind::Shape => spec.shape.is_some(),
+            Kind::Values => spec.at.is_some() || spec.value.is_some(),
+            Kind::Mean => spec.mean.is_some(),
+            Kind::Integral => spec.integral.is_some(),
+            Kind::Equal => spec.equal.is_some(),
+            Kind::Passive => spec.passive.is_some(),
+            Kind::Frequency => spec.frequency.is_some(),
+            Kind::DampingRatio => spec.damping_ratio.is_some(),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(kind, _)| *kind == self);
+        found.map_or("", |(_, name)| name)
+    }
+
+    fn is_about_one_function(self) -> bool {
+        !matches!(
+            self,
+            Kind::Equal | Kind::Passive | Kind::Frequency | Kind::DampingRatio
+        )
+    }
+}
+
+/// One map at a key.
+struct Reader<'a> {
+    file: &'a ModelFile,
+    grid: &'a Grid,
+    key: &'a str,
+    spec: &'a ConstraintSpec,
+}
+
+/// What the map at `key` demands, each with the key that says so.
+pub(super) fn read(
+    file: &ModelFile,
+    grid: &Grid,
+    key: &str,
+    spec: &ConstraintSpec,
+) -> Result<Vec<(String, Statement)>, InputError> {
+    let reader = Reader {
+        file,
+        grid,
+        key,
+        spec,
+    };
+    let kind = reader.kind()?;
+    reader.belongs_together(kind)?;
+    if kind == Kind::Values {
+        return reader.fixed_values();
+    }
+    if kind == Kind::Shape {
+        return reader.shapes();
+    }
+    Ok(vec![(key.to_owned(), reader.statement(kind)?)])
+}
+
+/// Smallest and largest values of a function, whose keys are `min` and `max` below `key`.
+pub(super) fn bounds(
+    file: &ModelFile,
+    grid: &Grid,
+    key: &str,
+    of: Quantity,
+    (min, max): (&Option<NumberOrColumn>, &Option<NumberOrColumn>),
+) -> Result<Statement, InputError> {
+    let limit = |name: &str, given: &Option<NumberOrColumn>| match given {
+        None => Ok(None),
+        Some(NumberOrColumn::Number(value)) => Ok(Some(Limit::Number(value.0))),
+        Some(column @ NumberOrColumn::Column(c)) => {
+            let values = values(file, grid, &format!("{key}.{name}"), column)?;
+            let name = format!("{} of {}", c.column, c.data);
+            Ok(Some(Limit::Nodal { name, values }))
+        }
+    };
+    let (min, max) = (limit("min", min)?, limit("max", max)?);
+    if let (Some(low), Some(high)) = (&min, &max) {
+        let at = |limit: &Limit, i: usize| match limit {
+            Limit::Number(value) => *value,
+            Limit::Nodal { values, .. } => values[i],
+        };
+        let crossed = (0..grid.nodes()).find(|&i| at(low, i) > at(high, i));
+        if let Some(i) = crossed {
+            return Err(file
+                .error_at(
+                    &format!("{key}.min"),
+                    "the smallest value is above the largest",
+                )
+                .found(format!(
+                    "min {} and max {} at {} s",
+                    at(low, i),
+                    at(high, i),
+                    grid.time(i)
+                ))
+                .expected("min at most max at all times"));
+        }
+    }
+    Ok(Statement::Bounds { of, min, max })
+}
+
+impl Reader<'_> {
+    fn error(&self, below: &str, problem: impl Into<String>) -> InputError {
+        self.file.error_at(&self.below(below), problem)
+    }
+
+    fn below(&self, key: &str) -> String {
+        match key {
+            "" => self.key.to_owned(),
+            key => format!("{}.{key}", self.key),
+        }
+    }
+
+    /// The one thing that the map says.
+    fn kind(&self) -> Result<Kind, InputError> {
+        let given: Vec<Kind> = (Kind::ALL.iter().map(|(kind, _)| *kind))
+            .filter(|kind| kind.is_given(self.spec))
+            .collect();
+        match given.as_slice() {
+            [kind] => Ok(*kind),
+            [] => {
+                let all: Vec<&str> = Kind::ALL.iter().map(|(_, name)| *name).collect();
+                Err(self
+                    .error("", "this constraint demands nothing")
+                    .expected(format!("one of: {}", all.join(", "))))
+            }
+            [first, second, ..] => Err(self
+                .error("", "a constraint demands one thing")
+                .found(format!("{} beside {}", first.name(), second.name()))
+                .expected("a map for each")),
+        }
+    }
+
+    fn belongs_together(&self, kind: Kind) -> Result<(), InputError> {
+        match (kind.is_about_one_function(), self.spec.function) {
+            (true, None) => {
+                return Err(self
+                    .error("", "this constraint needs a function")
+                    .found(format!("{} alone", kind.name()))
+                    .expected("`function: mass`, `damping` or `stiffness`"));
+            }
+            (false, Some(_)) => {
+                return Err(self
+                    .error("function", "this constraint is not about one function")
+                    .found(format!("`function` beside {}", kind.name()))
+                    .expected("no `function`"));
+            }
+            _ => {}
+        }
+        match self.spec.ratio {
+            Some(_) if kind != Kind::Equal => Err(self
+                .error("ratio", "only `equal` has a ratio")
+                .found(format!("`ratio` beside {}", kind.name()))
+                .expected("no `ratio`")),
+            Some(ratio) if ratio.0 == 0.0 => Err(self
+                .error("ratio", "a ratio cannot be zero")
+                .found(ratio.0)
+                .expected("another number; for a function that is zero, `max: 0` and `min: 0`")),
+            _ => Ok(()),
+        }
+    }
+
+    fn of(&self) -> Quantity {
+        // Kinds without a function do not ask.
+        quantity(self.spec.function.unwrap_or(FunctionName::Mass))
+    }
+
+    fn statement(&self, kind: Kind) -> Result<Statement, InputError> {
+        let spec = self.spec;
+        let of = self.of();
+        let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+        Ok(match kind {
+            Kind::Bounds => bounds(self.file, self.grid, self.key, of, (&spec.min, &spec.max))?,
+            Kind::Slope => {
+                let (min, max) = self.range("slope", spec.slope.as_ref())?;
+                Statement::Slope { of, min, max }
+            }
+            Kind::Mean => Statement::Mean {
+                of,
+                value: number(spec.mean),
+            },
+            Kind::Integral => Statement::Integral {
+                of,
+                value: number(spec.integral),
+            },
+            Kind::Equal => self.equal()?,
+            Kind::Frequency => {
+                let (min, max) = self.range("frequency", spec.frequency.as_ref())?;
+                self.positive("frequency.min", min)?;
+                self.positive("frequency.max", max)?;
+                Statement::Frequency { min, max }
+            }
+            Kind::DampingRatio => self.damping_ratio()?,
+            Kind::Passive | Kind::Shape | Kind::Values => {
+                if spec.passive == Some(false) {
+                    return Err(self
+                        .error("passive", "this demands nothing")
+                        .found("false")
+                        .expected("`passive: true`, or no such constraint"));
+                }
+                Statement::Passive
+            }
+        })
+    }
+
+    fn shapes(&self) -> Result<Vec<(String, Statement)>, InputError> {
+        let Some(shapes) = &self.spec.shape else {
+            return Ok(Vec::new());
+        };
+        self.not_empty("shape", shapes.values().len(), "at least one shape")?;
+        let statement = |(i, shape): (usize, &ShapeName)| {
+            let shape = match shape {
+                ShapeName::NonIncreasing => Shape::NonIncreasing,
+                ShapeName::NonDecreasing => Shape::NonDecreasing,
+                ShapeName::Convex => Shape::Convex,
+                ShapeName::Concave => Shape::Concave,
+            };
+            let key = format!("{}.shape{}", self.key, shapes.place(i));
+            let of = self.of();
+            (key, Statement::Shape { of, shape })
+        };
+        Ok(shapes.values().iter().enumerate().map(statement).collect())
+    }
+
+    fn fixed_values(&self) -> Result<Vec<(String, Statement)>, InputError> {
+        let (at, value) = match (&self.spec.at, &self.spec.value) {
+            (Some(at), Some(value)) => (at, value),
+            (at, _) => {
+                let (has, lacks) = match at {
+                    Some(_) => ("at", "value"),
+                    None => ("value", "at"),
+                };
+                return Err(self
+                    .error(has, format!("`{has}` needs `{lacks}` beside it"))
+                    .found(format!("`{has}` alone"))
+                    .expected("both, as in {function: stiffness, at: 0.0, value: 1.0}"));
+            }
+        };
+        let (times, values) = (at.values(), value.values());
+        self.not_empty("at", times.len(), "at least one time in s")?;
+        self.not_empty("value", values.len(), "at least one value")?;
+        if values.len() != 1 && values.len() != times.len() {
+            return Err(self
+                .error("value", "there is not one value for every time")
+                .found(format!("{} values, {} times", values.len(), times.len()))
+                .expected("as many values as times, or one for all"));
+        }
+        let (start, end) = (self.grid.start(), self.grid.time(self.grid.nodes() - 1));
+        let slack = SAME_TIME * self.grid.step();
+        let statement = |(i, time): (usize, &Number)| {
+            let below = format!("at{}", at.place(i));
+            if time.0 < start - slack || time.0 > end + slack {
+                return Err(self
+                    .error(&below, "this time lies outside the record")
+                    .found(time.0)
+                    .expected(format!("a time from {start} s to {end} s")));
+            }
+            let held = Statement::Value {
+                of: self.of(),
+                at: time.0.clamp(start, end),
+                value: values[i.min(values.len() - 1)].0,
+            };
+            Ok((self.below(&below), held))
+        };
+        times.iter().enumerate().map(statement).collect()
+    }
+
+    fn equal(&self) -> Result<Statement, InputError> {
+        let names = self.spec.equal.as_deref().unwrap_or_default();
+        match names {
+            [first, second] if first != second => Ok(Statement::Equal {
+                first: quantity(*first),
+                second: quantity(*second),
+                ratio: self.spec.ratio.map_or(1.0, |r| r.0),
+            }),
+            [first, _] => Err(self
+                .error("equal", "these are the same function")
+                .found(format!("`{first}` twice"))
+                .expected("two functions, as in [damping, stiffness]")),
+            _ => Err(self
+                .error("equal", "an equality is between two functions")
+                .found(match names.len() {
+                    0 => "an empty list".to_owned(),
+                    1 => "1 function".to_owned(),
+                    n => format!("{n} functions"),
+                })
+                .expected("two functions, as in [damping, stiffness]")),
+        }
+    }
+
+    fn damping_ratio(&self) -> Result<Statement, InputError> {
+        let range = self.spec.damping_ratio.as_ref();
+        if let Some(min) = range.and_then(|r| r.min) {
+            return Err(self
+                .error("damping_ratio.min", "a damping ratio can only be capped")
+                .found(min.0)
+                .expected("`max` alone: a least damping ratio is no convex constraint"));
+        }
+        let (_, max) = self.range("damping_ratio", range)?;
+        let Some(max) = self.positive("damping_ratio.max", max)? else {
+            return Err(self
+                .error("damping_ratio", "the cap is missing")
+                .expected("`max`, as in {max: 0.2}"));
+        };
+        Ok(Statement::DampingRatio { max })
+    }
+
+    /// Both ends of a range, at least one of which is given.
+    fn range(
+        &self,
+        key: &str,
+        range: Option<&RangeSpec>,
+    ) -> Result<(Option<f64>, Option<f64>), InputError> {
+        let end = |end: fn(&RangeSpec) -> Option<Number>| range.and_then(end).map(|n| n.0);
+        let (min, max) = (end(|r| r.min), end(|r| r.max));
+        match (min, max) {
+            (None, None) => Err(self
+                .error(key, "this range has no end")
+                .found("neither `min` nor `max`")
+                .expected(match key {
+                    "damping_ratio" => "`max`, as in {max: 0.2}",
+                    _ => "one of the two, or both",
+                })),
+            (Some(low), Some(high)) if low > high => Err(self
+                .error(
+                    &format!("{key}.min"),
+                    "the smallest value is above the largest",
+                )
+                .found(format!("min {low} and max {high}"))
+                .expected("min at most max")),
+            _ => Ok((min, max)),
+        }
+    }
+
+    fn positive(&self, key: &str, value: Option<f64>) -> Result<Option<f64>, InputError> {
+        match value {
+            Some(value) if value <= 0.0 => Err(self
+                .error(key, "this limit must be positive")
+                .found(value)
+                .expected("a number greater than 0")),
+            value => Ok(value),
+        }
+    }
+
+    fn not_empty(&self, key: &str, count: usize, expected: &str) -> Result<(), InputError> {
+        match count {
+            0 => Err(self
+                .error(key, "the list is empty")
+                .found("an empty list")
+                .expected(expected)),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn quantity(name: FunctionName) -> Quantity {
+    match name {
+        FunctionName::Mass => Quantity::Mass,
+        FunctionName::Damping => Quantity::Damping,
+        FunctionName::Stiffness => Quantity::Stiffness,
+    }
+}

@@ -1,0 +1,135 @@
+//! Penalties: `smooth` and `variation` of the functions.
+
+use super::QUANTITIES;
+use super::functions::{spec, values};
+use crate::config::ModelFile;
+use crate::config::scalar::Weight;
+use crate::config::spec::{SmoothSpec, WeightRule};
+use crate::error::InputError;
+use crate::functions::{Basis, Penalty, Quantity};
+use crate::problem::Problem;
+
+/// A weight that is still to be chosen from the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightSearch {
+    /// How it is chosen.
+    pub rule: WeightRule,
+    /// The penalties that it multiplies, by their places in the problem.
+    pub penalties: Vec<usize>,
+}
+
+/// Adds the penalties of all functions to the problem; those whose weight is a rule have weight 1.
+pub(super) fn build(
+    file: &ModelFile,
+    problem: &mut Problem,
+    warnings: &mut Vec<String>,
+) -> Result<Option<WeightSearch>, InputError> {
+    let mut search: Option<WeightSearch> = None;
+    for (j, quantity) in QUANTITIES.into_iter().enumerate() {
+        let name = quantity.name();
+        let smooth = spec(file, quantity).smooth.iter();
+        for (place, spec) in smooth.flat_map(|list| list.iter()) {
+            let key = format!("functions.{name}.smooth{place}");
+            let weight = match spec.weight {
+                Weight::Number(weight) => weight.0,
+                Weight::Rule(rule) => {
+                    can_choose(file, &key, rule, search.as_ref())?;
+                    1.0
+                }
+            };
+            let Some(basis) = problem
+                .functions
+                .iter()
+                .nth(j)
+                .and_then(|f| f.basis.clone())
+            else {
+                continue;
+            };
+            let penalty = penalty(file, problem, (j, &basis), &key, spec, weight)?;
+            if penalty.target.is_empty() {
+                warnings.push(format!(
+                    "{key} says nothing: this derivative of a {} function is zero",
+                    basis.name()
+                ));
+                continue;
+            }
+            if let Weight::Rule(rule) = spec.weight {
+                let search = search.get_or_insert_with(|| WeightSearch {
+                    rule,
+                    penalties: Vec::new(),
+                });
+                search.penalties.push(problem.penalties.len());
+            }
+            if weight > 0.0 {
+                problem.penalties.push(penalty);
+            }
+        }
+    }
+    Ok(search)
+}
+
+/// Total variation of the functions: index and weight.
+pub(super) fn variation(file: &ModelFile) -> Vec<(usize, f64)> {
+    let weight = |q: Quantity| spec(file, q).variation.as_ref().map(|v| v.weight.0);
+    let given = QUANTITIES
+        .into_iter()
+        .enumerate()
+        .filter_map(|(j, q)| Some((j, weight(q)?)));
+    given.filter(|(_, weight)| *weight > 0.0).collect()
+}
+
+fn penalty(
+    file: &ModelFile,
+    problem: &Problem,
+    (j, basis): (usize, &Basis),
+    key: &str,
+    spec: &SmoothSpec,
+    weight: f64,
+) -> Result<Penalty, InputError> {
+    let grid = &problem.oscillator.grid;
+    let rows = basis.roughness(grid, spec.order.0);
+    let mut penalty = Penalty::new(j, spec.order.0, weight, rows);
+    if let Some(reference) = &spec.reference {
+        let key = format!("{key}.reference");
+        let values = values(file, grid, &key, reference)?;
+        // The part of the reference outside the basis adds a constant to the cost and nothing else.
+        let nearest = basis.project(grid, &values).ok_or_else(|| {
+            file.error_at(&key, "the reference cannot be turned into this basis")
+                .found(format!("`{}`", basis.name()))
+                .expected("a basis whose functions the nodes can tell apart")
+        })?;
+        penalty.target = penalty.residuals(&nearest);
+    }
+    Ok(penalty)
+}
+
+/// Refuses a second rule, and a rule that the readings give no footing.
+fn can_choose(
+    file: &ModelFile,
+    key: &str,
+    rule: WeightRule,
+    search: Option<&WeightSearch>,
+) -> Result<(), InputError> {
+    let key = format!("{key}.weight");
+    if let Some(first) = search.filter(|first| first.rule != rule) {
+        return Err(file
+            .error_at(&key, "there is one rule for all weights that are chosen")
+            .found(format!("`{rule}` beside `{}`", first.rule))
+            .expected("the same rule, or a number"));
+    }
+    let sigma = |e: &crate::config::spec::ExperimentSpec| {
+        let sigma = e.sigma.as_ref();
+        sigma.and_then(|s| s.displacement.as_ref()).is_some()
+    };
+    let without = file.spec.experiments.iter().position(|e| !sigma(e));
+    match without {
+        Some(i) if rule == WeightRule::Discrepancy => Err(file
+            .error_at(
+                &key,
+                "the rule `discrepancy` needs the noise of the readings",
+            )
+            .found(format!("no `sigma` in experiments[{i}]"))
+            .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,53 @@
+//! A cap on the damping ratio, as second-order cones.
+
+use super::All;
+use super::form::Form;
+use super::sampling::value;
+use crate::constraints::{Cone, ConeGroup, Rows};
+
+pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3], zeta: f64) -> ConeGroup {
+    let s = balance(all, m, k);
+    let parts = [value(m, s), value(c, 1.0 / zeta), value(k, 1.0 / s)];
+    let each = all.each(&parts);
+    let samples = each[0].iter().zip(&each[1]).zip(&each[2]);
+    let mut cones = Vec::new();
+    let mut times = Vec::new();
+    for ((m, c), k) in samples {
+        let cone = cone(m, c, k);
+        // Both sides of a time at which nothing jumps say the same.
+        if cones.last() != Some(&cone) {
+            cones.push(cone);
+            times.push(m.time);
+        }
+    }
+    ConeGroup {
+        name: format!("damping ratio <= {zeta}"),
+        cones,
+        times,
+    }
+}
+
+fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
+    let mut sum = m.clone();
+    sum.add(1.0, k);
+    let mut difference = m.clone();
+    difference.add(-1.0, k);
+    let mut rows = Rows::new();
+    for form in [&sum, c, &difference] {
+        rows.push(form.entries.iter().copied(), -form.constant);
+    }
+    Cone { rows }
+}
+
+/// The power of two nearest to `sqrt(k/m)`, by the largest values at the start.
+fn balance(all: &All<'_>, m: usize, k: usize) -> f64 {
+    let start = all.functions.device(&all.functions.start());
+    let sizes: Vec<f64> = (start.functions())
+        .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
+        .collect();
+    let exponent = (0.5 * (sizes[k] / sizes[m]).log2()).round();
+    match exponent.is_finite() {
+        true => exponent.exp2(),
+        false => 1.0,
+    }
+}

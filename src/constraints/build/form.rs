@@ -1,0 +1,114 @@
+//! Affine forms of the parameters, and groups of them.
+
+use super::Impossible;
+use crate::constraints::{RowGroup, TOLERANCE};
+use std::collections::HashMap;
+
+/// `sum entries theta + constant` about a span of time.
+#[derive(Debug, Clone)]
+pub(super) struct Form {
+    pub entries: Vec<(usize, f64)>,
+    pub constant: f64,
+    /// The time at which limits that change with time are read, s.
+    pub time: f64,
+    pub span: [f64; 2],
+}
+
+impl Form {
+    /// Adds `factor * other`.
+    pub fn add(&mut self, factor: f64, other: &Form) {
+        self.constant += factor * other.constant;
+        let scaled = other.entries.iter().map(|(j, a)| (*j, factor * a));
+        self.entries.extend(scaled);
+    }
+
+    fn size(&self) -> f64 {
+        let entries = self.entries.iter().map(|(_, a)| a.abs());
+        entries.fold(self.constant.abs(), f64::max)
+    }
+}
+
+/// A row in the making: its bounds are those of all forms that are the same.
+struct Row {
+    entries: Vec<(usize, f64)>,
+    limits: [f64; 2],
+    span: [f64; 2],
+}
+
+/// The group of `lower <= form <= upper` with bounds that may depend on the time. Forms without
+/// parameters are checked and left out; forms that are the same become one row.
+pub(super) fn group(
+    name: impl Into<String>,
+    forms: &[Form],
+    bounds: impl Fn(f64) -> [f64; 2],
+) -> Result<RowGroup, Impossible> {
+    let mut rows: Vec<Row> = Vec::new();
+    let mut known: HashMap<Vec<(usize, u64)>, usize> = HashMap::new();
+    let name = name.into();
+    let broken = |time| Impossible::Broken {
+        name: name.clone(),
+        time,
+    };
+    for form in forms {
+        let limits = bounds(form.time);
+        let [lower, upper] = limits.map(|limit| limit - form.constant);
+        let entries = merged(&form.entries);
+        if entries.is_empty() {
+            let slack = TOLERANCE * form.size().max(finite(limits));
+            if lower > slack || upper < -slack {
+                return Err(broken(form.time));
+            }
+            continue;
+        }
+        let key = entries.iter().map(|(j, a)| (*j, a.to_bits())).collect();
+        let place = *known.entry(key).or_insert(rows.len());
+        match rows.get_mut(place) {
+            None => rows.push(Row {
+                entries,
+                limits: [lower, upper],
+                span: form.span,
+            }),
+            Some(row) => {
+                row.limits = [row.limits[0].max(lower), row.limits[1].min(upper)];
+                row.span = [row.span[0].min(form.span[0]), row.span[1].max(form.span[1])];
+            }
+        }
+    }
+    let mut group = RowGroup::new(name.clone());
+    for row in rows {
+        let Row {
+            entries,
+            mut limits,
+            span,
+        } = row;
+        if limits[0] > limits[1] {
+            // Two readings of one equality differ by rounding, or they contradict each other.
+            if limits[0] - limits[1] > TOLERANCE * finite(limits) {
+                return Err(broken(span[0]));
+            }
+            limits = [0.5 * (limits[0] + limits[1]); 2];
+        }
+        group.push(entries, limits, span);
+    }
+    Ok(group)
+}
+
+fn finite(limits: [f64; 2]) -> f64 {
+    let sizes = limits.iter().map(|b| b.abs()).filter(|b| b.is_finite());
+    sizes.fold(0.0, f64::max)
+}
+
+/// Entries by rising column, added up, without zeros.
+fn merged(entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let mut sorted = entries.to_vec();
+    sorted.sort_by_key(|(j, _)| *j);
+    let mut merged: Vec<(usize, f64)> = Vec::with_capacity(sorted.len());
+    for (j, a) in sorted {
+        match merged.last_mut() {
+            Some((last, sum)) if *last == j => *sum += a,
+            _ => merged.push((j, a)),
+        }
+    }
+    merged.retain(|(_, a)| *a != 0.0);
+    merged
+}

@@ -1,0 +1,253 @@
+//! From statements about the functions to rows and cones in their parameters.
+//!
+//! Where every function in a statement is linear between its knots, the statement is enforced at the
+//! ends of all pieces and so holds **at all times**: `nodal`, `constant`, `piecewise-constant` and
+//! `piecewise-linear` functions, lines, parabolas' slopes, and the curvature of cubic splines. Values
+//! and slopes of other polynomials and of splines are held at every node, where the equation of
+//! motion looks at them; **between nodes nothing is promised** about those.
+//!
+//! A row that is about a single parameter (a value at a knot) stays one, so that clipping is exact.
+
+mod bounds;
+mod damping_ratio;
+mod equal;
+mod form;
+mod frequency;
+mod passive;
+mod sampling;
+mod shape;
+mod slope;
+mod totals;
+mod values;
+
+pub use shape::Shape;
+
+use super::Constraints;
+use crate::dynamics::Grid;
+use crate::functions::{CoefficientFunction, Functions, Quantity};
+use std::fmt;
+
+/// A limit of a function, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Limit {
+    /// The same at all times.
+    Number(f64),
+    /// Values at the nodes, linear in between.
+    Nodal {
+        /// What names of rows call it.
+        name: String,
+        /// One value per node.
+        values: Vec<f64>,
+    },
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Limit::Number(value) => write!(f, "{value}"),
+            Limit::Nodal { name, .. } => f.write_str(name),
+        }
+    }
+}
+
+/// What is demanded of the functions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Statement {
+    /// `min <= p(t) <= max`, in the unit of the function.
+    Bounds {
+        /// The function `p`.
+        of: Quantity,
+        /// Smallest value.
+        min: Option<Limit>,
+        /// Largest value.
+        max: Option<Limit>,
+    },
+    /// `min <= p'(t) <= max`, in (unit of p)/s; for `piecewise-constant` functions of the divided
+    /// differences between the centres of neighbouring cells.
+    Slope {
+        /// The function `p`.
+        of: Quantity,
+        /// Smallest slope.
+        min: Option<f64>,
+        /// Largest slope.
+        max: Option<f64>,
+    },
+    /// Monotone or curved in one direction.
+    Shape {
+        /// The function.
+        of: Quantity,
+        /// Which shape.
+        shape: Shape,
+    },
+    /// `p(at) = value`; a time within 1e-6 steps of a knot is that knot.
+    Value {
+        /// The function `p`.
+        of: Quantity,
+        /// Time, s.
+        at: f64,
+        /// Value, in the unit of the function.
+        value: f64,
+    },
+    /// `1/T integral p dt = value`, exactly.
+    Mean {
+        /// The function `p`.
+        of: Quantity,
+        /// Value, in the unit of the function.
+        value: f64,
+    },
+    /// `integral p dt = value` over the record, exactly.
+    Integral {
+        /// The function `p`.
+        of: Quantity,
+        /// Value, in (unit of the function) s.
+        value: f64,
+    },
+    /// `first(t) = ratio * second(t)` as numbers in their units: at all times where both are linear
+    /// between knots or of the same basis, else at the nodes.
+    Equal {
+        /// First function.
+        first: Quantity,
+        /// Second function.
+        second: Quantity,
+        /// Factor of the second.
+        ratio: f64,
+    },
+    /// The stored energy never grows: `c - m'/2 >= 0` and `k' <= 0`. In every cell `c` at both ends
+    /// is at least half the slope of `m` there; a `piecewise-constant` mass must not jump up.
+    Passive,
+    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the device at rest
+    /// stays in a band, in Hz.
+    Frequency {
+        /// Lowest frequency, Hz.
+        min: Option<f64>,
+        /// Highest frequency, Hz.
+        max: Option<f64>,
+    },
+    /// `c^2 <= 4 zeta^2 m k` with `m + k >= 0`: the damping ratio is at most `zeta`, as the
+    /// second-order cone `|(c/zeta, s m - k/s)| <= s m + k/s`.
+    ///
+    /// This is `|(c/zeta, m - k)| <= m + k` for masses and stiffnesses of one magnitude (kg and N/m)
+    /// and says the same for any `m, k >= 0` and `s > 0`. `s` is the power of two nearest to
+    /// `sqrt(k/m)` at the start, so that neither side drowns in the rounding of the other.
+    DampingRatio {
+        /// Largest damping ratio.
+        max: f64,
+    },
+}
+
+/// Why a statement cannot become rows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Impossible {
+    /// The device has no such function.
+    Absent(Quantity),
+    /// All functions that it is about are fixed.
+    Fixed(Vec<Quantity>),
+    /// No parameters can change that this row is broken.
+    Broken {
+        /// Name of the row's group.
+        name: String,
+        /// Time that it is broken at, s.
+        time: f64,
+    },
+}
+
+impl Statement {
+    /// The functions that it is about.
+    pub fn functions(&self) -> Vec<Quantity> {
+        match self {
+            Statement::Bounds { of, .. }
+            | Statement::Slope { of, .. }
+            | Statement::Shape { of, .. }
+            | Statement::Value { of, .. }
+            | Statement::Mean { of, .. }
+            | Statement::Integral { of, .. } => vec![*of],
+            Statement::Equal { first, second, .. } => vec![*first, *second],
+            Statement::Frequency { .. } => vec![Quantity::Mass, Quantity::Stiffness],
+            Statement::Passive | Statement::DampingRatio { .. } => {
+                vec![Quantity::Mass, Quantity::Damping, Quantity::Stiffness]
+            }
+        }
+    }
+
+    /// Rows and cones in the parameters of all `functions`; fixed functions are moved to the bounds.
+    /// A statement that always holds has no rows.
+    ///
+    /// # Errors
+    /// If it is about fixed functions only, or no parameters can fulfil a row of it.
+    pub fn build(&self, grid: &Grid, functions: &Functions) -> Result<Constraints, Impossible> {
+        let all = All::new(grid, functions);
+        let about = self.functions();
+        let indices: Vec<usize> = (about.iter())
+            .map(|q| all.index(*q))
+            .collect::<Result<_, _>>()?;
+        if indices.iter().all(|&j| all.list[j].parameters() == 0) {
+            return Err(Impossible::Fixed(about));
+        }
+        let mut found = Constraints::default();
+        match (self, indices.as_slice()) {
+            (Statement::Bounds { min, max, .. }, &[j]) => {
+                found.groups = bounds::build(&all, j, min.as_ref(), max.as_ref())?;
+            }
+            (Statement::Slope { min, max, .. }, &[j]) => {
+                found.groups = slope::build(&all, j, *min, *max)?;
+            }
+            (Statement::Shape { shape, .. }, &[j]) => {
+                found.groups = vec![shape::build(&all, j, *shape)?];
+            }
+            (Statement::Value { at, value, .. }, &[j]) => {
+                found.groups = vec![values::build(&all, j, *at, *value)?];
+            }
+            (Statement::Mean { value, .. }, &[j]) => {
+                found.groups = vec![totals::mean(&all, j, *value)?];
+            }
+            (Statement::Integral { value, .. }, &[j]) => {
+                found.groups = vec![totals::integral(&all, j, *value)?];
+            }
+            (Statement::Equal { ratio, .. }, &[a, b]) => {
+                found.groups = vec![equal::build(&all, [a, b], *ratio)?];
+            }
+            (Statement::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
+            (Statement::Frequency { min, max }, &[m, k]) => {
+                found.groups = frequency::build(&all, [m, k], *min, *max)?;
+            }
+            (Statement::DampingRatio { max }, &[m, c, k]) => {
+                found.cones = vec![damping_ratio::build(&all, [m, c, k], *max)];
+            }
+            _ => {}
+        }
+        found.groups.retain(|group| !group.rows.is_empty());
+        found.cones.retain(|group| !group.cones.is_empty());
+        Ok(found)
+    }
+}
+
+/// All functions on their grid.
+struct All<'a> {
+    grid: &'a Grid,
+    functions: &'a Functions,
+    list: Vec<&'a CoefficientFunction>,
+}
+
+impl<'a> All<'a> {
+    fn new(grid: &'a Grid, functions: &'a Functions) -> Self {
+        Self {
+            grid,
+            functions,
+            list: functions.iter().collect(),
+        }
+    }
+
+    fn index(&self, quantity: Quantity) -> Result<usize, Impossible> {
+        let place = self.list.iter().position(|f| f.quantity == quantity);
+        place.ok_or(Impossible::Absent(quantity))
+    }
+
+    fn name(&self, j: usize) -> &'static str {
+        self.list[j].quantity.name()
+    }
+
+    /// Both ends of the record, s.
+    fn ends(&self) -> [f64; 2] {
+        [self.grid.start(), self.grid.time(self.grid.nodes() - 1)]
+    }
+}

@@ -1,0 +1,27 @@
+//! Passivity: the stored energy `m v^2/2 + k y^2/2` never grows.
+
+use super::form::group;
+use super::sampling::{slope, value};
+use super::shape::DOWN;
+use super::slope::slopes;
+use super::{All, Impossible};
+use crate::constraints::RowGroup;
+use crate::functions::Basis;
+
+pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3]) -> Result<Vec<RowGroup>, Impossible> {
+    let mut groups = Vec::new();
+    let mut parts = vec![value(c, 1.0)];
+    if let Some(Basis::PiecewiseConstant { .. }) = all.list[m].basis {
+        // Inside the cells m' is zero; a jump of m is a slope without bound.
+        let jumps = slopes(all, m);
+        groups.push(group("passive: m does not jump up", &jumps, |_| DOWN)?);
+    } else {
+        parts.push(slope(m, -0.5));
+    }
+    let damping = all.sum(&parts, &[]);
+    groups.push(group("passive: c >= m'/2", &damping, |_| {
+        [0.0, f64::INFINITY]
+    })?);
+    groups.push(group("passive: k' <= 0", &slopes(all, k), |_| DOWN)?);
+    Ok(groups)
+}

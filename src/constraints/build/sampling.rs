@@ -1,0 +1,229 @@
+//! At which times a statement has to hold so that it holds everywhere, and the forms there.
+
+use super::All;
+use super::form::Form;
+use crate::dynamics::Grid;
+use crate::functions::Basis;
+use nalgebra_sparse::CsrMatrix;
+
+/// Times nearer than this, relative to the record, are one: the same that the bases take for one.
+const SAME_TIME: f64 = 1e-12;
+/// Values this near to a line, relative to their size, are a line.
+const STRAIGHT: f64 = 1e-13;
+
+/// `factor * d^derivative p / dt^derivative` of one function.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part {
+    pub function: usize,
+    pub derivative: usize,
+    pub factor: f64,
+}
+
+/// The value of a function.
+pub(super) fn value(function: usize, factor: f64) -> Part {
+    Part {
+        function,
+        derivative: 0,
+        factor,
+    }
+}
+
+/// The slope of a function.
+pub(super) fn slope(function: usize, factor: f64) -> Part {
+    Part {
+        function,
+        derivative: 1,
+        factor,
+    }
+}
+
+/// Where a derivative of a function is linear.
+enum Pieces {
+    /// Between these times; it may jump at them.
+    Linear { times: Vec<f64>, jumps: bool },
+    /// Nowhere: it is looked at at every node.
+    Smooth,
+}
+
+/// One end of a piece: where continuous parts are read, and where those that jump are.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    time: f64,
+    inside: f64,
+    span: [f64; 2],
+}
+
+impl All<'_> {
+    fn pieces(&self, part: Part) -> Pieces {
+        let function = self.list[part.function];
+        let grid = self.grid;
+        let linear = |times, jumps| Pieces::Linear { times, jumps };
+        match &function.basis {
+            None => {
+                let times = self.breaks(&function.offset);
+                let jumps = part.derivative > 0 && times.len() > 2;
+                linear(times, jumps)
+            }
+            Some(basis @ (Basis::Nodal | Basis::PiecewiseLinear { .. })) => {
+                linear(basis.knot_times(grid), part.derivative > 0)
+            }
+            Some(basis @ Basis::PiecewiseConstant { .. }) => linear(basis.knot_times(grid), true),
+            Some(Basis::Constant) => linear(self.ends().to_vec(), false),
+            Some(Basis::Polynomial { degree }) if *degree <= part.derivative + 1 => {
+                linear(self.ends().to_vec(), false)
+            }
+            Some(basis @ Basis::BSpline { .. }) if part.derivative >= 2 => {
+                linear(basis.knot_times(grid), false)
+            }
+            Some(Basis::Polynomial { .. } | Basis::BSpline { .. }) => Pieces::Smooth,
+        }
+    }
+
+    /// The times between which nodal values are on a line: the ends, or all nodes.
+    pub fn breaks(&self, nodal: &[f64]) -> Vec<f64> {
+        let last = nodal.len() - 1;
+        let size = nodal.iter().fold(0.0f64, |most, p| most.max(p.abs()));
+        let off = |(i, p): (usize, &f64)| {
+            let share = i as f64 / last as f64;
+            let line = nodal[0] * (1.0 - share) + nodal[last] * share;
+            (p - line).abs() > STRAIGHT * size
+        };
+        match nodal.iter().enumerate().any(off) {
+            true => self.grid.times(),
+            false => self.ends().to_vec(),
+        }
+    }
+
+    /// The sum of `parts` at the ends of all pieces, where it must be tested to be known everywhere;
+    /// `also` are further times at which what it is compared with bends.
+    pub fn sum(&self, parts: &[Part], also: &[f64]) -> Vec<Form> {
+        let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
+        let samples = self.samples(&pieces, also);
+        let mut sums: Vec<Form> = samples.iter().map(Form::at).collect();
+        for (part, pieces) in parts.iter().zip(&pieces) {
+            let jumps = matches!(pieces, Pieces::Linear { jumps: true, .. });
+            let times: Vec<f64> = (samples.iter())
+                .map(|s| if jumps { s.inside } else { s.time })
+                .collect();
+            let forms = self.forms(part.function, part.derivative, &times);
+            for (sum, form) in sums.iter_mut().zip(&forms) {
+                sum.add(part.factor, form);
+            }
+        }
+        sums
+    }
+
+    /// All `parts` on their own at the same times.
+    pub fn each(&self, parts: &[Part]) -> Vec<Vec<Form>> {
+        let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
+        let samples = self.samples(&pieces, &[]);
+        let one = |(part, pieces): (&Part, &Pieces)| {
+            let jumps = matches!(pieces, Pieces::Linear { jumps: true, .. });
+            let times: Vec<f64> = (samples.iter())
+                .map(|s| if jumps { s.inside } else { s.time })
+                .collect();
+            let mut forms: Vec<Form> = samples.iter().map(Form::at).collect();
+            let read = self.forms(part.function, part.derivative, &times);
+            for (form, read) in forms.iter_mut().zip(&read) {
+                form.add(part.factor, read);
+            }
+            forms
+        };
+        parts.iter().zip(&pieces).map(one).collect()
+    }
+
+    fn samples(&self, pieces: &[Pieces], also: &[f64]) -> Vec<Sample> {
+        let mut times = also.to_vec();
+        let mut any_jumps = false;
+        for pieces in pieces {
+            match pieces {
+                Pieces::Linear { times: own, jumps } => {
+                    times.extend(own);
+                    any_jumps |= jumps;
+                }
+                Pieces::Smooth => times.extend(self.grid.times()),
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        let slack = SAME_TIME * self.grid.duration();
+        times.dedup_by(|later, earlier| *later - *earlier <= slack);
+        if !any_jumps {
+            let at = |t: &f64| Sample {
+                time: *t,
+                inside: *t,
+                span: [*t, *t],
+            };
+            return times.iter().map(at).collect();
+        }
+        let ends = |cell: &[f64]| {
+            let span = [cell[0], cell[1]];
+            let inside = 0.5 * (cell[0] + cell[1]);
+            span.map(|time| Sample { time, inside, span })
+        };
+        times.windows(2).flat_map(ends).collect()
+    }
+
+    /// A derivative of a function at `times` (s).
+    pub fn forms(&self, j: usize, derivative: usize, times: &[f64]) -> Vec<Form> {
+        let function = self.list[j];
+        let first = self.functions.ranges()[j].start;
+        let rows = function.basis.as_ref();
+        let rows = rows.map(|basis| basis.rows(self.grid, times, derivative));
+        let form = |(i, t): (usize, &f64)| Form {
+            entries: rows.as_ref().map_or(Vec::new(), |m| entries(m, i, first)),
+            constant: nodal(self.grid, &function.offset, derivative, *t),
+            time: *t,
+            span: [*t, *t],
+        };
+        times.iter().enumerate().map(form).collect()
+    }
+
+    /// Rows of a matrix in the parameters of function `j`, one form each at `times` (s).
+    pub fn matrix_forms(&self, j: usize, rows: &CsrMatrix<f64>, times: &[f64]) -> Vec<Form> {
+        let first = self.functions.ranges()[j].start;
+        let form = |(i, t): (usize, &f64)| Form {
+            entries: entries(rows, i, first),
+            constant: 0.0,
+            time: *t,
+            span: [*t, *t],
+        };
+        times.iter().enumerate().map(form).collect()
+    }
+}
+
+impl Form {
+    /// Zero at a sample.
+    fn at(sample: &Sample) -> Self {
+        Self {
+            entries: Vec::new(),
+            constant: 0.0,
+            time: sample.time,
+            span: sample.span,
+        }
+    }
+}
+
+fn entries(matrix: &CsrMatrix<f64>, i: usize, first: usize) -> Vec<(usize, f64)> {
+    let row = matrix.row(i);
+    let columns = row.col_indices().iter().map(|j| first + j);
+    columns.zip(row.values().iter().copied()).collect()
+}
+
+/// A derivative of the piecewise linear function with these values at the nodes.
+pub(super) fn nodal(grid: &Grid, values: &[f64], derivative: usize, t: f64) -> f64 {
+    let x = (t - grid.start()) / grid.step();
+    // A time that misses a node by rounding is that node.
+    let near = x.round();
+    let x = match (x - near).abs() <= SAME_TIME * values.len() as f64 {
+        true => near,
+        false => x,
+    };
+    let cell = (x.max(0.0) as usize).min(values.len() - 2);
+    let share = (x - cell as f64).clamp(0.0, 1.0);
+    match derivative {
+        0 if share == 0.0 => values[cell],
+        0 => values[cell] * (1.0 - share) + values[cell + 1] * share,
+        1 => (values[cell + 1] - values[cell]) / grid.step(),
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,77 @@
+//! Monotone, convex and concave functions.
+
+use super::form::{Form, group};
+use super::sampling::Part;
+use super::slope::slopes;
+use super::{All, Impossible};
+use crate::constraints::RowGroup;
+use crate::functions::Basis;
+
+/// The shape of a function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// It never rises.
+    NonIncreasing,
+    /// It never falls.
+    NonDecreasing,
+    /// Its slope never falls.
+    Convex,
+    /// Its slope never rises.
+    Concave,
+}
+
+impl Shape {
+    /// Name in a model file and in names of rows.
+    pub fn name(self) -> &'static str {
+        match self {
+            Shape::NonIncreasing => "non-increasing",
+            Shape::NonDecreasing => "non-decreasing",
+            Shape::Convex => "convex",
+            Shape::Concave => "concave",
+        }
+    }
+}
+
+/// Not negative, and not positive.
+pub(super) const UP: [f64; 2] = [0.0, f64::INFINITY];
+pub(super) const DOWN: [f64; 2] = [f64::NEG_INFINITY, 0.0];
+
+pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, Impossible> {
+    let (forms, bounds) = match shape {
+        Shape::NonIncreasing => (slopes(all, j), DOWN),
+        Shape::NonDecreasing => (slopes(all, j), UP),
+        Shape::Convex => (curvatures(all, j), UP),
+        Shape::Concave => (curvatures(all, j), DOWN),
+    };
+    let name = format!("{} {}", all.name(j), shape.name());
+    group(name, &forms, |_| bounds)
+}
+
+/// The curvature of a function, or where it is not square-integrable its divided differences, scaled
+/// by the root of their spacing.
+fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
+    match &all.list[j].basis {
+        Some(
+            basis
+            @ (Basis::Nodal | Basis::PiecewiseLinear { .. } | Basis::PiecewiseConstant { .. }),
+        ) => {
+            let rows = basis.roughness(all.grid, 2);
+            let knots = basis.knot_times(all.grid);
+            // The rows are about the inner knots, or about the inner cells.
+            let middle = |i: usize| match basis {
+                Basis::PiecewiseConstant { .. } => 0.5 * (knots[i + 1] + knots[i + 2]),
+                _ => knots[i + 1],
+            };
+            let times: Vec<f64> = (0..rows.nrows()).map(middle).collect();
+            all.matrix_forms(j, &rows, &times)
+        }
+        _ => {
+            let curvature = Part {
+                function: j,
+                derivative: 2,
+                factor: 1.0,
+            };
+            all.sum(&[curvature], &[])
+        }
+    }
+}
