@@ -1,6 +1,6 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
-use crate::constraints::Constraints;
+use crate::constraints::{Constraints, RowGroup};
 use crate::dynamics::{Oscillator, State};
 use crate::functions::{Functions, Penalty, Variation};
 use crate::objective::{Readings, Weighting};
@@ -33,6 +33,8 @@ pub struct Problem {
     pub variations: Vec<Variation>,
     /// What the functions must satisfy.
     pub constraints: Constraints,
+    /// What the functions may break at a price.
+    pub soft: Vec<RowGroup>,
 }
 
 impl Problem {
@@ -45,6 +47,7 @@ impl Problem {
             penalties: Vec::new(),
             variations: Vec::new(),
             constraints: Constraints::default(),
+            soft: Vec::new(),
         }
     }
 

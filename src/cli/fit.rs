@@ -2,10 +2,10 @@
 
 use super::progress::Progress;
 use super::{Failure, exit_code, interrupt, print, unwritable};
-use crate::config::{Model, ModelFile, Purpose, build};
+use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::report::document::{Prediction, ResultDocument};
 use crate::report::{OutputFolder, Run, json, predict, summary};
-use crate::solvers::{Fit, Status, fit};
+use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit};
 use std::path::{Path, PathBuf};
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -50,23 +50,43 @@ pub(super) fn fit_into(
     progress: &Progress,
     with_figures: bool,
 ) -> Result<(ResultDocument, Status), Failure> {
-    let found = search(model, progress)?;
+    let (weighted, path, found) = search(model, progress)?;
+    let model = weighted.as_ref().unwrap_or(model);
     let predictions = predictions(model, &found)?;
     let run = Run {
         model,
         fit: &found,
         predictions: &predictions,
+        weights: path.as_ref(),
     };
     run.write(folder, with_figures)
         .map_err(|error| unwritable(folder.path(), &error))?;
     Ok((run.document(), found.outcome.status))
 }
 
-fn search(model: &Model, progress: &Progress) -> Result<Fit, Failure> {
+/// The fit; where a rule chooses the weight of the smoothness also the model with that weight and
+/// the path on which it was chosen.
+fn search(
+    model: &Model,
+    progress: &Progress,
+) -> Result<(Option<Model>, Option<WeightPath>, Fit), Failure> {
     let start = model.problem.functions.start();
-    let result = fit(&model.problem, &start, &model.settings, &mut |row| {
-        progress.show(row)
-    });
+    let mut observe = |row: &Row| progress.show(row);
+    let (problem, settings) = (&model.problem, &model.settings);
+    let result = match &model.weight_rule {
+        None => fit(problem, &start, settings, &mut observe).map(|fit| (None, None, fit)),
+        Some(WeightSearch { rule, penalties }) => {
+            choose_weight(problem, &start, settings, *rule, penalties, &mut observe).map(
+                |(path, problem, fit)| {
+                    let weighted = Model {
+                        problem,
+                        ..model.clone()
+                    };
+                    (Some(weighted), Some(path), fit)
+                },
+            )
+        }
+    };
     progress.clear();
     result.map_err(|breakdown| Failure::Numerical(format!("the start has no motion: {breakdown}")))
 }

@@ -5,6 +5,7 @@
 mod build;
 mod rows;
 mod set;
+mod soft;
 mod violation;
 
 pub use build::{Impossible, Limit, Shape, Statement};

@@ -97,12 +97,12 @@ impl Constraints {
         self.cones.extend(other.cones);
     }
 
-    /// The constraints that must hold: those without the soft ones.
-    #[must_use]
-    pub fn hard(&self) -> Self {
-        let mut hard = self.clone();
-        hard.groups.retain(|group| group.soft.is_none());
-        hard
+    /// Takes out the soft groups.
+    pub fn take_soft(&mut self) -> Vec<RowGroup> {
+        let groups = std::mem::take(&mut self.groups);
+        let (soft, hard) = groups.into_iter().partition(|group| group.soft.is_some());
+        self.groups = hard;
+        soft
     }
 
     /// Whether every constraint bounds or fixes a single parameter, so that clipping projects onto

@@ -51,7 +51,7 @@ impl Problem {
             }
             GradientKind::Continuous => self.continuous_gradient(evaluation),
         };
-        if !(self.penalties.is_empty() && self.variations.is_empty()) {
+        if self.is_regularised() {
             let push = self.penalty_gradient(theta);
             let push_l2 = self.functions.gram_solve(&push);
             euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
@@ -65,6 +65,10 @@ impl Problem {
         }
     }
 
+    fn is_regularised(&self) -> bool {
+        !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
+    }
+
     fn penalty_gradient(&self, theta: &[f64]) -> Vec<f64> {
         let mut gradient = vec![0.0; theta.len()];
         for penalty in &self.penalties {
@@ -74,6 +78,9 @@ impl Problem {
         for variation in &self.variations {
             let range = self.functions.ranges()[variation.function].clone();
             variation.add_gradient(&theta[range.clone()], &mut gradient[range]);
+        }
+        for group in &self.soft {
+            group.add_price_gradient(theta, &mut gradient);
         }
         gradient
     }

@@ -43,7 +43,8 @@ impl Problem {
     ///
     /// The cost is the sum over the experiments of [`Readings::cost`] plus the sum over the penalties
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
-    /// of `weight sum |D theta|` ([`crate::functions::Variation`]).
+    /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
+    /// constraints ([`crate::constraints::RowGroup::price`]).
     ///
     /// # Errors
     /// A [`Breakdown`] if a motion does not exist: the mass is not positive, or it overflows.
@@ -82,7 +83,7 @@ impl Problem {
     }
 
     /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
-    /// `weight sum |D theta|`.
+    /// `weight sum |D theta|` plus soft constraints `weight mean excess^2`.
     pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
         let smooth = self.penalties.iter().map(|penalty| {
@@ -91,6 +92,7 @@ impl Problem {
         let jumps = self.variations.iter().map(|variation| {
             variation.weight * variation.total(&theta[ranges[variation.function].clone()])
         });
-        smooth.sum::<f64>() + jumps.sum::<f64>()
+        let broken = self.soft.iter().map(|group| group.price(theta));
+        smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>()
     }
 }

@@ -33,6 +33,9 @@ pub struct ResultDocument {
     /// The constraints at the best point.
     #[serde(default)]
     pub constraints: ConstraintSummary,
+    /// How the weight of the smoothness was chosen, if by a rule.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<WeightSummary>,
     /// The starts that were tried, in order.
     #[serde(default)]
     pub rungs: Vec<RungSummary>,
@@ -167,11 +170,15 @@ pub struct Prediction {
 
 /// The constraints at the best point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ConstraintSummary {
     /// Largest violation relative to its row's scale; 0 if all hold or there are none.
     pub max_violation: f64,
     /// The groups with rows at their bounds.
     pub active: Vec<ActiveSummary>,
+    /// The soft groups that are broken.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub slack: Vec<SlackSummary>,
 }
 
 /// A group of constraints with rows at their bounds.
@@ -204,4 +211,49 @@ pub struct RungSummary {
     pub iterations: u64,
     /// How it ended.
     pub status: String,
+}
+
+/// A soft constraint that is broken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SlackSummary {
+    /// What the constraint says.
+    pub name: String,
+    /// Number of broken rows.
+    pub rows: usize,
+    /// By how much at most, in the unit of the row.
+    pub largest: f64,
+    /// Part of J that it costs.
+    pub price: f64,
+}
+
+/// How the weight of the smoothness was chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WeightSummary {
+    /// The rule asked for.
+    pub rule: String,
+    /// The weight used.
+    pub weight: f64,
+    /// What each rule picks on the path; absent where it picks none.
+    pub picks: BTreeMap<String, f64>,
+    /// Seed of the random vectors behind the degrees of freedom.
+    pub seed: u64,
+    /// What the user should know about the choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+    /// The fits along the path, by falling weight.
+    pub path: Vec<PathSummary>,
+}
+
+/// One fit along the path of weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PathSummary {
+    /// Weight.
+    pub weight: f64,
+    /// Misfit of the readings.
+    pub misfit: f64,
+    /// `sum |L theta - target|^2` of the penalties on the path.
+    pub roughness: f64,
+    /// Effective number of parameters that the data determine; absent where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
 }

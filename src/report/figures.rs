@@ -4,6 +4,7 @@ use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
 use super::predict::PredictedMotion;
 use crate::dynamics::Trajectory;
+use crate::solvers::{PathPoint, WeightPath, WeightRule};
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
@@ -295,4 +296,49 @@ pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
                 .maybe(predicted.truth.as_ref().map(true_motion)),
         )
     })
+}
+
+/// The path of weights: misfit and roughness against the weight, with what each rule picks.
+pub fn weight_path(path: &WeightPath) -> Figure {
+    let column = |f: fn(&PathPoint) -> f64| path.points.iter().map(f).collect::<Vec<f64>>();
+    let weights = column(|p| p.weight);
+    let curve = |label: &str, values: Vec<f64>, colour: Colour| {
+        Mark::line(label, &weights, &values, Style::new(colour).width(1.8))
+    };
+    let panel = |y: Axis, mark: Mark| {
+        let panel = Panel::new(Axis::log("weight", ""), y).mark(mark);
+        let dashes = [Dash::Dashed, Dash::Dotted, Dash::DashDot];
+        let picks = WeightRule::ALL
+            .iter()
+            .zip(path.picks)
+            .zip(dashes)
+            .enumerate();
+        picks.fold(panel, |panel, (i, ((rule, pick), dash))| {
+            let style = Style::nth(i + 1).dash(dash);
+            let mark = |i: usize| Mark::vertical(rule.name(), path.points[i].weight, style);
+            panel.maybe(pick.map(mark))
+        })
+    };
+    Figure::new(
+        "weights",
+        "Choice of the weight",
+        "Misfit, roughness and effective degrees of freedom against the weight of the smoothness, \
+         with the weight that each rule picks.",
+    )
+    .panel(panel(
+        Axis::log("misfit", ""),
+        curve("misfit", column(|p| p.misfit), Colour::Blue),
+    ))
+    .panel(panel(
+        Axis::log("roughness", ""),
+        curve("roughness", column(|p| p.roughness), Colour::Black),
+    ))
+    .panel(panel(
+        Axis::log("degrees of freedom", ""),
+        curve(
+            "degrees of freedom",
+            column(|p| p.degrees_of_freedom),
+            Colour::Green,
+        ),
+    ))
 }

@@ -3,8 +3,8 @@
 use super::csv::CsvTable;
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
-    FunctionSummary, GradientSummary, ModelSummary, OutcomeSummary, Prediction, ResultDocument,
-    RungSummary,
+    FunctionSummary, GradientSummary, ModelSummary, OutcomeSummary, PathSummary, Prediction,
+    ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
@@ -14,7 +14,9 @@ use crate::config::Model;
 use crate::dynamics::Device;
 use crate::functions::{Quantity, Ratios};
 use crate::objective::Weighting;
-use crate::solvers::{ActiveGroup, Fit, Row, Rung, active_constraints};
+use crate::solvers::{
+    ActiveGroup, Fit, PathPoint, Row, Rung, WeightPath, WeightRule, active_constraints,
+};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -27,6 +29,8 @@ pub struct Run<'a> {
     pub fit: &'a Fit,
     /// The motion of the found device from other initial states.
     pub predictions: &'a [Prediction],
+    /// The path on which the weight of the smoothness was chosen, if by a rule.
+    pub weights: Option<&'a WeightPath>,
 }
 
 impl Run<'_> {
@@ -83,6 +87,7 @@ impl Run<'_> {
             seconds: fit.elapsed.as_secs_f64(),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
+            weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
             predictions: self.predictions.to_vec(),
@@ -131,7 +136,48 @@ impl Run<'_> {
         ConstraintSummary {
             max_violation: worst.map_or(0.0, |v| v.relative),
             active: active.into_iter().map(active_summary).collect(),
+            slack: self.slack(),
         }
+    }
+
+    fn slack(&self) -> Vec<SlackSummary> {
+        let theta = &self.fit.best.parameters;
+        let broken = self.model.problem.soft.iter().filter_map(|group| {
+            let (rows, largest) = group.slack(theta);
+            (!rows.is_empty()).then(|| SlackSummary {
+                name: group.name.clone(),
+                rows: rows.len(),
+                largest,
+                price: group.price(theta),
+            })
+        });
+        broken.collect()
+    }
+
+    fn weight_summary(&self) -> Option<WeightSummary> {
+        let path = self.weights?;
+        let rule = self.model.weight_rule.as_ref()?.rule;
+        let picks = WeightRule::ALL
+            .iter()
+            .zip(path.picks)
+            .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
+        let point = |p: &PathPoint| PathSummary {
+            weight: p.weight,
+            misfit: p.misfit,
+            roughness: p.roughness,
+            degrees_of_freedom: p
+                .degrees_of_freedom
+                .is_finite()
+                .then_some(p.degrees_of_freedom),
+        };
+        Some(WeightSummary {
+            rule: rule.name().into(),
+            weight: path.chosen_weight(),
+            picks: picks.collect(),
+            seed: path.seed,
+            remark: path.remark.clone(),
+            path: path.points.iter().map(point).collect(),
+        })
     }
 
     fn named_functions(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
@@ -232,11 +278,12 @@ impl Run<'_> {
 
     /// The figures of a fit.
     pub fn figures(&self) -> Vec<Figure> {
-        let mut figures = vec![
+        let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
+        figures.extend([
             self.convergence(),
             self.functions_figure(),
             self.ratios_figure(),
-        ];
+        ]);
         let problem = &self.model.problem;
         let several = problem.experiments.len() > 1;
         for (i, experiment) in problem.experiments.iter().enumerate() {

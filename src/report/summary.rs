@@ -75,6 +75,23 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
 }
 
 fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    if let Some(weights) = &document.weights {
+        writeln!(
+            text,
+            "weight of the smoothness {:.3e} by {}",
+            weights.weight, weights.rule
+        )?;
+        if let Some(remark) = &weights.remark {
+            writeln!(text, "{remark}")?;
+        }
+    }
+    for slack in &document.constraints.slack {
+        writeln!(
+            text,
+            "soft `{}` is broken by up to {:.3e} on {} rows",
+            slack.name, slack.largest, slack.rows
+        )?;
+    }
     for active in &document.constraints.active {
         writeln!(text, "{}", active.sentence)?;
     }

@@ -9,8 +9,10 @@ use crate::solvers::Point;
 /// program brings a row that it does not mean to touch.
 const NEAR: f64 = 1e-6;
 /// A push counts if giving way by one per cent of the row's scale would lower J by more than this
-/// share of it.
+/// share of it, or of [`NOTHING`] of what there is to explain, where J is less.
 const PUSH: f64 = 1e-6;
+/// A cost below this share of the misfit of no motion is rounding.
+const NOTHING: f64 = 1e-12;
 
 /// A group of constraints with active rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,6 +78,10 @@ pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> 
         return Vec::new();
     }
     let multipliers = multipliers(problem, point);
+    let worth = point
+        .evaluation
+        .cost
+        .max(NOTHING * problem.misfit_of_silence());
     let groups = constraints.groups.iter().zip(near).enumerate();
     groups
         .filter(|(_, (_, rows))| !rows.is_empty())
@@ -83,7 +89,7 @@ pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> 
             let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m[g][i].abs());
             let counts = |&i: &usize| {
                 let gain = 0.01 * group.scale(i, &point.parameters) * multiplier(i);
-                gain > PUSH * point.evaluation.cost
+                gain > PUSH * worth
             };
             let pushed: Vec<usize> = rows.iter().copied().filter(counts).collect();
             ActiveGroup {

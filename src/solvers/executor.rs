@@ -5,7 +5,7 @@ use super::lbfgs::Lbfgs;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
 use super::projected_gradient::ProjectedGradient;
-use super::recorder::{Recorder, Row, Snapshot, ratio};
+use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step};
 use crate::dynamics::{Breakdown, Cause};
@@ -19,9 +19,11 @@ use std::time::{Duration, Instant};
 pub struct Fit {
     /// The point with the lowest cost.
     pub best: Point,
-    /// Cost at the start.
+    /// Cost at the start values of the functions, whatever start the search took.
     pub initial_cost: f64,
-    /// `G^2` at the start.
+    /// Cost at the point from which the search set out.
+    pub started_from: f64,
+    /// `G^2` at the start values.
     pub initial_norm_squared: f64,
     /// One row per iteration.
     pub history: Vec<Row>,
@@ -44,7 +46,8 @@ impl Fit {
     }
 }
 
-/// Runs one solver from `start`; `observe` is called after every iteration.
+/// Runs one solver from `start`; `observe` is called after every iteration. `reference` is what the
+/// ratios of cost and gradient are taken to, by default the start itself.
 ///
 /// Every method accepts only points of lower cost, so the last point is the best one.
 ///
@@ -54,11 +57,13 @@ pub(super) fn search(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
+    reference: Option<Reference>,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
     let run = Run {
         method: method(settings.solver),
         settings,
+        reference,
         clock: Instant::now(),
         progress: Err(NOT_STARTED),
         outcome: None,
@@ -87,6 +92,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
 struct Run<'a> {
     method: Box<dyn Descend>,
     settings: &'a FitSettings,
+    reference: Option<Reference>,
     clock: Instant,
     progress: Result<Progress, Breakdown>,
     outcome: Option<Outcome>,
@@ -115,7 +121,7 @@ impl Run<'_> {
         work.evaluate_into(&parameters, &mut evaluation)?;
         let point = work.complete(parameters, evaluation);
         Ok(Progress {
-            recorder: Recorder::new(&point),
+            recorder: Recorder::new(&point, self.reference),
             point,
         })
     }
@@ -163,6 +169,7 @@ impl Run<'_> {
         Ok(Fit {
             best: point,
             initial_cost: recorder.initial_cost,
+            started_from: recorder.started_from,
             initial_norm_squared: recorder.initial_norm_squared,
             history: recorder.rows,
             snapshots: recorder.snapshots,

@@ -6,6 +6,7 @@
 //! equation-error start; a horizon that grows from an eighth of the record to all of it.
 
 use super::executor::search;
+use super::recorder::Reference;
 use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
@@ -86,20 +87,26 @@ pub fn fit(
         Initial::Functions => [Attempt::Functions, Attempt::Data, Attempt::GrowingHorizon],
         Initial::Data => [Attempt::Data, Attempt::Functions, Attempt::GrowingHorizon],
     };
+    let mut reference = reference(problem, start, settings);
     let climbs = settings.solver == Solver::GaussNewton;
     let mut best: Option<Fit> = None;
     let mut rungs = Vec::new();
     let mut trouble = None;
     for attempt in attempts {
-        match run(problem, start, settings, attempt, observe) {
+        match run(problem, start, settings, attempt, reference, observe) {
             Ok(fit) => {
                 rungs.push(Rung {
                     name: attempt.name(),
-                    initial_cost: fit.initial_cost,
+                    initial_cost: fit.started_from,
                     cost: fit.best.evaluation.cost,
                     iterations: fit.history.len() as u64,
                     outcome: fit.outcome.clone(),
                 });
+                // The later rungs are compared to the start values too.
+                reference = reference.or(Some(Reference {
+                    cost: fit.initial_cost,
+                    norm_squared: fit.initial_norm_squared,
+                }));
                 let ended = matches!(fit.outcome.status, Status::Interrupted | Status::TimeLimit);
                 let enough = !climbs || ended || explains(problem, &fit);
                 best = Some(better(best, fit));
@@ -131,6 +138,20 @@ pub fn fit(
     }
 }
 
+/// Cost and gradient at the start values, to which all rungs are compared.
+fn reference(problem: &Problem, start: &[f64], settings: &FitSettings) -> Option<Reference> {
+    if settings.initial == Initial::Functions {
+        // The first rung begins there and finds out for itself.
+        return None;
+    }
+    let evaluation = problem.evaluate(start).ok()?;
+    let gradient = problem.gradient(start, &evaluation, settings.gradient);
+    Some(Reference {
+        cost: evaluation.cost,
+        norm_squared: gradient.norm_squared,
+    })
+}
+
 /// The fit with the lower cost, with the work of both.
 fn better(best: Option<Fit>, fit: Fit) -> Fit {
     let Some(best) = best else {
@@ -159,25 +180,32 @@ fn run(
     start: &[f64],
     settings: &FitSettings,
     attempt: Attempt,
+    reference: Option<Reference>,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
     match attempt {
-        Attempt::Functions => search(problem, start, settings, observe),
-        Attempt::Data => search(problem, &from_data(problem, start), settings, observe),
+        Attempt::Functions => search(problem, start, settings, reference, observe),
+        Attempt::Data => search(
+            problem,
+            &from_data(problem, start),
+            settings,
+            reference,
+            observe,
+        ),
         Attempt::GrowingHorizon => {
             let mut parameters = from_data(problem, start);
             for share in HORIZONS {
                 if share == 1.0 {
-                    return search(problem, &parameters, settings, observe);
+                    return search(problem, &parameters, settings, reference, observe);
                 }
                 let part = problem.first_part(share);
                 let mut short = settings.clone();
                 short.stopping.iterations = HORIZON_ITERATIONS;
-                if let Ok(fit) = search(&part, &parameters, &short, observe) {
+                if let Ok(fit) = search(&part, &parameters, &short, None, observe) {
                     parameters = fit.best.parameters;
                 }
             }
-            search(problem, &parameters, settings, observe)
+            search(problem, &parameters, settings, reference, observe)
         }
     }
 }

@@ -33,22 +33,36 @@ pub struct Snapshot {
 /// Iterations after which the motion is kept for figures: the paper's Fig. 3b and its continuation.
 pub const SNAPSHOT_ITERATIONS: [u64; 8] = [0, 10, 30, 100, 300, 1000, 3000, 10_000];
 
+/// What the ratios of a run are taken to: `J0` and `G0^2`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reference {
+    pub cost: f64,
+    pub norm_squared: f64,
+}
+
 /// History and snapshots of one run.
 #[derive(Debug)]
 pub(super) struct Recorder {
     pub rows: Vec<Row>,
     pub snapshots: Vec<Snapshot>,
     pub initial_cost: f64,
+    pub started_from: f64,
     pub initial_norm_squared: f64,
 }
 
 impl Recorder {
-    pub fn new(start: &Point) -> Self {
+    /// A record that begins at `start`, with ratios to `reference`, by default the start itself.
+    pub fn new(start: &Point, reference: Option<Reference>) -> Self {
+        let reference = reference.unwrap_or(Reference {
+            cost: start.evaluation.cost,
+            norm_squared: start.gradient.norm_squared,
+        });
         let mut recorder = Self {
             rows: Vec::new(),
             snapshots: Vec::new(),
-            initial_cost: start.evaluation.cost,
-            initial_norm_squared: start.gradient.norm_squared,
+            initial_cost: reference.cost,
+            started_from: start.evaluation.cost,
+            initial_norm_squared: reference.norm_squared,
         };
         recorder.keep_snapshot(0, start);
         recorder

@@ -1,12 +1,13 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
 use super::gauss_newton::linearise_at;
-use super::{Fit, FitSettings, Initial, Row, Status, fit};
+use super::{Counts, Fit, FitSettings, Initial, Row, Status, fit};
 use crate::dynamics::Breakdown;
 use crate::objective::Weighting;
 use crate::problem::Problem;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::time::Duration;
 
 /// Which rule chooses the weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +41,7 @@ pub struct PathPoint {
     pub weight: f64,
     /// Misfit of the readings; chi-square where they have a sigma.
     pub misfit: f64,
-    /// `sum |L theta - target|^2` of the penalties, without the weight.
+    /// `sum |L theta - target|^2` of the penalties on the path, without the weight.
     pub roughness: f64,
     /// Effective number of parameters that the data determine.
     pub degrees_of_freedom: f64,
@@ -57,10 +58,19 @@ pub struct WeightPath {
     pub points: Vec<PathPoint>,
     /// Index that each rule of [`WeightRule::ALL`] picks; `None` where it picks none.
     pub picks: [Option<usize>; 3],
+    /// Index of the point whose weight is used.
+    pub chosen: usize,
     /// Seed of the random vectors behind the degrees of freedom.
     pub seed: u64,
     /// What the user should know about the choice.
     pub remark: Option<String>,
+}
+
+impl WeightPath {
+    /// The weight that is used.
+    pub fn chosen_weight(&self) -> f64 {
+        self.points[self.chosen].weight
+    }
 }
 
 /// Largest weight of the path, relative to the misfit of no motion over a roughness of one.
@@ -76,14 +86,13 @@ const PROBES: usize = 16;
 const SEED: u64 = 1;
 
 impl Problem {
-    /// The same problem with all penalties multiplied by `factor`.
+    /// The same problem with the weights of the penalties `which` multiplied by `factor`.
     #[must_use]
-    pub fn with_penalty_factor(&self, factor: f64) -> Self {
+    pub fn with_penalty_factor(&self, which: &[usize], factor: f64) -> Self {
         let mut problem = self.clone();
-        problem
-            .penalties
-            .iter_mut()
-            .for_each(|p| p.weight *= factor);
+        for &i in which {
+            problem.penalties[i].weight *= factor;
+        }
         problem
     }
 
@@ -94,8 +103,8 @@ impl Problem {
     }
 }
 
-/// Fits `problem` for a path of factors on its penalties, each from its neighbour, and once more at
-/// the factor that `rule` picks.
+/// Fits `problem` for a path of factors on the penalties `which`, each from its neighbour, and once
+/// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
 /// A [`Breakdown`] if the fit at the largest weight has no motion at its start.
@@ -104,14 +113,18 @@ pub fn choose_weight(
     start: &[f64],
     settings: &FitSettings,
     rule: WeightRule,
+    which: &[usize],
     observe: &mut dyn FnMut(&Row),
 ) -> Result<(WeightPath, Problem, Fit), Breakdown> {
     let mut walk = Walk {
         problem,
         settings: settings.clone(),
+        which,
         observe,
         from: start.to_vec(),
         last: None,
+        counts: Counts::default(),
+        elapsed: Duration::ZERO,
     };
     let mut points = Vec::new();
     for weight in weights(problem) {
@@ -133,16 +146,22 @@ pub fn choose_weight(
     let remark = remark(problem, rule, index, &points);
     // Without a pick the weakest smoothing comes nearest to what the rule asks for.
     let chosen = index.unwrap_or(points.len() - 1);
-    let weighted = problem.with_penalty_factor(points[chosen].weight);
-    let found = fit(
+    let weighted = problem.with_penalty_factor(which, points[chosen].weight);
+    let mut found = fit(
         &weighted,
         &points[chosen].parameters,
         &walk.settings,
         walk.observe,
     )?;
+    found.counts = walk.counts + found.counts;
+    found.elapsed += walk.elapsed;
+    if let Ok(evaluation) = weighted.evaluate(start) {
+        found.initial_cost = evaluation.cost;
+    }
     let path = WeightPath {
         points,
         picks,
+        chosen,
         seed: SEED,
         remark,
     };
@@ -153,18 +172,23 @@ pub fn choose_weight(
 struct Walk<'a> {
     problem: &'a Problem,
     settings: FitSettings,
+    which: &'a [usize],
     observe: &'a mut dyn FnMut(&Row),
     from: Vec<f64>,
     last: Option<Status>,
+    counts: Counts,
+    elapsed: Duration,
 }
 
 impl Walk<'_> {
     fn visit(&mut self, weight: f64) -> Result<PathPoint, Breakdown> {
-        let problem = self.problem.with_penalty_factor(weight);
+        let problem = self.problem.with_penalty_factor(self.which, weight);
         let found = fit(&problem, &self.from, &self.settings, self.observe)?;
         // From here on every fit starts where its neighbour ended.
         self.settings.initial = Initial::Functions;
         self.last = Some(found.outcome.status);
+        self.counts = self.counts + found.counts;
+        self.elapsed += found.elapsed;
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
         let n = problem.reading_count() as f64;
@@ -172,7 +196,7 @@ impl Walk<'_> {
         Ok(PathPoint {
             weight,
             misfit,
-            roughness: roughness(&problem, &self.from),
+            roughness: roughness(&problem, self.which, &self.from),
             degrees_of_freedom,
             gcv: n * misfit / (n - degrees_of_freedom).powi(2),
             parameters: self.from.clone(),
@@ -193,13 +217,12 @@ fn weights(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-fn roughness(problem: &Problem, theta: &[f64]) -> f64 {
+fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
     let ranges = problem.functions.ranges();
-    let each = problem
-        .penalties
-        .iter()
-        .map(|p| p.roughness(&theta[ranges[p.function].clone()]));
-    each.sum()
+    let penalties = which.iter().map(|&i| &problem.penalties[i]);
+    penalties
+        .map(|p| p.roughness(&theta[ranges[p.function].clone()]))
+        .sum()
 }
 
 /// Trace of the matrix that takes the readings to their fitted values, by random signs.

@@ -30,6 +30,28 @@ fn paper() {
 }
 
 #[test]
+fn noisy() {
+    let bench = Workbench::with_shipped_models();
+    let simulate = [
+        "simulate",
+        "models/paper-device.yaml",
+        "--noise",
+        "0.1",
+        "--seed",
+        "1",
+        "--out",
+        "data/noisy.csv",
+    ];
+    bench.run_to(0, &simulate);
+    for name in ["noisy.csv", "noisy.csv.json"] {
+        assert!(
+            bench.read(&format!("data/{name}")) == shipped(name),
+            "{name}"
+        );
+    }
+}
+
+#[test]
 fn paper_truth() {
     assert!(make_data::paper_truth().to_csv() == shipped("paper_truth.csv"));
 }

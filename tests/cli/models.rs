@@ -33,8 +33,69 @@ fn every_shipped_model_is_run_here() {
         "paper-ones.yaml",
         "paper-device.yaml",
         "paper-lbfgs.yaml",
+        "paper-positive.yaml",
+        "paper-smooth.yaml",
+        "linear-mass.yaml",
+        "knots.yaml",
+        "spline.yaml",
+        "noisy.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
+}
+
+/// Largest error of a function against the truth.
+fn error(result: &Value, function: &str) -> f64 {
+    result["functions"][function]["truth_max_error"]
+        .as_f64()
+        .expect("a number")
+}
+
+/// The models that find the true device, and how well each function is found.
+#[test]
+fn models_that_recover_the_device() {
+    let expected = [
+        ("linear-mass", 1e-10, 1e-10),
+        ("knots", 1e-6, 1e-6),
+        ("paper-smooth", 1e-4, 1e-4),
+        ("spline", 1e-6, 1e-6),
+    ];
+    for (name, mass, others) in expected {
+        let (bench, result) = fitted(name, 0);
+        assert_eq!(result["outcome"]["status"], "converged", "{name}");
+        assert!(error(&result, "mass") <= mass, "{name}: {result}");
+        assert!(error(&result, "damping") <= others, "{name}: {result}");
+        assert!(error(&result, "stiffness") <= others, "{name}: {result}");
+        let violation = result["constraints"]["max_violation"]
+            .as_f64()
+            .expect("a number");
+        assert!(violation <= 1e-9, "{name}: {result}");
+        left_behind(&bench, &format!("runs/{name}"));
+    }
+}
+
+#[test]
+fn paper_positive() {
+    let (_, result) = fitted("paper-positive", 0);
+    assert!(result["cost"]["ratio"].as_f64().expect("a number") <= 1e-6);
+    let least = |f: &str| result["functions"][f]["min"].as_f64().expect("a number");
+    assert!(least("mass") >= 0.05 && least("damping") >= 0.0 && least("stiffness") >= 0.05);
+    // An exact fit, and another device.
+    assert!(error(&result, "mass") > 0.1 && error(&result, "damping") > 0.1);
+}
+
+#[test]
+fn noisy() {
+    let (bench, result) = fitted("noisy", 0);
+    assert!(error(&result, "mass") <= 0.05, "{result}");
+    let weights = &result["weights"];
+    assert_eq!(weights["rule"], "discrepancy");
+    assert_eq!(weights["weight"], weights["picks"]["discrepancy"]);
+    assert!(weights["path"].as_array().expect("a list").len() >= 9);
+    assert!(
+        bench
+            .read("runs/noisy/figures/weights.svg")
+            .starts_with("<svg")
+    );
 }
 
 #[test]

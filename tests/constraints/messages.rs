@@ -56,7 +56,11 @@ fn said(text: &str) -> String {
 fn names(constraints: &str) -> Vec<String> {
     let model = read(&text(constraints)).unwrap_or_else(|error| panic!("{error}"));
     let set = model.problem.constraints;
-    let rows = set.groups.into_iter().map(|g| g.name);
+    let rows = set
+        .groups
+        .into_iter()
+        .chain(model.problem.soft)
+        .map(|g| g.name);
     rows.chain(set.cones.into_iter().map(|g| g.name)).collect()
 }
 
@@ -83,7 +87,6 @@ fn every_kind_is_understood() {
         [
             "mass non-increasing",
             "mass convex",
-            "mass non-decreasing",
             "damping >= 0.5",
             "damping <= 2",
             "damping >= c of c.csv",
@@ -101,11 +104,12 @@ fn every_kind_is_understood() {
             "passive: c >= m'/2",
             "frequency >= 0.05 Hz",
             "frequency <= 0.5 Hz",
+            "mass non-decreasing",
             "damping ratio <= 0.9",
         ]
     );
     let model = read(&text(list)).unwrap();
-    let soft: Vec<_> = (model.problem.constraints.groups.iter())
+    let soft: Vec<_> = (model.problem.soft.iter())
         .filter_map(|g| Some((g.name.as_str(), g.soft?)))
         .collect();
     assert_eq!(soft, [("mass non-decreasing", 3.0)]);
@@ -210,7 +214,10 @@ fn penalties_and_rules() {
     let search = found.weight_rule.unwrap();
     assert_eq!((search.rule.name(), search.penalties), ("gcv", vec![1]));
     assert_eq!(found.problem.penalties[1].weight, 1.0);
-    assert_eq!(found.variation, [(1, 0.5)]);
+    let [variation] = found.problem.variations.as_slice() else {
+        panic!("one variation");
+    };
+    assert_eq!((variation.function, variation.weight), (1, 0.5));
 
     assert_snapshot!(said(&with("smooth: {order: 2, weight: discrepancy}")), @"
     m.yaml:9:64: functions.damping.smooth.weight: the rule `discrepancy` needs the noise of the readings

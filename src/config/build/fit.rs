@@ -12,11 +12,16 @@ use std::time::Duration;
 /// 8 % fewer still.
 const DEFAULT_MEMORY: usize = 20;
 
-pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<FitSettings, InputError> {
+pub(super) fn build(
+    file: &ModelFile,
+    problem: &Problem,
+    searches: bool,
+) -> Result<FitSettings, InputError> {
     let spec = file.spec.fit.as_ref();
     let gradient = gradient(file, problem)?;
     let solver = solver(file)?;
     can_constrain(file, problem, solver)?;
+    can_regularise(file, problem, searches, solver)?;
     let initial = match spec.and_then(|f| f.initial) {
         Some(InitialName::Functions) | None => Initial::Functions,
         Some(InitialName::Data) => Initial::Data,
@@ -69,6 +74,27 @@ fn can_constrain(file: &ModelFile, problem: &Problem, solver: Solver) -> Result<
             .found(format!("`{}` with `{name}`", solver.name()))
             .expected("`gauss-newton` or `projected-gradient`, which do")),
         _ => Ok(()),
+    }
+}
+
+/// Refuses total variation and a search for the weight with the methods that know neither.
+fn can_regularise(
+    file: &ModelFile,
+    problem: &Problem,
+    searches: bool,
+    solver: Solver,
+) -> Result<(), InputError> {
+    let asked = match (problem.variations.is_empty(), searches) {
+        (false, _) => "total variation",
+        (true, true) => "a rule for the weight",
+        (true, false) => return Ok(()),
+    };
+    match solver {
+        Solver::GaussNewton => Ok(()),
+        _ => Err(file
+            .error_at("fit.method", format!("this method knows no {asked}"))
+            .found(format!("`{}`", solver.name()))
+            .expected("`gauss-newton`, which does")),
     }
 }
 

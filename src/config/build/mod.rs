@@ -28,9 +28,6 @@ pub struct Model {
     pub settings: FitSettings,
     /// The rule that chooses the weight of some penalties, whose weight in `problem` is 1.
     pub weight_rule: Option<WeightSearch>,
-    /// Functions that pay for their total variation: index (mass 0) and weight, in the unit of J per
-    /// unit of the function.
-    pub variation: Vec<(usize, f64)>,
     /// The true device on the grid, where it is known.
     pub truth: Option<Device>,
     /// Initial states to predict the motion from.
@@ -108,9 +105,10 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let experiments = experiments::build(file, purpose, &grid, records)?;
     let mut problem = Problem::new(oscillator, functions, experiments);
     let weight_rule = penalties::build(file, &mut problem, &mut warnings)?;
-    let variation = penalties::variation(file);
+    penalties::add_variations(file, &mut problem);
     let places = constraints::build(file, &mut problem, &mut warnings)?;
-    let settings = fit::build(file, &problem)?;
+    problem.soft = problem.constraints.take_soft();
+    let settings = fit::build(file, &problem, weight_rule.is_some())?;
     // A simulation is of the functions as they are given.
     if !matches!(purpose, Purpose::Simulate { .. }) {
         constraints::move_start(file, &mut problem, &places, &mut warnings)?;
@@ -125,7 +123,6 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         problem,
         settings,
         weight_rule,
-        variation,
         truth,
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,

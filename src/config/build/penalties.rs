@@ -6,14 +6,15 @@ use crate::config::ModelFile;
 use crate::config::scalar::Weight;
 use crate::config::spec::{SmoothSpec, WeightRule};
 use crate::error::InputError;
-use crate::functions::{Basis, Penalty, Quantity};
+use crate::functions::{Basis, Design, Penalty, Variation};
 use crate::problem::Problem;
+use crate::solvers;
 
 /// A weight that is still to be chosen from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightSearch {
     /// How it is chosen.
-    pub rule: WeightRule,
+    pub rule: solvers::WeightRule,
     /// The penalties that it multiplies, by their places in the problem.
     pub penalties: Vec<usize>,
 }
@@ -55,7 +56,7 @@ pub(super) fn build(
             }
             if let Weight::Rule(rule) = spec.weight {
                 let search = search.get_or_insert_with(|| WeightSearch {
-                    rule,
+                    rule: meant(rule),
                     penalties: Vec::new(),
                 });
                 search.penalties.push(problem.penalties.len());
@@ -68,14 +69,23 @@ pub(super) fn build(
     Ok(search)
 }
 
-/// Total variation of the functions: index and weight.
-pub(super) fn variation(file: &ModelFile) -> Vec<(usize, f64)> {
-    let weight = |q: Quantity| spec(file, q).variation.as_ref().map(|v| v.weight.0);
-    let given = QUANTITIES
-        .into_iter()
-        .enumerate()
-        .filter_map(|(j, q)| Some((j, weight(q)?)));
-    given.filter(|(_, weight)| *weight > 0.0).collect()
+/// Adds the total variation of the functions to the problem.
+pub(super) fn add_variations(file: &ModelFile, problem: &mut Problem) {
+    let grid = problem.oscillator.grid;
+    let bases: Vec<Option<Basis>> = problem.functions.iter().map(|f| f.basis.clone()).collect();
+    for (j, (quantity, basis)) in QUANTITIES.into_iter().zip(bases).enumerate() {
+        let weight = spec(file, quantity)
+            .variation
+            .as_ref()
+            .map_or(0.0, |v| v.weight.0);
+        if let (Some(basis), true) = (basis, weight > 0.0) {
+            problem.variations.push(Variation {
+                function: j,
+                weight,
+                rows: Design::Sparse(basis.changes(&grid)),
+            });
+        }
+    }
 }
 
 fn penalty(
@@ -103,6 +113,14 @@ fn penalty(
     Ok(penalty)
 }
 
+fn meant(rule: WeightRule) -> solvers::WeightRule {
+    match rule {
+        WeightRule::Discrepancy => solvers::WeightRule::Discrepancy,
+        WeightRule::LCurve => solvers::WeightRule::LCurve,
+        WeightRule::Gcv => solvers::WeightRule::Gcv,
+    }
+}
+
 /// Refuses a second rule, and a rule that the readings give no footing.
 fn can_choose(
     file: &ModelFile,
@@ -111,10 +129,10 @@ fn can_choose(
     search: Option<&WeightSearch>,
 ) -> Result<(), InputError> {
     let key = format!("{key}.weight");
-    if let Some(first) = search.filter(|first| first.rule != rule) {
+    if let Some(first) = search.filter(|first| first.rule != meant(rule)) {
         return Err(file
             .error_at(&key, "there is one rule for all weights that are chosen")
-            .found(format!("`{rule}` beside `{}`", first.rule))
+            .found(format!("`{rule}` beside `{}`", first.rule.name()))
             .expected("the same rule, or a number"));
     }
     let sigma = |e: &crate::config::spec::ExperimentSpec| {

@@ -21,7 +21,7 @@ pub use polynomial::{from_physical_powers, physical_powers};
 use super::{Design, Gram};
 use crate::dynamics::Grid;
 use crate::dynamics::quadrature::trapezoid_weights;
-use nalgebra_sparse::CsrMatrix;
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use space::{Space, matrix};
 
 /// How often [`Basis::project`] corrects its solution of the normal equations; the second pass
@@ -161,6 +161,32 @@ impl Basis {
             _ => theta.fill(value),
         }
         theta
+    }
+
+    /// Changes of the function from one knot, cell or node to the next, rows x parameters: the sum
+    /// of their sizes is its total variation.
+    pub fn changes(&self, grid: &Grid) -> CsrMatrix<f64> {
+        let knots = self.knot_times(grid);
+        let times: Vec<f64> = match self {
+            Basis::PiecewiseConstant { .. } => {
+                knots.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect()
+            }
+            Basis::Nodal | Basis::PiecewiseLinear { .. } => knots,
+            Basis::Constant => Vec::new(),
+            Basis::Polynomial { .. } | Basis::BSpline { .. } => grid.times(),
+        };
+        let values = self.rows(grid, &times, 0);
+        let mut changes = CooMatrix::new(times.len().saturating_sub(1), self.parameters(grid));
+        for i in 1..times.len() {
+            for (row, sign) in [(i, 1.0), (i - 1, -1.0)] {
+                if let Some(row) = values.get_row(row) {
+                    for (&j, value) in row.col_indices().iter().zip(row.values()) {
+                        changes.push(i - 1, j, sign * value);
+                    }
+                }
+            }
+        }
+        CsrMatrix::from(&changes)
     }
 
     /// The parameters of the function closest to the values `nodal` at the nodes:

@@ -257,6 +257,7 @@ pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usi
     let readings = sub.residuals.len();
     add_penalties(problem, &point.parameters, &mut sub);
     add_variations(problem, &point.parameters, &mut sub);
+    add_soft(problem, &point.parameters, &mut sub);
     sub.constrain(&problem.constraints, &point.parameters);
     (sub, readings)
 }
@@ -286,6 +287,20 @@ pub(super) fn add_variations(problem: &Problem, parameters: &[f64], sub: &mut Su
             let row = variation.rows.row(i).map(|(j, a)| (range.start + j, a));
             sub.absolute.push(row, -change);
             sub.absolute_weights.push(variation.weight);
+        }
+    }
+}
+
+/// The rows of soft constraints that are broken at `parameters`, as residuals.
+fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+    for group in &problem.soft {
+        let root = group.row_weight().sqrt();
+        for i in 0..group.rows.len() {
+            let excess = group.excess(i, parameters);
+            if excess != 0.0 {
+                let row = group.rows.row(i).map(|(j, a)| (j, root * a));
+                sub.residuals.push(row, -root * excess);
+            }
         }
     }
 }

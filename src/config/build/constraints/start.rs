@@ -19,12 +19,8 @@ pub(in crate::config::build) fn move_start(
         return Ok(());
     }
     let start = problem.functions.start();
-    // A soft constraint does not have to hold at the start either.
-    let all = std::mem::take(&mut problem.constraints);
-    problem.constraints = all.hard();
     let found = problem.feasible_start(&start);
     let was_inside = problem.constraints.hold(&start, TOLERANCE);
-    problem.constraints = all;
     match found {
         Start::Kept(_) => Ok(()),
         Start::Moved {
