@@ -11,9 +11,10 @@ use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 
-/// A fit explains the record if its misfit is below this share of that of no motion at all. False
-/// minima leave tens of per cent.
-const EXPLAINED: f64 = 0.05;
+/// A fit explains the record if its misfit is below this share of that of no motion at all, or if
+/// noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// goes near zero) to tens of per cent (a wrong period); a fit in between costs another rung.
+const EXPLAINED: f64 = 1e-3;
 /// Parts of the record that the growing horizon fits in turn.
 const HORIZONS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 /// Most iterations on each part but the last.
@@ -172,7 +173,9 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
 }
 
 fn explains(problem: &Problem, fit: &Fit) -> bool {
-    fit.best.evaluation.misfit <= EXPLAINED * problem.misfit_of_silence()
+    let misfit = fit.best.evaluation.misfit;
+    let noise = problem.largest_chi_square();
+    misfit <= EXPLAINED * problem.misfit_of_silence() || noise.is_some_and(|noise| misfit <= noise)
 }
 
 fn run(

@@ -96,6 +96,15 @@ impl Problem {
         problem
     }
 
+    /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
+    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
+    pub fn largest_chi_square(&self) -> Option<f64> {
+        let mut readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
+        let known = readings.all(|r| matches!(r.weighting(), Weighting::Sigma(_)));
+        let n = self.reading_count() as f64;
+        known.then(|| n + 2.0 * (2.0 * n).sqrt())
+    }
+
     /// Number of readings of all experiments.
     pub fn reading_count(&self) -> usize {
         let readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
@@ -256,23 +265,8 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
     traces.sum::<f64>() / PROBES as f64
 }
 
-/// The largest chi-square that noise alone explains: its mean plus two standard deviations.
-fn largest_chi_square(problem: &Problem) -> f64 {
-    let n = problem.reading_count() as f64;
-    n + 2.0 * (2.0 * n).sqrt()
-}
-
-fn has_sigma(problem: &Problem) -> bool {
-    let mut readings = problem
-        .experiments
-        .iter()
-        .filter_map(|e| e.readings.as_ref());
-    readings.all(|r| matches!(r.weighting(), Weighting::Sigma(_)))
-}
-
 fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usize> {
-    let limit = largest_chi_square(problem);
-    has_sigma(problem).then_some(())?;
+    let limit = problem.largest_chi_square()?;
     points.iter().position(|p| p.misfit <= limit)
 }
 
@@ -343,7 +337,7 @@ fn remark(
             Some(format!(
                 "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
                  sigma may be too small, or the model cannot explain the readings",
-                largest_chi_square(problem)
+                problem.largest_chi_square().unwrap_or(f64::NAN)
             ))
         }
         (rule, None) => Some(format!(
