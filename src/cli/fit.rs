@@ -59,9 +59,10 @@ pub(super) fn fit_into(
         predictions: &predictions,
         weights: path.as_ref(),
     };
-    run.write(folder, with_figures)
+    let document = run.document();
+    run.write(folder, &document, with_figures)
         .map_err(|error| unwritable(folder.path(), &error))?;
-    Ok((run.document(), found.outcome.status))
+    Ok((document, found.outcome.status))
 }
 
 /// The fit; where a rule chooses the weight of the smoothness also the model with that weight and

@@ -34,12 +34,17 @@ pub struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Writes tables and, if asked for, figures; the result document last, so that a folder with a
+    /// Writes tables and, if asked for, figures; the result `document` last, so that a folder with a
     /// result is complete.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn write(&self, folder: &OutputFolder, with_figures: bool) -> io::Result<()> {
+    pub fn write(
+        &self,
+        folder: &OutputFolder,
+        document: &ResultDocument,
+        with_figures: bool,
+    ) -> io::Result<()> {
         folder.write("history.csv", &self.history().to_csv())?;
         folder.write("functions.csv", &self.functions_table().to_csv())?;
         folder.write("trajectory.csv", &self.trajectories().to_csv())?;
@@ -51,7 +56,7 @@ impl Run<'_> {
         for figure in figures {
             folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        folder.write("result.json", &json(&self.document()))
+        folder.write("result.json", &json(document))
     }
 
     /// The result document.

@@ -5,19 +5,25 @@
 //! of a wrong period; noise biases it, which the fit that follows removes.
 
 use super::gauss_newton::{add_penalties, add_variations};
-use crate::constraints::{Constraints, RowGroup};
+use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::objective::{Readings, Weighting};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 
 /// Rounds of the search for the smoothing weight: each halves its decimal exponent's interval.
-const ROUNDS: u32 = 24;
+const ROUNDS: u32 = 14;
 /// Decimal exponents of the smoothing weight between no smoothing and a parabola.
 const EXPONENTS: [f64; 2] = [-12.0, 16.0];
 /// A pull towards the start, relative to the equation's own weight: it decides what the equation
 /// leaves open and nothing else.
 const PULL: f64 = 1e-9;
+
+/// A clipped solution is used if it keeps this share of the plain one's decrease: the fit that
+/// follows needs a start, not an optimum.
+const KEPT: f64 = 0.999;
+/// Readings whose noise is below this share of their size are taken as they are.
+const NOISELESS: f64 = 1e-6;
 
 /// Displacement, velocity and acceleration at the readings but the two at each end.
 struct Kinematics {
@@ -52,20 +58,39 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
         .relative_metric(&sizes, problem.oscillator.grid.duration());
     let weight = PULL * sub.value(&vec![0.0; start.len()]).max(f64::MIN_POSITIVE);
     sub.proximal = metric.iter().map(|m| m * weight).collect();
-    let plain = sub.solve_plain().filter(|z| sub.holds(z, 0.0));
-    let z = match plain {
-        Some(z) => z,
-        None => {
-            let solution = sub.solve();
-            match solution.status {
-                ConicStatus::Solved | ConicStatus::Almost => solution.z,
-                status => return Err(status),
-            }
-        }
+    let constraints = &problem.constraints;
+    let moved = |z: &[f64]| -> Vec<f64> {
+        let mut theta: Vec<f64> = start.iter().zip(z).map(|(s, d)| s + d).collect();
+        constraints.clip(&mut theta);
+        theta
     };
-    let mut theta: Vec<f64> = start.iter().zip(&z).map(|(s, d)| s + d).collect();
-    problem.constraints.clip(&mut theta);
-    Ok(theta)
+    if let Some(theta) = sub
+        .solve_plain()
+        .and_then(|z| clipped(&sub, &held, &z, start, &moved))
+    {
+        return Ok(theta);
+    }
+    let solution = sub.solve();
+    match solution.status {
+        ConicStatus::Solved | ConicStatus::Almost => Ok(moved(&solution.z)),
+        status => Err(status),
+    }
+}
+
+/// The plain solution moved into the constraints, if they hold there and it is nearly as good as
+/// the plain one, which no point in them can beat.
+fn clipped(
+    sub: &Subproblem,
+    constraints: &Constraints,
+    z: &[f64],
+    start: &[f64],
+    moved: &dyn Fn(&[f64]) -> Vec<f64>,
+) -> Option<Vec<f64>> {
+    let theta = moved(z);
+    let step: Vec<f64> = theta.iter().zip(start).map(|(t, s)| t - s).collect();
+    let at_start = sub.value(&vec![0.0; z.len()]);
+    let kept = (at_start - sub.value(&step)) / (at_start - sub.value(z));
+    (constraints.hold(&theta, TOLERANCE) && kept >= KEPT).then_some(theta)
 }
 
 /// The constraints, and where nothing fixes the common scale of all functions, the mean of the first
@@ -152,6 +177,10 @@ fn smoothed(readings: &Readings) -> Option<Vec<f64>> {
         Weighting::Sigma(sigma) => sigma,
         Weighting::Integral { .. } => noise_level(observed),
     };
+    let size = observed.iter().map(|y| y * y).sum::<f64>() / observed.len() as f64;
+    if noise <= NOISELESS * size.sqrt() {
+        return Some(observed.to_vec());
+    }
     let [mut low, mut high] = EXPONENTS;
     let mut best = observed.to_vec();
     for _ in 0..ROUNDS {

@@ -10,6 +10,7 @@ use super::recorder::Reference;
 use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use std::time::Instant;
 
 /// A fit explains the record if its misfit is below this share of that of no motion at all, or if
 /// noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
@@ -94,8 +95,12 @@ pub fn fit(
     let mut rungs = Vec::new();
     let mut trouble = None;
     for attempt in attempts {
-        match run(problem, start, settings, attempt, reference, observe) {
-            Ok(fit) => {
+        let clock = Instant::now();
+        let result = run(problem, start, settings, attempt, reference, observe);
+        match result {
+            Ok(mut fit) => {
+                // With the work that made the start.
+                fit.elapsed = clock.elapsed();
                 rungs.push(Rung {
                     name: attempt.name(),
                     initial_cost: fit.started_from,
