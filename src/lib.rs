@@ -1,4 +1,116 @@
-//! kmcfit
+//! Finds the time-varying mass, damping and stiffness of an oscillator from its measured motion.
+//!
+//! # Equations
+//!
+//! **Motion.** A device with mass `m(t) > 0` (kg), damping `c(t)` (N s/m) and stiffness `k(t)` (N/m)
+//! moves from a known state `y(0)`, `y'(0)` by
+//!
+//! ```text
+//! m y'' + c y' + k y = f,    f = 0 for free motion
+//! ```
+//!
+//! stepped by an explicit Runge–Kutta method on equally spaced nodes. Each function is a basis times
+//! parameters, and `theta` are the parameters of all.
+//!
+//! **Cost.** The fit minimises, without a factor 1/2,
+//!
+//! ```text
+//! J(theta) = sum over records     of  integral (y - y_obs)^2 dt             (no sigma given)
+//!                                 or  sum over readings ((y - y_obs)/sigma)^2
+//!          + sum over penalties   of  weight * integral (d^q p/dt^q - ref)^2 dt    (ref: q = 0 only)
+//!          + sum over variations  of  weight * total variation of p
+//!          + sum over soft groups of  weight * mean over rows of excess^2
+//! ```
+//!
+//! subject to linear rows and second-order cones in `theta`. [`problem::Problem::evaluate`] computes
+//! it; the integral over the readings is the trapezoid rule.
+//!
+//! **Adjoint.** One backward solve gives the gradient with respect to all functions. For functions of
+//! time and the cost without sigma it is Eq. 13 of the paper, with `z = z' = 0` at the end:
+//!
+//! ```text
+//! m z'' + (2 m' - c) z' + (m'' - c' + k) z = 2 (y - y_obs)
+//! dJ/dm = -z y'',   dJ/dc = -z y',   dJ/dk = -z y
+//! ```
+//!
+//! ([`dynamics::adjoint::continuous`]). The default is the exact transpose of the time stepper instead
+//! ([`dynamics::adjoint::discrete`]): the gradient of the discretised cost, right to rounding.
+//!
+//! Free motion stays as it is when `m`, `c` and `k` are multiplied by one positive `s(t)`: at best it
+//! shows `k/m` and `c/m`. Constraints and penalties say the rest.
+//!
+//! # Modules, in the order in which data flow
+//!
+//! 1. [`config`] reads a model file, and through [`observations`] its tables, and builds from it a
+//! 2. [`problem`], validated and immutable; what is wrong with the input is an [`mod@error`].
+//! 3. [`functions`] turns parameters into mass, damping and stiffness at the nodes, and knows their
+//!    roughness and variation; [`dynamics`] turns those into a motion, its linearisation, its adjoints.
+//! 4. [`objective`] is the cost of the parameters and its gradient, from one motion per point.
+//! 5. [`constraints`] turns statements about the functions into rows and cones in the parameters.
+//! 6. [`qp`] solves the convex subproblems: a sparse factorisation where no inequality is met, Clarabel
+//!    where one is.
+//! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
+//!    starts and the choice of a weight.
+//! 8. [`report`] writes tables, figures and the result document, and compares runs.
+//! 9. [`cli`] is one file per command.
+//!
+//! # Example
+//!
+//! A device whose mass falls along a line is simulated, and found again from its motion:
+//!
+//! ```
+//! use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
+//! use kmcfit::functions::{Basis, CoefficientFunction, Functions, Quantity};
+//! use kmcfit::objective::{GradientKind, Readings, Weighting};
+//! use kmcfit::problem::{Experiment, Problem};
+//! use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+//!
+//! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
+//! let grid = Grid::new(0.0, 25.0, 1001).expect("a grid");
+//! let nodes = grid.nodes();
+//! let truth = Device {
+//!     mass: grid.times().iter().map(|t| 1.0 - t / 50.0).collect(),
+//!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
+//! };
+//! let oscillator = Oscillator {
+//!     grid,
+//!     method: Method::Rk4,
+//!     terms: vec![Term::Damping, Term::Stiffness],
+//! };
+//! let initial = State { displacement: 3.3, velocity: 1.0 };
+//! let motion = oscillator.forward(&truth, initial, None).expect("a motion");
+//!
+//! // What is sought: a line for the mass and a constant for the damping; the stiffness is known.
+//! let line = Basis::Polynomial { degree: 1 };
+//! let start = line.constant(&grid, 2.0);
+//! let list = vec![
+//!     CoefficientFunction::free(Quantity::Mass, line, &grid, start),
+//!     CoefficientFunction::constant(Quantity::Damping, 1.0, nodes),
+//!     CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+//! ];
+//! let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
+//! let weighting = Weighting::Integral { spacing: grid.step() };
+//! let record = Experiment {
+//!     name: "free decay".into(),
+//!     initial,
+//!     force: None,
+//!     readings: Some(Readings::new(motion.displacement, 1, weighting)),
+//! };
+//! let problem = Problem::new(oscillator, functions, vec![record]);
+//!
+//! let settings = FitSettings {
+//!     solver: Solver::GaussNewton,
+//!     initial: Initial::Functions,
+//!     gradient: GradientKind::Discrete,
+//!     stopping: Stopping::default(),
+//!     interrupt: None,
+//! };
+//! let found = fit(&problem, &problem.functions.start(), &settings, &mut |_| {}).expect("a motion");
+//! assert_eq!(found.outcome.status, Status::Converged);
+//! let mass = &found.best.evaluation.device.mass;
+//! let error = mass.iter().zip(&truth.mass).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
+//! assert!(error < 1e-9, "{error}");
+//! ```
 #![allow(
     clippy::result_large_err,
     reason = "an input error ends the program: its size costs nothing, its detail helps"
