@@ -27,7 +27,7 @@ pub struct Arguments {
 /// Step sizes of the check: two per decade over ten decades, the largest being the power of ten
 /// nearest to `10 J/G^2`. A step `a` lowers J by `a G^2` to first order, so the same part of J is
 /// lowered whatever the unit of J; for the paper's run the steps are 1 to 1e-10.
-fn steps(model: &Model) -> Result<Vec<f64>, Failure> {
+fn steps(model: &Model) -> Result<Option<Vec<f64>>, Failure> {
     let problem = &model.problem;
     let start = problem.functions.start();
     let here = problem.evaluate(&start).map_err(no_motion)?;
@@ -36,14 +36,19 @@ fn steps(model: &Model) -> Result<Vec<f64>, Failure> {
     let decade = (10.0 * here.cost / norm_squared).log10().round();
     let decade = if decade.is_finite() { decade } else { 0.0 };
     let step = |i| 10f64.powf(decade - 0.5 * f64::from(i));
-    Ok((0..=20).map(step).collect())
+    Ok((norm_squared > 0.0).then(|| (0..=20).map(step).collect()))
 }
 
 fn no_motion(breakdown: Breakdown) -> Failure {
     Failure::Numerical(format!("the start has no motion: {breakdown}"))
 }
 
-/// The discrete gradient passes if its error falls below this at some step. An error in the
+/// A curve that ends by falling in proportion to the step, by sqrt(10) from one to the next, has not
+/// met a floor yet; this is a little less.
+const FALLS: f64 = 2.5;
+
+/// The discrete gradient passes if its error falls below this at some step or still falls at the
+/// shortest one. An error in the
 /// gradient is a floor; an exact gradient is only limited by truncation and rounding, which leave
 /// 1e-7 or less at N = 128,000.
 const PASS: f64 = 1e-6;
@@ -57,6 +62,13 @@ struct Curve {
 }
 
 impl Curve {
+    /// Whether the error is as small as that of an exact gradient, or on its way there.
+    fn passes(&self) -> bool {
+        let tail = &self.error[self.error.len().saturating_sub(4)..];
+        let falls = tail.len() == 4 && tail.windows(2).all(|w| w[0] > FALLS * w[1]);
+        self.best().1 <= PASS || falls
+    }
+
     fn best(&self) -> (f64, f64) {
         let pairs = self.step.iter().copied().zip(self.error.iter().copied());
         pairs.fold((f64::NAN, f64::INFINITY), |best, pair| {
@@ -80,7 +92,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .into_iter()
         .map(|nodes| build(&file, Purpose::Check { nodes }))
         .collect::<Result<Vec<_>, _>>()?;
-    let steps = steps(&model)?;
+    let Some(steps) = steps(&model)? else {
+        print(&describe(&model));
+        print("the gradient vanishes at the start: check it from another one\n");
+        return Ok(OK);
+    };
     let folder = arguments
         .out
         .as_deref()
@@ -113,7 +129,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 fn node_counts(arguments: &Arguments) -> Vec<Option<usize>> {
     match arguments.nodes.is_empty() {
         true => vec![None],
-        false => arguments.nodes.iter().copied().map(Some).collect(),
+        false => {
+            let mut nodes = arguments.nodes.clone();
+            nodes.dedup();
+            nodes.into_iter().map(Some).collect()
+        }
     }
 }
 
@@ -155,7 +175,7 @@ fn check(model: &Model, steps: &[f64]) -> Result<Vec<Curve>, Failure> {
 
 fn verdict(curves: &[Curve]) -> u8 {
     let failed: Vec<&Curve> = (curves.iter())
-        .filter(|c| c.kind == GradientKind::Discrete && c.best().1 > PASS)
+        .filter(|c| c.kind == GradientKind::Discrete && !c.passes())
         .collect();
     if failed.is_empty() {
         print(&format!(

@@ -3,7 +3,8 @@
 use super::progress::Progress;
 use super::{Failure, exit_code, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
-use crate::report::document::{Prediction, ResultDocument};
+use crate::dynamics::State;
+use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{OutputFolder, Run, json, predict, summary};
 use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit};
 use std::path::{Path, PathBuf};
@@ -50,9 +51,22 @@ pub(super) fn fit_into(
     progress: &Progress,
     with_figures: bool,
 ) -> Result<(ResultDocument, Status), Failure> {
-    let (weighted, path, found) = search(model, progress)?;
+    // A folder holds a result only of the run that wrote the rest of it.
+    folder
+        .begin()
+        .map_err(|error| unwritable(folder.path(), &error))?;
+    let (weighted, path, found) = match search(model, progress) {
+        Ok(found) => found,
+        Err(reason) => {
+            let document = FailureDocument::new(&model.title, &reason);
+            folder
+                .write("result.json", &json(&document))
+                .map_err(|error| unwritable(folder.path(), &error))?;
+            return Err(Failure::Numerical(reason));
+        }
+    };
     let model = weighted.as_ref().unwrap_or(model);
-    let predictions = predictions(model, &found)?;
+    let predictions = predictions(model, &found);
     let run = Run {
         model,
         fit: &found,
@@ -70,7 +84,7 @@ pub(super) fn fit_into(
 fn search(
     model: &Model,
     progress: &Progress,
-) -> Result<(Option<Model>, Option<WeightPath>, Fit), Failure> {
+) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
     let start = model.problem.functions.start();
     let mut observe = |row: &Row| progress.show(row);
     let (problem, settings) = (&model.problem, &model.settings);
@@ -89,18 +103,27 @@ fn search(
         }
     };
     progress.clear();
-    result.map_err(|breakdown| Failure::Numerical(format!("the start has no motion: {breakdown}")))
+    result.map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
 }
 
-fn predictions(model: &Model, found: &Fit) -> Result<Vec<Prediction>, Failure> {
-    let motions = predict(
-        &model.problem.oscillator,
-        &found.best.evaluation.device,
-        model.truth.as_ref(),
-        &model.predictions,
-    )
-    .map_err(|breakdown| Failure::Numerical(format!("a prediction has no motion: {breakdown}")))?;
-    Ok(motions.into_iter().map(|m| m.summary).collect())
+/// The predictions that the model asks for; one without a motion says so and harms no other.
+fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
+    let device = &found.best.evaluation.device;
+    let oscillator = &model.problem.oscillator;
+    let one = |state: &State| {
+        let motions = predict(oscillator, device, model.truth.as_ref(), &[*state]);
+        match motions {
+            Ok(motions) => motions.into_iter().map(|m| m.summary).collect(),
+            Err(breakdown) => vec![Prediction {
+                displacement: state.displacement,
+                velocity: state.velocity,
+                cost: None,
+                energy: None,
+                failure: Some(breakdown.to_string()),
+            }],
+        }
+    };
+    model.predictions.iter().flat_map(one).collect()
 }
 
 /// `runs/NAME` with the name of the model file.

@@ -101,8 +101,16 @@ fn unwritable(path: &Path, error: &io::Error) -> InputError {
     .expected("a place that can be written to")
 }
 
-/// Prints results; a reader that has gone away (`| head`) is no error.
+/// Prints results; a reader that has gone away (`| head`) is no error, a full disk ends the
+/// program.
 fn print(text: &str) {
     use io::Write;
-    let _ = io::stdout().write_all(text.as_bytes());
+    let mut out = io::stdout();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            eprintln!("error: the output cannot be written: {error}");
+            std::process::exit(BAD_INPUT.into());
+        }
+        _ => {}
+    }
 }

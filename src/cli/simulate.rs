@@ -43,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let problem = build(&file, purpose)?.problem;
     let noise = noise(arguments)?;
+    keeps_readings(arguments, &file)?;
     let experiment = chosen(arguments, &problem.experiments)?;
     let device = problem.functions.device(&problem.functions.start());
     let motion = problem
@@ -79,6 +80,26 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         }
     }
     Ok(OK)
+}
+
+/// Refuses to write over the model's own readings.
+fn keeps_readings(arguments: &Arguments, file: &ModelFile) -> Result<(), InputError> {
+    let Some(out) = &arguments.out else {
+        return Ok(());
+    };
+    let target = out.canonicalize().ok();
+    for data in file.spec.experiments.iter().filter_map(|e| e.data.as_ref()) {
+        let own = file.resolve(&data.0).canonicalize().ok();
+        if own.is_some() && own == target {
+            return Err(InputError::new(
+                Place::Argument("--out".into()),
+                "this file holds the readings of the model",
+            )
+            .found(out.display())
+            .expected("another file, so that no measurement is lost"));
+        }
+    }
+    Ok(())
 }
 
 /// How a file of readings was made: `OUT.json` beside `OUT`.

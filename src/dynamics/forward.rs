@@ -32,6 +32,8 @@ pub enum Cause {
     Mass,
     /// The motion left the range of floating-point numbers.
     Overflow,
+    /// The motion exists, but the square of a residual leaves the range of floating-point numbers.
+    CostOverflow,
 }
 
 /// An evaluation that ended early: an outcome of a trial, not a misuse. Line searches step back.
@@ -43,19 +45,27 @@ pub struct Breakdown {
     pub node: usize,
     /// Time of that node, s.
     pub time: f64,
-    /// The value found there: mass in kg, or the displacement in m.
+    /// The value found there: the mass in kg, the last finite displacement or the largest residual
+    /// in m.
     pub value: f64,
 }
 
 impl fmt::Display for Breakdown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let what = match self.cause {
-            Cause::Mass => "the mass is not positive",
-            Cause::Overflow => "the motion overflows",
-        };
-        write!(f, "{what} at t = {:.6} s ({:.3e})", self.time, self.value)
+        let (time, value) = (self.time, self.value);
+        match self.cause {
+            Cause::Mass => write!(f, "the mass is {value} kg at t = {time:.6} s, not positive"),
+            Cause::Overflow => write!(f, "the motion overflows at t = {time:.6} s"),
+            Cause::CostOverflow => write!(
+                f,
+                "the cost overflows: the motion and a reading are {value:.3e} m apart at t = \
+                 {time:.6} s"
+            ),
+        }
     }
 }
+
+impl std::error::Error for Breakdown {}
 
 impl Oscillator {
     /// The motion of `device` from `initial` under `force` (N at the nodes; `None` is no force).

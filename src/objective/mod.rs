@@ -9,7 +9,7 @@ pub use gradient::{Gradient, GradientKind};
 pub use readings::{Readings, Weighting};
 pub use verify::GradientError;
 
-use crate::dynamics::{Breakdown, Device, Trajectory};
+use crate::dynamics::{Breakdown, Cause, Device, Trajectory};
 use crate::problem::Problem;
 
 /// The cost at one point and everything that it was computed from.
@@ -47,7 +47,8 @@ impl Problem {
     /// constraints ([`crate::constraints::RowGroup::price`]).
     ///
     /// # Errors
-    /// A [`Breakdown`] if a motion does not exist: the mass is not positive, or it overflows.
+    /// A [`Breakdown`] if a motion does not exist (the mass is not positive, or it overflows), or the
+    /// cost overflows.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, Breakdown> {
         let mut evaluation = self.workspace();
         self.evaluate_into(theta, &mut evaluation)?;
@@ -79,7 +80,31 @@ impl Problem {
         }
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
+        if !evaluation.cost.is_finite() {
+            return Err(self.cost_overflow(evaluation));
+        }
         Ok(())
+    }
+
+    /// Where the largest residual stands, for a cost that has left the finite numbers.
+    fn cost_overflow(&self, evaluation: &Evaluation) -> Breakdown {
+        let mut worst = (0, 0.0f64);
+        for (experiment, motion) in self.experiments.iter().zip(&evaluation.trajectories) {
+            let Some(readings) = &experiment.readings else {
+                continue;
+            };
+            for (i, r) in readings.residuals(&motion.displacement).enumerate() {
+                if r.abs() > worst.1.abs() {
+                    worst = (i * readings.stride(), r);
+                }
+            }
+        }
+        Breakdown {
+            cause: Cause::CostOverflow,
+            node: worst.0,
+            time: self.oscillator.grid.time(worst.0),
+            value: worst.1,
+        }
     }
 
     /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
@@ -93,6 +118,7 @@ impl Problem {
             variation.weight * variation.total(&theta[ranges[variation.function].clone()])
         });
         let broken = self.soft.iter().map(|group| group.price(theta));
-        smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>()
+        // An empty sum is -0.0.
+        0.0 + smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>()
     }
 }

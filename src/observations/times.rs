@@ -3,12 +3,15 @@
 use super::Table;
 use crate::error::InputError;
 
-/// How far a spacing may be from the step, as a part of the step.
+/// How far a spacing may be from the step, and a time from its place, as a part of the step.
 ///
 /// Times that were computed as i·dt in double precision differ from equal spacing by some 1e-16 T,
 /// which is below 1e-10 of a step for up to a million readings; this leaves room for times
 /// printed with nine or more digits, and is far below what moves a reading noticeably.
 pub const SPACING_TOLERANCE: f64 = 1e-6;
+
+/// A spacing that is off by less than this part of the step looks like rounding.
+const ROUNDED: f64 = 0.05;
 
 /// The times in a column, strictly increasing.
 ///
@@ -30,8 +33,8 @@ pub fn increasing<'a>(table: &'a Table, column: &str) -> Result<&'a [f64], Input
 ///
 /// # Errors
 ///
-/// When the times are not [`increasing`], there is only one, or a spacing differs from the median by
-/// more than [`SPACING_TOLERANCE`].
+/// When the times are not [`increasing`], there is only one, a spacing differs from the median by
+/// more than [`SPACING_TOLERANCE`], or a time is further than that from `t_0 + i dt`.
 pub fn equally_spaced(table: &Table, column: &str) -> Result<f64, InputError> {
     let times = increasing(table, column)?;
     let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
@@ -45,20 +48,49 @@ pub fn equally_spaced(table: &Table, column: &str) -> Result<f64, InputError> {
     let expected = median(&spacings);
     let off = |spacing: &f64| (spacing - expected).abs() > SPACING_TOLERANCE * expected;
     match spacings.iter().position(off) {
-        None => Ok((last - first) / intervals as f64),
-        Some(row) => Err(InputError::new(
-            table.place(row + 1, Some(column)),
-            "the times are not equally spaced",
+        None => in_place(table, column, times, (last - first) / intervals as f64),
+        Some(row) => {
+            let error = InputError::new(
+                table.place(row + 1, Some(column)),
+                "the times are not equally spaced",
+            )
+            .found(format!(
+                "{} after {}, a spacing of {}",
+                times[row + 1],
+                times[row],
+                spacing(spacings[row])
+            ))
+            .expected(format!(
+                "a spacing of {}, as between most rows",
+                spacing(expected)
+            ));
+            Err(
+                match (spacings[row] - expected).abs() < ROUNDED * expected {
+                    true => {
+                        error.hint("the times may have been rounded: print more digits of them")
+                    }
+                    false => error,
+                },
+            )
+        }
+    }
+}
+
+/// The step, if every time is where it should be: small differences of spacing must not add up.
+fn in_place(table: &Table, column: &str, times: &[f64], step: f64) -> Result<f64, InputError> {
+    let place = |i: usize| times[0] + i as f64 * step;
+    let astray = |i: &usize| (times[*i] - place(*i)).abs() > SPACING_TOLERANCE * step;
+    match (0..times.len()).find(astray) {
+        None => Ok(step),
+        Some(i) => Err(InputError::new(
+            table.place(i, Some(column)),
+            "the times are not equally spaced: they drift",
         )
-        .found(format!(
-            "{} after {}, a spacing of {}",
-            times[row + 1],
-            times[row],
-            spacing(spacings[row])
-        ))
+        .found(times[i])
         .expected(format!(
-            "a spacing of {}, as between most rows",
-            spacing(expected)
+            "{}, {i} steps of {} after the first",
+            place(i),
+            spacing(step)
         ))),
     }
 }

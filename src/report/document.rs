@@ -166,6 +166,9 @@ pub struct Prediction {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
+    /// Why there is no motion from there, if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
 /// The constraints at the best point.
@@ -256,4 +259,32 @@ pub struct PathSummary {
     /// Effective number of parameters that the data determine; absent where it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
+}
+
+/// What a run leaves behind that could not begin: its outcome and nothing else.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FailureDocument {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// Title of the model.
+    pub title: String,
+    /// Version of kmcfit.
+    pub version: String,
+    /// Status `failed`, and why.
+    pub outcome: OutcomeSummary,
+}
+
+impl FailureDocument {
+    /// The document of a run that failed for this reason.
+    pub fn new(title: &str, reason: &str) -> Self {
+        Self {
+            format: FORMAT,
+            title: title.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            outcome: OutcomeSummary {
+                status: crate::solvers::Status::Failed.name().into(),
+                reason: reason.into(),
+            },
+        }
+    }
 }

@@ -24,7 +24,7 @@ impl OutputFolder {
         };
         make_folder(path).map_err(|e| refuse("the output folder cannot be made", &e))?;
         tempfile::NamedTempFile::new_in(path)
-            .map_err(|e| refuse("the output folder cannot be written to", &e))?;
+            .map_err(|e| refuse("the output folder cannot be written to", &e.kind().into()))?;
         Ok(Self {
             path: path.to_path_buf(),
         })
@@ -33,6 +33,28 @@ impl OutputFolder {
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Takes away what an older run left that the new one may not write again: its result, without
+    /// which the folder holds no run, and its figures.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn begin(&self) -> io::Result<()> {
+        let gone = |result: io::Result<()>| match result {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        };
+        gone(std::fs::remove_file(self.path.join("result.json")))?;
+        let Ok(figures) = std::fs::read_dir(self.path.join("figures")) else {
+            return Ok(());
+        };
+        for figure in figures.flatten().map(|entry| entry.path()) {
+            if figure.extension().is_some_and(|e| e == "svg") {
+                gone(std::fs::remove_file(figure))?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes one file, replacing an older one at once: other readers see the old file or the new

@@ -59,5 +59,6 @@ fn summarise(
         velocity: state.velocity,
         cost: truth.map(|t| integral(&|i| motion.displacement[i] - t.displacement[i])),
         energy: truth.map(|t| integral(&|i| t.displacement[i])),
+        failure: None,
     }
 }

@@ -133,6 +133,9 @@ pub fn prediction_table(predictions: &[Prediction]) -> String {
             known(p.cost),
             known(p.energy)
         );
+        if let Some(failure) = &p.failure {
+            let _ = writeln!(text, "{:>12} no motion: {failure}", "");
+        }
     }
     text
 }

@@ -9,6 +9,7 @@ use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step};
 use crate::dynamics::{Breakdown, Cause};
+use crate::functions::Functions;
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
@@ -151,6 +152,19 @@ impl Run<'_> {
         }
     }
 
+    /// The outcome of a search that is over before its first iteration.
+    fn nothing_to_do(&self, functions: Option<&Functions>) -> Option<Outcome> {
+        let cost = self.progress.as_ref().ok()?.point.evaluation.cost;
+        let converged = |reason: &str| Some(Outcome::new(Status::Converged, reason));
+        if functions.is_some_and(|f| f.parameters() == 0) {
+            return converged("there is nothing to fit: every function is fixed");
+        }
+        if cost == 0.0 {
+            return converged("the start fits exactly");
+        }
+        self.settings.stopping.out_of_iterations(0)
+    }
+
     fn ended_from_outside(&self) -> Option<Outcome> {
         let flag = self.settings.interrupt.as_ref();
         if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
@@ -205,7 +219,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         let parameters = state.take_param().unwrap_or_default();
         let mut work = Work::new(problem, self.settings.gradient);
         self.progress = self.start(&mut work, parameters);
-        self.outcome = self.settings.stopping.out_of_iterations(0);
+        self.outcome = self.nothing_to_do(problem.problem.as_ref().map(|p| &p.functions));
         Ok((self.view(state), None))
     }
 

@@ -3,8 +3,11 @@
 //! The search runs in coordinates `x`: the logarithm of the mass where its parameters can carry
 //! one, the parameters themselves elsewhere. A step in `ln m` cannot take the mass through zero,
 //! where plain L-BFGS ends. All inner products are those of functions of time, `x^T G x'`, so the
-//! path does not depend on the number of nodes. Pairs that have lost curvature are left out; after
+//! path hardly depends on the number of nodes. Pairs that have lost curvature are left out; after
 //! a failed line search the memory is dropped once and the search goes on along the gradient.
+//!
+//! argmin runs the loop and counts the solves; its own L-BFGS is not used, as it has no guard
+//! against lost curvature, no step limit, and asks for cost and gradient separately.
 
 use super::line_search::{Line, weak_wolfe};
 use super::point::Work;
@@ -16,7 +19,7 @@ use std::collections::VecDeque;
 
 /// Pairs with `<s, z>` below this fraction of `|s| |z|` carry rounding, not curvature.
 const LOST_CURVATURE: f64 = 1e-10;
-/// Largest change of `ln m` in one step: a factor of e.
+/// Largest change of `ln m` at the first trial of a step: a factor of e.
 const LONGEST_LOG_STEP: f64 = 1.0;
 
 /// The method and its memory.

@@ -49,7 +49,7 @@ impl Stopping {
     }
 
     /// Whether any convergence test is asked for.
-    fn has_test(&self) -> bool {
+    pub fn has_test(&self) -> bool {
         let tests = [
             self.cost_ratio,
             self.gradient_ratio,

@@ -235,7 +235,7 @@ fn grid() {
     assert_snapshot!(changed("nodes: 21", "nodes: 2"), @"
     error: model.yaml:8:15: grid.nodes: this number of nodes cannot be used
       found: 2
-      expected: 3 to 100000000
+      expected: 3 to 10000000
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 30"), @"
     error: model.yaml:8:15: grid.nodes: the readings do not fall on nodes
@@ -444,7 +444,7 @@ fn simulate_arguments() {
     assert_snapshot!(with(&["--nodes", "2"]), @"
     error: --nodes: this number of nodes cannot be used
       found: 2
-      expected: 3 to 100000000
+      expected: 3 to 10000000
     ");
     assert_snapshot!(with(&["--nodes", "many"]), @"
     error: invalid value 'many' for '--nodes <NODES>': invalid digit found in string
@@ -465,7 +465,7 @@ fn check_arguments() {
     assert_snapshot!(with(&["--nodes", "1"]), @"
     error: --nodes: this number of nodes cannot be used
       found: 1
-      expected: 3 to 100000000
+      expected: 3 to 10000000
     ");
     assert_snapshot!(with(&["--out", "model.yaml/out"]), @"
     error: --out: the output folder cannot be made

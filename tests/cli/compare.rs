@@ -458,16 +458,16 @@ fn a_run_without_motion() {
     let (code, stdout, stderr) = bench.run(&["compare", "heavy.yaml", "constants.yaml"]);
     assert_eq!(code, 3);
     assert!(
-        stderr.starts_with("failed: heavy: the start has no motion"),
+        stderr.starts_with("failed: heavy: the start cannot be evaluated"),
         "{stderr}"
     );
     assert!(
-        stdout.contains("heavy: left out\n  the start has no motion"),
+        stdout.contains("heavy: left out\n  the start cannot be evaluated"),
         "{stdout}"
     );
     assert_eq!(records(&bench.read("runs/compare/compare.csv")).len(), 1);
     with_page(&bench, "runs/compare/compare.html", |page| {
-        assert!(text_of(page.root_element()).contains("left out: the start has no motion"));
+        assert!(text_of(page.root_element()).contains("left out: the start cannot be evaluated"));
     });
 }
 

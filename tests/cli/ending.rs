@@ -106,7 +106,7 @@ fn a_start_without_motion() {
     let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--out", "run"]);
     assert_eq!((code, stdout.as_str()), (3, ""));
     assert!(
-        stderr.starts_with("failed: the start has no motion: "),
+        stderr.starts_with("failed: the start cannot be evaluated: "),
         "{stderr}"
     );
 }

@@ -7,5 +7,6 @@ mod data_files;
 mod ending;
 mod models;
 mod predict;
+mod regressions;
 mod simulate;
 mod workbench;

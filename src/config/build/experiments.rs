@@ -21,6 +21,25 @@ pub(super) struct Record {
     pub values: Vec<f64>,
 }
 
+/// Two experiments of one name could not be told apart.
+pub(super) fn distinct_names(file: &ModelFile) -> Result<(), InputError> {
+    let mut names: Vec<&str> = Vec::new();
+    for (i, spec) in file.spec.experiments.iter().enumerate() {
+        let Some(name) = &spec.name else { continue };
+        if names.contains(&name.0.as_str()) {
+            return Err(file
+                .error_at(
+                    &format!("experiments[{i}].name"),
+                    "two experiments have the same name",
+                )
+                .found(format!("`{}`", name.0))
+                .expected("a name of its own for every experiment"));
+        }
+        names.push(&name.0);
+    }
+    Ok(())
+}
+
 /// Reads the files of all experiments; `None` where there is none to be read.
 pub(super) fn read(file: &ModelFile, purpose: Purpose) -> Result<Vec<Option<Record>>, InputError> {
     if matches!(purpose, Purpose::Simulate { .. }) {
@@ -67,6 +86,15 @@ fn read_one(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> Result<Record,
             })
             .expected(format!("at least {}", Grid::FEWEST_NODES));
         return Err(asked("data")(few));
+    }
+    if time == displacement {
+        return Err(file
+            .error_at(
+                &format!("{key}.columns"),
+                "time and displacement are the same column",
+            )
+            .found(format!("`{time}`"))
+            .expected("two columns"));
     }
     let spacing = equally_spaced(&table, &time).map_err(asked("columns.time"))?;
     let times = table.column(&time)?;

@@ -136,7 +136,7 @@ fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
         value => Ok(value.as_ref().map(|v| v.0)),
     };
     let seconds = positive("seconds", &stop.seconds)?;
-    Ok(Stopping {
+    let given = Stopping {
         iterations: stop.iterations.as_ref().map_or(1000, |n| n.0 as u64),
         cost_ratio: positive("cost_ratio", &stop.cost_ratio)?,
         gradient_ratio: positive("gradient_ratio", &stop.gradient_ratio)?,
@@ -144,5 +144,11 @@ fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
         step: positive("step", &stop.step)?,
         // A limit beyond what a Duration holds is no limit.
         limit: seconds.and_then(|s| Duration::try_from_secs_f64(s).ok()),
-    })
+    };
+    // Exactly so many iterations are only asked for by naming them.
+    let tolerance = match (given.has_test(), &stop.iterations) {
+        (false, None) => Stopping::default().tolerance,
+        _ => given.tolerance,
+    };
+    Ok(Stopping { tolerance, ..given })
 }

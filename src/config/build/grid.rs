@@ -7,8 +7,8 @@ use crate::config::spec::StepMethod;
 use crate::dynamics::{Grid, Method};
 use crate::error::{InputError, Place};
 
-/// Most nodes: a trajectory and its functions then take about 10 GB.
-const MOST_NODES: usize = 100_000_000;
+/// Most nodes: at about 400 bytes a node a run then takes 4 GB.
+const MOST_NODES: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,

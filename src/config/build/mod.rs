@@ -87,6 +87,7 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
 /// At the first thing that cannot be meant, with its line.
 pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let spec = &file.spec;
+    experiments::distinct_names(file)?;
     let records = experiments::read(file, purpose)?;
     let grid = grid::build(file, purpose, &records)?;
     let mut warnings = Vec::new();

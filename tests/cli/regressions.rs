@@ -1,0 +1,147 @@
+//! One test for each mistake that was found by using the program.
+
+use crate::workbench::{MODEL, Workbench, readings};
+
+fn bench(from: &str, to: &str) -> Workbench {
+    let bench = Workbench::empty();
+    assert!(MODEL.contains(from), "{from}");
+    bench.write("model.yaml", &MODEL.replace(from, to));
+    bench.write("readings.csv", &readings(21));
+    bench
+}
+
+fn status(bench: &Workbench, run: &str) -> String {
+    let text = bench.read(&format!("{run}/result.json"));
+    let result: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    result["outcome"]["status"]
+        .as_str()
+        .expect("a word")
+        .to_owned()
+}
+
+#[test]
+fn a_prediction_without_motion_does_not_cost_the_fit() {
+    let bench = bench(
+        "fit:",
+        "predict: [{displacement: 1e308, velocity: 1e308}, {displacement: 1, velocity: 0}]\nfit:",
+    );
+    let stdout = bench.run_to(0, &["fit", "model.yaml"]);
+    assert!(
+        stdout.contains("no motion: the motion overflows"),
+        "{stdout}"
+    );
+    assert_eq!(status(&bench, "runs/model"), "completed");
+}
+
+#[test]
+fn a_failed_run_leaves_no_older_result_behind() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    assert_eq!(status(&bench, "run"), "completed");
+    bench.write("bad.yaml", &MODEL.replace("start: 2.0", "start: 1e-300"));
+    bench.run_to(3, &["fit", "bad.yaml", "--out", "run"]);
+    assert_eq!(status(&bench, "run"), "failed");
+}
+
+#[test]
+fn figures_of_an_older_run_go_with_it() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    assert!(!bench.contents().keys().any(|name| name.ends_with(".svg")));
+}
+
+#[test]
+fn a_cost_that_overflows_is_an_outcome() {
+    let bench = Workbench::with_small_model();
+    let spoiled = readings(21).replacen("\n1,", "\n1,1e300\n#", 1);
+    bench.write("readings.csv", &spoiled);
+    let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
+    assert_eq!(code, 3, "{stderr}");
+    assert!(
+        stderr.contains("the cost overflows") && stderr.contains("t = 1.0"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn without_iterations_or_tests_the_default_tolerance_holds() {
+    let bench = bench("stop: {iterations: 5}", "stop: {}");
+    let (_, stdout, _) = bench.run(&["fit", "model.yaml"]);
+    assert!(!stdout.contains("asked for"), "{stdout}");
+}
+
+#[test]
+fn times_that_drift_are_not_equally_spaced() {
+    let bench = Workbench::with_small_model();
+    // Every spacing is within the tolerance, but the middle is off by ten times as much.
+    let mut text = String::from("t_s,y_m\n");
+    let mut t = 0.0f64;
+    for i in 0..41 {
+        text += &format!("{t},{}\n", (0.1 * f64::from(i)).cos());
+        t += 0.1 * (1.0 + if i < 20 { 0.45e-6 } else { -0.45e-6 });
+    }
+    bench.write("readings.csv", &text);
+    let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("they drift"), "{stderr}");
+}
+
+#[test]
+fn simulate_does_not_write_over_the_model_s_readings() {
+    let bench = Workbench::with_small_model();
+    let before = bench.contents();
+    let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./readings.csv"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("holds the readings"), "{stderr}");
+    assert_eq!(bench.contents(), before);
+}
+
+#[test]
+fn a_start_that_fits_exactly_is_converged_and_has_nothing_to_check() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["simulate", "model.yaml", "--out", "exact.csv"]);
+    bench.write("exact.yaml", &MODEL.replace("readings.csv", "exact.csv"));
+    bench.run_to(0, &["fit", "exact.yaml"]);
+    assert_eq!(status(&bench, "runs/exact"), "converged");
+    let stdout = bench.run_to(0, &["check", "exact.yaml"]);
+    assert!(stdout.contains("the gradient vanishes"), "{stdout}");
+}
+
+#[test]
+fn experiments_have_names_of_their_own_and_columns_two() {
+    let bench = bench("displacement: y_m", "displacement: t_s");
+    let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("the same column"), "{stderr}");
+}
+
+/// More parameters than the paper's 10^5.
+#[test]
+fn forty_thousand_nodes_run_the_same_commands() {
+    let bench = Workbench::with_shipped_models();
+    let nodes = "40000";
+    bench.run_to(
+        0,
+        &[
+            "simulate",
+            "models/paper-device.yaml",
+            "--nodes",
+            nodes,
+            "--out",
+            "data/large.csv",
+        ],
+    );
+    let model = bench.read("models/paper-lbfgs.yaml");
+    let model = model
+        .replace("paper.csv", "large.csv")
+        .replace("nodes: 2000", "nodes: 40000")
+        .replace("{iterations: 1000, cost_ratio: 1e-6}", "{iterations: 5}");
+    bench.write("models/large.yaml", &model);
+    bench.run_to(0, &["fit", "models/large.yaml"]);
+    assert_eq!(status(&bench, "runs/large"), "completed");
+    let stdout = bench.run_to(0, &["check", "models/large.yaml"]);
+    assert!(stdout.contains("120000 parameters"), "{stdout}");
+    let stdout = bench.run_to(0, &["predict", "runs/large", "--initial", "-3.3,1"]);
+    assert!(stdout.contains("-3.3"), "{stdout}");
+}
