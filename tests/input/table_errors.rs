@@ -233,6 +233,7 @@ fn spacing() {
     t.csv:4: row 3, column `t`: the times are not equally spaced
       found: 0.20001 after 0.1, a spacing of 0.10001
       expected: a spacing of 0.1, as between most rows
+      hint: the times may have been rounded: print more digits of them
     ");
     assert_snapshot!(equal("t\n0\n0\n"), @"
     t.csv:3: row 2, column `t`: two rows with the same time
