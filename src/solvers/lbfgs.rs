@@ -62,17 +62,18 @@ impl Lbfgs {
             direction: &direction,
             spare: Some(work.problem().workspace()),
             candidate: None,
+            last: 0.0,
             accepted: None,
             work,
         };
         let longest = LONGEST_LOG_STEP / at.largest_log_change(&direction);
-        let length = weak_wolfe(
+        weak_wolfe(
             &mut trials,
             point.evaluation.cost,
             slope,
             first.min(longest),
         )?;
-        let next = trials.accepted?;
+        let (length, next) = trials.accepted?;
         self.remember(at, point, &next, &gradient);
         Some(Step::Moved {
             point: next,
@@ -197,11 +198,15 @@ struct Trials<'a, 'w, 'q, 'p> {
     direction: &'a [f64],
     spare: Option<Evaluation>,
     candidate: Option<(Vec<f64>, Evaluation)>,
-    accepted: Option<Point>,
+    /// Step of the last trial.
+    last: f64,
+    /// The lowest trial that lowered the cost enough, and its step.
+    accepted: Option<(f64, Point)>,
 }
 
 impl Line for Trials<'_, '_, '_, '_> {
     fn cost(&mut self, a: f64) -> Option<f64> {
+        self.last = a;
         let mut x = self.x.clone();
         add_scaled(&mut x, a, self.direction);
         let parameters = self.at.back(&x);
@@ -229,7 +234,10 @@ impl Line for Trials<'_, '_, '_, '_> {
         };
         let point = self.work.complete(parameters, evaluation);
         let slope = self.at.inner(&self.at.gradient(&point), self.direction);
-        self.accepted = Some(point);
+        let lowest = self.accepted.as_ref().map(|(_, p)| p.evaluation.cost);
+        if lowest.is_none_or(|lowest| point.evaluation.cost < lowest) {
+            self.accepted = Some((self.last, point));
+        }
         slope
     }
 }
