@@ -8,5 +8,6 @@ mod ending;
 mod models;
 mod predict;
 mod regressions;
+mod results;
 mod simulate;
 mod workbench;
