@@ -162,7 +162,11 @@ fn failed_and_empty_runs_are_read_back() {
         let (code, _, stderr) = bench.run(command);
         assert_eq!(code, 2, "{stderr}");
         insta::allow_duplicates! {
-            insta::assert_snapshot!(stderr, @"");
+            insta::assert_snapshot!(stderr, @"
+            error: failed/result.json: this run failed and found no device
+              found: the start cannot be evaluated: the motion overflows at t = 0.100000 s
+              expected: the result of a run that found one
+            ");
         }
     }
     let still = MODEL.replace("iterations: 5", "iterations: 0");

@@ -170,3 +170,97 @@ fn the_kind_of_the_cost_follows_the_sigmas() {
     let sentence = result["model"]["cost_definition"].as_str().expect("text");
     assert!(sentence.contains("records without sigma") && sentence.contains("chi-square"));
 }
+
+/// What a soft constraint costs is in J, and that it is broken is said, in the result and in words.
+#[test]
+fn soft_constraints_that_are_broken_are_said_to_be() {
+    let bench = bench();
+    let result = fitted(&bench, EVERYTHING);
+    let slack = result["constraints"]["slack"].as_array().expect("a list");
+    let stiffness = column(&bench.read("run/functions.csv"), "stiffness_N_per_m");
+    let ends = [
+        ("stiffness(0) = 1.2", stiffness[0]),
+        ("stiffness(10) = 1.2", stiffness[400]),
+    ];
+    assert_eq!(slack.len(), 2);
+    for (entry, (name, value)) in slack.iter().zip(ends) {
+        assert_eq!(entry["name"], name);
+        assert_eq!(entry["rows"], 1);
+        // Each row is computed from the knots, the column from the table: rounding apart.
+        assert!((number(&entry["largest"]) - (value - 1.2).abs()).abs() < 1e-12);
+        assert!((number(&entry["price"]) - 0.5 * (value - 1.2).powi(2)).abs() < 1e-12);
+    }
+    // None is a hard one.
+    assert_eq!(result["constraints"]["max_violation"], 0.0);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    assert!(
+        summary.contains("soft `stiffness(0) = 1.2` is broken by up to "),
+        "{summary}"
+    );
+    assert!(summary.contains(" on 1 row\n"), "{summary}");
+    // Where the data agree with it, nothing is said.
+    let agreed = EVERYTHING
+        .replace("value: 1.2", "value: 1.0")
+        .replace("at: [0.0, 10.0]", "at: 0.0")
+        .replace(
+            "  - {function",
+            "  - {function: mass, min: 0.1, soft: 1}\n  - {function",
+        );
+    let result = fitted(&bench, &agreed);
+    let broken = result["constraints"]["slack"].as_array().expect("a list");
+    assert!(
+        broken.iter().all(|entry| entry["name"] != "mass >= 0.1"),
+        "{broken:?}"
+    );
+}
+
+/// A coarse fit starts a finer one whose knots contain its own: the finer one begins at the coarse
+/// cost and does not end above it.
+#[test]
+fn a_coarse_fit_starts_a_finer_one() {
+    let bench = bench();
+    let noise = ["--noise", "0.02", "--seed", "3", "--out", "readings.csv"];
+    bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
+    let model = |knots: usize, start: [&str; 3]| {
+        let [mass, damping, stiffness] = start;
+        format!(
+            "format: 1
+experiments:
+  - data: readings.csv
+    initial: {{displacement: 1.0, velocity: 0.5}}
+grid: {{method: rk4}}
+functions:
+  mass: {{basis: piecewise-linear, knots: {knots}, start: {mass}, smooth: {{order: 1, weight: 0.001}}}}
+  damping: {{basis: b-spline, knots: {knots}, start: {damping}}}
+  stiffness: {{basis: piecewise-constant, knots: {knots}, start: {stiffness}}}
+constraints:
+  - {{function: stiffness, at: 0.0, value: 1.0}}
+fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
+"
+        )
+    };
+    bench.write("coarse.yaml", &model(6, ["1.3", "0.3", "1.0"]));
+    bench.run_to(0, &["fit", "coarse.yaml"]);
+    let columns = ["mass_kg", "damping_N_s_per_m", "stiffness_N_per_m"]
+        .map(|name| format!("{{data: runs/coarse/functions.csv, column: {name}}}"));
+    bench.write(
+        "fine.yaml",
+        &model(11, columns.each_ref().map(String::as_str)),
+    );
+    bench.run_to(0, &["fit", "fine.yaml"]);
+    let cost = |run: &str, key: &str| {
+        let result: Value = serde_json::from_str(&bench.read(run)).expect("JSON");
+        number(&result["cost"][key])
+    };
+    let reached = cost("runs/coarse/result.json", "final");
+    let begun = cost("runs/fine/result.json", "initial");
+    let found = cost("runs/fine/result.json", "final");
+    // The table has all digits, and every coarse function is a fine one: what is left is the rounding
+    // of a projection, a few hundred additions.
+    assert!((begun / reached - 1.0).abs() < 1e-9, "{begun} {reached}");
+    assert!(found <= begun, "{found} {begun}");
+    assert!(
+        found < 0.999 * reached,
+        "twice the knots explain more noise: {found} {reached}"
+    );
+}
