@@ -176,3 +176,24 @@ pub fn prediction_table(predictions: &[Prediction]) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(decimals(-1e-9), "0.00000");
+        assert_eq!(decimals(-0.0), "0.00000");
+        assert_eq!(decimals(-1e-5), "-0.00001");
+        assert_eq!(decimals(-0.09917), "-0.09917");
+        assert_eq!(decimals(12.0), "12.00000");
+    }
+
+    #[test]
+    fn one_is_not_many() {
+        assert_eq!(count(1, "row"), "1 row");
+        assert_eq!(count(0, "row"), "0 rows");
+        assert_eq!(count(2, "row"), "2 rows");
+    }
+}

@@ -10,4 +10,5 @@ mod predict;
 mod regressions;
 mod results;
 mod simulate;
+mod story;
 mod workbench;
