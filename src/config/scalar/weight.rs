@@ -1,0 +1,36 @@
+//! Weights of penalties.
+
+use super::written::number_in;
+use super::{Number, Scalar, choose};
+use crate::config::complaint::Complaint;
+use crate::config::spec::WeightRule;
+use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
+use std::fmt;
+
+/// The weight of a penalty: a number, or the name of a rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    /// Given.
+    Number(Number),
+    /// Chosen from the data.
+    Rule(WeightRule),
+}
+
+impl Weight {
+    fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
+        let names = || WeightRule::ALL.iter().map(|(name, _)| *name);
+        let expected = format!("a finite number, or {}", crate::input::one_of(names()));
+        let weight = match scalar {
+            Scalar::Text(word) if number_in(word).is_none() => {
+                choose(scalar, WeightRule::ALL).map(Self::Rule)
+            }
+            other => Number::read(other).map(Self::Number),
+        };
+        weight.map_err(|complaint| Complaint {
+            expected,
+            ..complaint
+        })
+    }
+}
+
+deserialize_scalar!(Weight, Weight::read, "a number or the name of a rule");
