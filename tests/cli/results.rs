@@ -264,3 +264,52 @@ fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
         "twice the knots explain more noise: {found} {reached}"
     );
 }
+
+/// Every start that was tried is in the result and in the summary, and the best of them is the fit:
+/// 40 periods with three readings each, from a period that is off (`tests/ladder.rs`).
+#[test]
+fn the_rungs_of_the_ladder_are_told() {
+    let bench = Workbench::empty();
+    let model = |stiffness: &str, rest: &str| {
+        format!(
+            "format: 1
+experiments:
+  - name: sparse
+{rest}
+    initial: {{displacement: 3.3, velocity: 1.0}}
+grid: {{nodes: 2401, method: rk4, duration: 25.0}}
+functions:
+  mass: {{fixed: 1.0}}
+  damping: {{fixed: 0.05}}
+  stiffness: {stiffness}
+fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
+"
+        )
+    };
+    bench.write("device.yaml", &model("{fixed: 101.0}", ""));
+    bench.run_to(0, &["simulate", "device.yaml", "--out", "all.csv"]);
+    let all = bench.read("all.csv");
+    let (header, rows) = all.split_once('\n').expect("a header");
+    let kept: Vec<&str> = rows.lines().step_by(20).collect();
+    bench.write("sparse.csv", &format!("{header}\n{}\n", kept.join("\n")));
+    let data = "    data: sparse.csv\n    sigma: {displacement: 1e-8}";
+    let sought = "{basis: constant, start: 130.0}";
+    bench.write("model.yaml", &model(sought, data));
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
+    let rungs = result["rungs"].as_array().expect("a list");
+    let starts: Vec<&Value> = rungs.iter().map(|rung| &rung["start"]).collect();
+    assert_eq!(
+        starts,
+        ["start values", "equation error", "growing horizon"]
+    );
+    let costs: Vec<f64> = rungs.iter().map(|rung| number(&rung["cost"])).collect();
+    assert!(costs[2] < 1e-12 * costs[0].min(costs[1]), "{costs:?}");
+    assert_eq!(number(&result["cost"]["final"]), costs[2]);
+    for start in ["start values", "equation error", "growing horizon"] {
+        assert!(
+            summary.contains(&format!("\nfrom the {start}: J ")),
+            "{summary}"
+        );
+    }
+}
