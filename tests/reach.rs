@@ -4,49 +4,48 @@
 mod common;
 
 use kmcfit::constraints::RowGroup;
-use kmcfit::dynamics::{Device, Method};
+use kmcfit::dynamics::{Device, Grid, Method, Oscillator};
 use kmcfit::functions::basis::uniform_knots;
 use kmcfit::functions::{Basis, CoefficientFunction, Penalty, Quantity};
 use kmcfit::objective::GradientKind;
 use kmcfit::problem::Problem;
-use kmcfit::solvers::{FitSettings, Initial, Solver, Start, Stopping, fit};
+use kmcfit::solvers::{FitSettings, Initial, Solver, Start, Status, Stopping, fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const STARTS: u64 = 20;
-const NODES: usize = 301;
+const NODES: usize = 61;
+const ITERATIONS: u64 = 400;
 
-/// The answer: m = 1 - 0.02 t, c = 0.05, k = 1; the stiffness is known.
-fn truth(oscillator: &kmcfit::dynamics::Oscillator) -> Device {
-    let mass = oscillator
-        .grid
-        .times()
-        .iter()
-        .map(|t| 1.0 - 0.02 * t)
-        .collect();
-    Device {
-        mass,
-        coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
-    }
+/// Every basis, small enough that a mass which falls in a line is far from a constant in it.
+fn bases(grid: &Grid) -> [Basis; 6] {
+    let knots = |count| uniform_knots(grid, count);
+    [
+        Basis::Nodal,
+        Basis::Constant,
+        Basis::PiecewiseConstant { knots: knots(5) },
+        Basis::PiecewiseLinear { knots: knots(6) },
+        Basis::Polynomial { degree: 2 },
+        Basis::BSpline { knots: knots(4) },
+    ]
 }
 
-fn bases(grid: &kmcfit::dynamics::Grid) -> Vec<Basis> {
-    vec![
-        Basis::Nodal,
-        Basis::PiecewiseLinear {
-            knots: uniform_knots(grid, 6),
-        },
-        Basis::Polynomial { degree: 2 },
-        Basis::BSpline {
-            knots: uniform_knots(grid, 4),
-        },
-    ]
+/// The answer: the mass of `basis` nearest to `m = 1 - 0.02 t`, c = 0.05, k = 1; the stiffness is
+/// known. Its smoothness costs nothing in any basis.
+fn truth(oscillator: &Oscillator, basis: &Basis) -> Device {
+    let grid = oscillator.grid;
+    let line: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
+    let theta = basis.project(&grid, &line).unwrap();
+    Device {
+        mass: basis.design(&grid).multiply(&theta, NODES),
+        coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
+    }
 }
 
 /// The mass in `basis`, a constant damping, a known stiffness, started at `(m, c)`.
 fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Device) {
     let oscillator = common::oscillator(NODES, Method::Rk4);
-    let truth = truth(&oscillator);
+    let truth = truth(&oscillator, basis);
     let observed = oscillator
         .forward(&truth, common::INITIAL, None)
         .unwrap()
@@ -68,29 +67,41 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Dev
         .penalties
         .push(Penalty::new(0, 2, 1.0, basis.roughness(&grid, 2)));
     if constrained {
-        // The mass is only lost, and the damping is never negative.
-        let times: Vec<f64> = grid.times().into_iter().step_by(10).collect();
-        let slopes = basis.rows(&grid, &times, 1);
-        let mut group = RowGroup::new("mass non-increasing");
-        for (row, t) in slopes.row_iter().zip(&times) {
-            let entries = row
-                .col_indices()
-                .iter()
-                .copied()
-                .zip(row.values().iter().copied());
-            group.push(entries, [f64::NEG_INFINITY, 0.0], [*t, *t]);
-        }
-        problem.constraints.groups.push(group);
-        let damping = problem.functions.ranges()[1].start;
-        let mut group = RowGroup::new("damping >= 0");
-        group.push(
-            [(damping, 1.0)],
-            [0.0, f64::INFINITY],
-            [0.0, common::DURATION],
-        );
-        problem.constraints.groups.push(group);
+        problem.constraints.groups = constraints(&problem, basis);
     }
     (problem, truth)
+}
+
+/// The mass is only lost, and the damping is never negative.
+fn constraints(problem: &Problem, basis: &Basis) -> Vec<RowGroup> {
+    let grid = problem.oscillator.grid;
+    let mut falling = RowGroup::new("mass non-increasing");
+    let times: Vec<f64> = grid.times().into_iter().step_by(4).collect();
+    let values = basis.rows(&grid, &times, 0);
+    for i in 1..times.len() {
+        // The mass of a time less that of the time before.
+        let entries = [(i, 1.0), (i - 1, -1.0)].map(|(i, sign)| {
+            let row = values.row(i);
+            let terms = row.col_indices().iter().zip(row.values());
+            terms.map(|(j, a)| (*j, sign * a)).collect::<Vec<_>>()
+        });
+        let mut row = vec![0.0; basis.parameters(&grid)];
+        entries.concat().iter().for_each(|(j, a)| row[*j] += a);
+        // Within a cell, and for a constant, the mass is the same: there is nothing to demand.
+        let row: Vec<_> = row
+            .into_iter()
+            .enumerate()
+            .filter(|(_, a)| *a != 0.0)
+            .collect();
+        if !row.is_empty() {
+            falling.push(row, [f64::NEG_INFINITY, 0.0], [times[i - 1], times[i]]);
+        }
+    }
+    let damping = problem.functions.ranges()[1].start;
+    let mut positive = RowGroup::new("damping >= 0");
+    let record = [0.0, common::DURATION];
+    positive.push([(damping, 1.0)], [0.0, f64::INFINITY], record);
+    vec![falling, positive]
 }
 
 fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool {
@@ -103,7 +114,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
         gradient: GradientKind::Discrete,
         stopping: Stopping {
             tolerance: Some(1e-12),
-            ..Stopping::exactly(400)
+            ..Stopping::exactly(ITERATIONS)
         },
         interrupt: None,
     };
@@ -117,30 +128,43 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
     assert!(problem.constraints.hold(&found.best.parameters, 1e-9));
     let errors = common::errors(&found.best.evaluation.device, &truth);
-    errors.iter().all(|e| *e < 1e-3)
+    let reached = errors.iter().all(|e| *e < 1e-3);
+    // Nobody ends anywhere else: who has not arrived is on the way.
+    let status = found.outcome.status;
+    assert!(
+        reached || status == Status::MaxIterations,
+        "{solver:?} {} seed {seed}: {:?}",
+        basis.name(),
+        found.outcome
+    );
+    reached
 }
 
 #[test]
 fn the_share_of_starts_that_reach_the_answer_does_not_fall() {
     let grid = common::oscillator(NODES, Method::Rk4).grid;
-    // Gauss-Newton has the start ladder, the others only their start; in 400 iterations they do not
-    // bring a smoothed function of one value per node to its end.
-    let table: [(Solver, bool, [u64; 4]); 5] = [
-        (Solver::GaussNewton, false, [20, 20, 20, 20]),
-        (Solver::GaussNewton, true, [20, 20, 20, 20]),
-        (Solver::ProjectedGradient, false, [0, 20, 20, 14]),
-        (Solver::ProjectedGradient, true, [0, 20, 20, 20]),
-        (Solver::Lbfgs { memory: 20 }, false, [0, 20, 20, 20]),
+    let lbfgs = Solver::Lbfgs { memory: 20 };
+    // Gauss-Newton takes the curvature of the cost into account. The others have the gradient alone,
+    // and with one value per node the penalty on the curvature of m is up to (pi/dt)^4 times stiffer
+    // for one function than for another: 400 iterations are not enough for all starts, least of all
+    // along the plain gradient. Four splines are ill-conditioned in the same way, only less.
+    let table: [(Solver, bool, [u64; 6]); 6] = [
+        (Solver::GaussNewton, false, [20; 6]),
+        (Solver::GaussNewton, true, [20; 6]),
+        (Solver::ProjectedGradient, false, [11, 20, 20, 20, 20, 16]),
+        (Solver::ProjectedGradient, true, [20; 6]),
+        (lbfgs, false, [20; 6]),
+        (Solver::SteepestDescent, false, [2, 20, 20, 20, 20, 16]),
     ];
     println!("starts of {STARTS} that reach the answer");
     let mut short = Vec::new();
     for (solver, constrained, least) in table {
+        let under = if constrained { "constrained" } else { "free" };
         for (basis, least) in bases(&grid).iter().zip(least) {
-            let count = (1..=STARTS)
-                .filter(|seed| reaches(basis, solver, constrained, *seed))
-                .count() as u64;
+            let reached = |seed: &u64| reaches(basis, solver, constrained, *seed);
+            let count = (1..=STARTS).filter(reached).count() as u64;
             let words = format!(
-                "{} {} constrained: {constrained}: {count}",
+                "{:18} {under:11} {:18} {count:2}",
                 solver.name(),
                 basis.name()
             );

@@ -3,10 +3,10 @@
 use super::progress::Progress;
 use super::{Failure, exit_code, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
-use crate::dynamics::State;
+use crate::dynamics::{Breakdown, State};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{OutputFolder, Run, json, predict, summary};
-use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit};
+use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit, without_motion};
 use std::path::{Path, PathBuf};
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -103,7 +103,11 @@ fn search(
         }
     };
     progress.clear();
-    result.map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
+    let result = result.or_else(|breakdown| {
+        let fit = without_motion(problem, &model.given_start, settings, breakdown)?;
+        Ok((None, None, fit))
+    });
+    result.map_err(|breakdown: Breakdown| format!("the start cannot be evaluated: {breakdown}"))
 }
 
 /// The predictions that the model asks for; one without a motion says so and harms no other.

@@ -365,9 +365,11 @@ pub struct StopSpec {
     pub cost_ratio: Option<Number>,
     /// When the squared norm of the gradient has fallen to this part of its first value.
     pub gradient_ratio: Option<Number>,
-    /// When an iteration lowers the cost by less than this part of it.
+    /// When an iteration lowers the cost by at most this part of it and changes no function by more
+    /// than the square root of this, relative to the function's size; or when it changes none by more
+    /// than this.
     pub tolerance: Option<Number>,
-    /// When the step becomes shorter than this.
+    /// When an iteration changes no function by more than this part of its size.
     pub step: Option<Number>,
     /// After this time, in s.
     pub seconds: Option<Number>,

@@ -108,11 +108,20 @@ impl Conic {
 }
 
 impl Subproblem {
+    /// Most iterations of Clarabel, unless told otherwise: it takes ten to thirty, and what is not
+    /// solved after a hundred does not get solved.
+    pub const ITERATIONS: u32 = 100;
+
     /// The minimiser under all constraints.
+    pub fn solve(&self) -> Solution {
+        self.solve_within(Self::ITERATIONS)
+    }
+
+    /// [`Subproblem::solve`] in at most so many iterations.
     ///
     /// The residuals are variables of their own, so `F^T F` is never formed; rows are scaled to size
     /// 1 and infinite bounds are left out.
-    pub fn solve(&self) -> Solution {
+    pub fn solve_within(&self, iterations: u32) -> Solution {
         // The cost at zero becomes 1: the tolerances mean the same for every problem.
         let at_zero = self.value(&vec![0.0; self.variables]);
         let scale = if at_zero > 0.0 && at_zero.is_finite() {
@@ -131,7 +140,7 @@ impl Subproblem {
             tol_gap_abs: 1e-11,
             tol_gap_rel: 1e-10,
             tol_feas: 1e-11,
-            max_iter: 100,
+            max_iter: iterations,
             max_threads: 1,
             ..DefaultSettings::default()
         };

@@ -10,5 +10,5 @@ mod projection;
 mod subproblem;
 
 pub use self::clarabel::{ConicStatus, Solution};
-pub use projection::{Projection, RowPlace, project};
+pub use projection::{Projection, RowPlace, project, project_within};
 pub use subproblem::Subproblem;

@@ -72,10 +72,20 @@ pub struct Projection {
 /// Projects `theta` onto the constraints in the diagonal metric `metric`:
 /// minimises `sum_j metric_j (theta'_j - theta_j)^2`.
 pub fn project(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Projection {
+    project_within(Subproblem::ITERATIONS, constraints, theta, metric)
+}
+
+/// [`project`] in at most so many iterations of the quadratic program.
+pub fn project_within(
+    iterations: u32,
+    constraints: &Constraints,
+    theta: &[f64],
+    metric: &[f64],
+) -> Projection {
     let mut sub = Subproblem::new(theta.len());
     sub.proximal.copy_from_slice(metric);
     let places = sub.constrain(constraints, theta);
-    let solution = sub.solve();
+    let solution = sub.solve_within(iterations);
     let mut projected: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
     constraints.clip(&mut projected);
     Projection {

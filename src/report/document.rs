@@ -1,11 +1,18 @@
 //! `result.json`: the document that a run leaves behind. Its keys are stable.
 
+use super::cost::CostKind;
 use crate::dynamics::Grid;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the document's format.
 pub const FORMAT: u32 = 1;
+
+/// A number that left the range of floating-point numbers stands as `null` in JSON, which has no word
+/// for it: it is read back as not a number.
+fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
 
 /// The whole document.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,7 +75,9 @@ pub struct ModelSummary {
     pub gradient: String,
     /// Number of free parameters.
     pub parameters: usize,
-    /// What J is, in one sentence with its factors.
+    /// How the misfit in J is measured: `integral`, `chi-square` or `mixed`.
+    pub cost_kind: CostKind,
+    /// The whole of J in one sentence, with all its factors.
     pub cost_definition: String,
 }
 
@@ -92,14 +101,19 @@ pub struct OutcomeSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CostSummary {
     /// At the start.
+    #[serde(deserialize_with = "number_or_null")]
     pub initial: f64,
     /// At the best point.
+    #[serde(deserialize_with = "number_or_null")]
     pub r#final: f64,
     /// `final / initial`.
+    #[serde(deserialize_with = "number_or_null")]
     pub ratio: f64,
     /// Part of `final` from the readings.
+    #[serde(deserialize_with = "number_or_null")]
     pub misfit: f64,
     /// Part of `final` from the regularisation.
+    #[serde(deserialize_with = "number_or_null")]
     pub regularisation: f64,
 }
 
@@ -107,15 +121,18 @@ pub struct CostSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GradientSummary {
     /// At the start.
+    #[serde(deserialize_with = "number_or_null")]
     pub initial_norm_squared: f64,
     /// At the best point.
+    #[serde(deserialize_with = "number_or_null")]
     pub final_norm_squared: f64,
 }
 
 /// Work done.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CountsSummary {
-    /// Iterations of the solver.
+    /// Iterations of the fit that is reported, one row of `history.csv` each; those along a path of
+    /// weights are counted there.
     pub iterations: u64,
     /// Forward solves.
     pub forward: u64,
@@ -131,9 +148,15 @@ pub struct CountsSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
     /// Smallest value at a node.
+    #[serde(deserialize_with = "number_or_null")]
     pub min: f64,
     /// Largest value at a node.
+    #[serde(deserialize_with = "number_or_null")]
     pub max: f64,
+    /// For a polynomial the factors `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i`
+    /// in the unit of the function per s^i.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub powers: Option<Vec<f64>>,
     /// Largest distance from the truth at a node, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_max_error: Option<f64>,
@@ -150,6 +173,7 @@ pub struct ExperimentSummary {
     /// Number of readings.
     pub readings: usize,
     /// Root-mean-square residual, m.
+    #[serde(deserialize_with = "number_or_null")]
     pub rms_residual: f64,
 }
 
@@ -247,11 +271,21 @@ pub struct WeightSummary {
     pub path: Vec<PathSummary>,
 }
 
+impl WeightSummary {
+    /// Iterations of all fits along the path.
+    pub fn iterations(&self) -> u64 {
+        self.path.iter().map(|point| point.iterations).sum()
+    }
+}
+
 /// One fit along the path of weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PathSummary {
     /// Weight.
     pub weight: f64,
+    /// Iterations of this fit, all its starts together.
+    #[serde(default)]
+    pub iterations: u64,
     /// Misfit of the readings.
     pub misfit: f64,
     /// `sum |L theta - target|^2` of the penalties on the path.

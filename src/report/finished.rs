@@ -87,6 +87,16 @@ fn document(folder: &Path) -> Result<ResultDocument, InputError> {
                 .expected(FORMAT.to_string()),
         );
     }
+    if value.get("model").is_none()
+        && let Some(reason) = value.pointer("/outcome/reason").and_then(|r| r.as_str())
+    {
+        // Written by a run that could not begin: its outcome is all there is.
+        return Err(
+            InputError::file(&path, "this run failed and found no device")
+                .found(reason)
+                .expected("the result of a run that found one"),
+        );
+    }
     serde_json::from_value(value).map_err(|error| {
         InputError::file(&path, "the result is not complete")
             .found(error)

@@ -18,6 +18,7 @@
 
 mod axis;
 pub mod compare;
+mod cost;
 mod csv;
 mod curve;
 pub mod document;
@@ -38,6 +39,7 @@ pub mod svg;
 mod text;
 
 pub use compare::Comparison;
+pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use figure::{Axis, Figure, Panel, Scale};
 pub use files::{OutputFolder, write_whole};

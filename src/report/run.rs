@@ -1,5 +1,6 @@
 //! What a fit leaves behind: tables, figures and the result document.
 
+use super::cost::{CostKind, cost_definition};
 use super::csv::CsvTable;
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
@@ -12,8 +13,8 @@ use super::files::OutputFolder;
 use super::render;
 use crate::config::Model;
 use crate::dynamics::Device;
-use crate::functions::{Quantity, Ratios};
-use crate::objective::Weighting;
+use crate::functions::basis::physical_powers;
+use crate::functions::{Basis, Quantity, Ratios};
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, WeightPath, WeightRule, active_constraints,
 };
@@ -112,23 +113,8 @@ impl Run<'_> {
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.functions.parameters(),
-            cost_definition: self.cost_definition().into(),
-        }
-    }
-
-    fn cost_definition(&self) -> &'static str {
-        let readings = self.model.problem.experiments.iter();
-        let weightings = || readings.clone().filter_map(|e| e.readings.as_ref());
-        let integral = |w: Weighting| matches!(w, Weighting::Integral { .. });
-        match (
-            weightings().any(|r| integral(r.weighting())),
-            weightings().any(|r| !integral(r.weighting())),
-        ) {
-            (true, false) => "J = integral (y - y_obs)^2 dt by the trapezoid rule, m^2 s",
-            (false, true) => "J = sum over readings of ((y - y_obs)/sigma)^2 (chi-square)",
-            _ => {
-                "J = integral (y - y_obs)^2 dt over records without sigma + chi-square over the others"
-            }
+            cost_kind: CostKind::of(problem),
+            cost_definition: cost_definition(problem),
         }
     }
 
@@ -168,6 +154,7 @@ impl Run<'_> {
             .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
         let point = |p: &PathPoint| PathSummary {
             weight: p.weight,
+            iterations: p.iterations,
             misfit: p.misfit,
             roughness: p.roughness,
             degrees_of_freedom: p
@@ -196,10 +183,25 @@ impl Run<'_> {
 
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let summary = |(i, (quantity, values)): (usize, (Quantity, &[f64]))| {
-            let truth = self.true_function(i);
-            (quantity.name().to_string(), summarise(values, truth))
+            let summary = FunctionSummary {
+                powers: self.powers(i),
+                ..summarise(values, self.true_function(i))
+            };
+            (quantity.name().to_string(), summary)
         };
         self.named_functions().enumerate().map(summary).collect()
+    }
+
+    /// The factors of the powers of t, if function `index` is a free polynomial.
+    fn powers(&self, index: usize) -> Option<Vec<f64>> {
+        let problem = &self.model.problem;
+        let function = problem.functions.iter().nth(index)?;
+        let Some(Basis::Polynomial { .. }) = &function.basis else {
+            return None;
+        };
+        let range = problem.functions.ranges()[index].clone();
+        let theta = &self.fit.best.parameters[range];
+        Some(physical_powers(&problem.oscillator.grid, theta))
     }
 
     fn experiment_summaries(&self) -> Vec<ExperimentSummary> {
@@ -415,6 +417,7 @@ fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
         truth_max_error: errors
             .as_ref()
             .map(|e| e.iter().copied().fold(0.0, f64::max)),
+        powers: None,
         truth_rms_error: errors
             .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
     }

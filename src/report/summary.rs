@@ -21,11 +21,11 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     )?;
     writeln!(
         text,
-        "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {} iterations, {} forward and {} adjoint solves, {:.2} s",
+        "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {}, {} forward and {} adjoint solves, {:.2} s",
         cost.initial,
         cost.r#final,
         cost.ratio,
-        document.counts.iterations,
+        iterations(document),
         document.counts.forward,
         document.counts.adjoint,
         document.seconds
@@ -33,8 +33,10 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     for experiment in &document.experiments {
         writeln!(
             text,
-            "{}: rms residual {:.4e} m over {} readings",
-            experiment.name, experiment.rms_residual, experiment.readings
+            "{}: rms residual {:.4e} m over {}",
+            experiment.name,
+            experiment.rms_residual,
+            count(experiment.readings, "reading")
         )?;
     }
     writeln!(text)?;
@@ -45,6 +47,36 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         write!(text, "\n{}", prediction_table(&document.predictions))?;
     }
     Ok(())
+}
+
+/// The iterations of the last fit, and of the fits on the way to its weight, if a rule chose that.
+fn iterations(document: &ResultDocument) -> String {
+    let last = count(document.counts.iterations as usize, "iteration");
+    match &document.weights {
+        Some(weights) => {
+            let fits = count(weights.path.len(), "weight");
+            let before = weights.iterations();
+            format!("{last} after {before} along a path of {fits}")
+        }
+        None => last,
+    }
+}
+
+/// A number of things, in the singular where there is one.
+fn count(number: usize, thing: &str) -> String {
+    match number {
+        1 => format!("1 {thing}"),
+        _ => format!("{number} {thing}s"),
+    }
+}
+
+/// Five decimals; what rounds to zero has no sign.
+fn decimals(x: f64) -> String {
+    let text = format!("{x:.5}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|b| b == b'0' || b == b'.') => zero.into(),
+        _ => text,
+    }
 }
 
 fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
@@ -63,8 +95,9 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         };
         write!(
             text,
-            "{name:<10} {:>12.5} {:>12.5}",
-            function.min, function.max
+            "{name:<10} {:>12} {:>12}",
+            decimals(function.min),
+            decimals(function.max)
         )?;
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
@@ -88,8 +121,10 @@ fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::
     for slack in &document.constraints.slack {
         writeln!(
             text,
-            "soft `{}` is broken by up to {:.3e} on {} rows",
-            slack.name, slack.largest, slack.rows
+            "soft `{}` is broken by up to {:.3e} on {}",
+            slack.name,
+            slack.largest,
+            count(slack.rows, "row")
         )?;
     }
     for active in &document.constraints.active {
@@ -109,8 +144,10 @@ fn write_rungs(text: &mut String, document: &ResultDocument) -> std::fmt::Result
             .map_or("no motion".into(), |cost| format!("J {cost:.4e}"));
         writeln!(
             text,
-            "from the {}: {cost} after {} iterations ({})",
-            rung.start, rung.iterations, rung.status
+            "from the {}: {cost} after {} ({})",
+            rung.start,
+            count(rung.iterations as usize, "iteration"),
+            rung.status
         )?;
     }
     Ok(())
@@ -138,4 +175,25 @@ pub fn prediction_table(predictions: &[Prediction]) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(decimals(-1e-9), "0.00000");
+        assert_eq!(decimals(-0.0), "0.00000");
+        assert_eq!(decimals(-1e-5), "-0.00001");
+        assert_eq!(decimals(-0.09917), "-0.09917");
+        assert_eq!(decimals(12.0), "12.00000");
+    }
+
+    #[test]
+    fn one_is_not_many() {
+        assert_eq!(count(1, "row"), "1 row");
+        assert_eq!(count(0, "row"), "0 rows");
+        assert_eq!(count(2, "row"), "2 rows");
+    }
 }

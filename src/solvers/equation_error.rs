@@ -93,16 +93,11 @@ fn clipped(
     (constraints.hold(&theta, TOLERANCE) && kept >= KEPT).then_some(theta)
 }
 
-/// The constraints, and where nothing fixes the common scale of all functions, the mean of the first
-/// free function at its start: without it the equation is solved by no device at all.
+/// The constraints, and where nothing fixes the common scale of all functions, the mean of the mass
+/// at its start: without it the equation is solved by no device at all.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
-    let something_fixed = problem.functions.iter().any(|f| f.parameters() == 0)
-        || problem.experiments.iter().any(|e| e.force.is_some())
-        || constraints.groups.iter().any(|g| {
-            (0..g.rows.len()).any(|i| g.bounds(i)[0] == g.bounds(i)[1] && g.bounds(i)[0] != 0.0)
-        });
-    if !something_fixed {
+    if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
         let grid = &problem.oscillator.grid;
         let mut ones = problem.functions.empty_device();
         ones.mass
@@ -119,6 +114,30 @@ fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
         constraints.groups.push(group);
     }
     constraints
+}
+
+/// Whether the equation of motion tells `theta` from `s theta`. Its error is linear in `theta`, and
+/// homogeneous unless a force that acts on a record or a fixed function gives it a right-hand side;
+/// a force or a function that is zero does not.
+fn equation_fixes_scale(problem: &Problem) -> bool {
+    let nonzero = |values: &[f64]| values.iter().any(|v| *v != 0.0);
+    let fixed = problem.functions.iter().any(|f| nonzero(&f.offset));
+    let measured = problem.experiments.iter().filter(|e| e.readings.is_some());
+    let mut forces = measured.filter_map(|e| e.force.as_deref());
+    fixed || forces.any(nonzero)
+}
+
+/// Whether some equality tells `theta` from `s theta`: `a theta = b` does unless `b` is zero. An
+/// inequality does not fix the scale, it only bounds it. A `b` that is rounding beside the terms of
+/// the row at `start` counts as zero.
+fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
+    constraints.groups.iter().any(|group| {
+        (0..group.rows.len()).any(|i| {
+            let [lower, upper] = group.bounds(i);
+            let terms = group.rows.row(i).map(|(j, a)| (a * start[j]).abs());
+            lower == upper && lower.abs() > TOLERANCE * terms.sum::<f64>()
+        })
+    })
 }
 
 fn add_experiment(problem: &Problem, experiment: &Experiment, start: &[f64], sub: &mut Subproblem) {

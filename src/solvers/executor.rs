@@ -135,7 +135,14 @@ impl Run<'_> {
         match self.method.step(work, before) {
             Step::Stuck(reason) => self.outcome = Some(Outcome::new(Status::Stalled, reason)),
             Step::Minimum(reason) => self.outcome = Some(Outcome::new(Status::Converged, reason)),
-            Step::Moved { point, length } => {
+            Step::Infeasible(reason) => {
+                self.outcome = Some(Outcome::new(Status::Infeasible, reason))
+            }
+            Step::Moved {
+                point,
+                length,
+                hindered,
+            } => {
                 progress
                     .recorder
                     .record(work.problem(), before, &point, length);
@@ -143,7 +150,8 @@ impl Run<'_> {
                 progress.point = point;
                 if let Some(row) = progress.recorder.rows.last() {
                     (self.observe)(row);
-                    self.outcome = self.settings.stopping.after(row, previous_cost);
+                    let stopping = &self.settings.stopping;
+                    self.outcome = stopping.after(row, previous_cost, hindered);
                 }
             }
         }
@@ -217,7 +225,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         mut state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
-        let mut work = Work::new(problem, self.settings.gradient);
+        let mut work = Work::new(problem, self.settings);
         self.progress = self.start(&mut work, parameters);
         self.outcome = self.nothing_to_do(problem.problem.as_ref().map(|p| &p.functions));
         Ok((self.view(state), None))
@@ -228,7 +236,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        self.advance(&mut Work::new(problem, self.settings.gradient));
+        self.advance(&mut Work::new(problem, self.settings));
         Ok((self.view(state), None))
     }
 

@@ -78,6 +78,7 @@ impl Lbfgs {
         Some(Step::Moved {
             point: next,
             length,
+            hindered: false,
         })
     }
 

@@ -2,9 +2,11 @@
 //! record of what happened are shared.
 
 mod activity;
+mod conflict;
 mod equation_error;
 mod executor;
 mod gauss_newton;
+mod infeasible;
 mod ladder;
 mod lbfgs;
 mod line_search;
@@ -20,6 +22,7 @@ mod weight_path;
 pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::equation_error;
 pub use executor::Fit;
+pub use infeasible::without_motion;
 pub use ladder::{Initial, Rung, fit};
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};
@@ -78,10 +81,17 @@ pub struct FitSettings {
 
 /// Where one iteration led.
 pub(crate) enum Step {
-    /// To a point with lower cost; `length` is the step along the direction.
-    Moved { point: Point, length: f64 },
+    /// To a point with lower cost; `length` is the step along the direction. A `hindered` step is
+    /// short because longer ones could not be computed: that it is short says nothing of a minimum.
+    Moved {
+        point: Point,
+        length: f64,
+        hindered: bool,
+    },
     /// Nowhere: no step lowers the cost, for this reason.
     Stuck(String),
+    /// Nowhere: the point breaks the constraints, and no step leads into them, for this reason.
+    Infeasible(String),
     /// Nowhere: the model predicts no decrease worth the name; the point is a minimum.
     Minimum(String),
 }

@@ -1,5 +1,6 @@
 //! A point of the search, and the counted work that makes one.
 
+use super::FitSettings;
 use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
@@ -32,6 +33,8 @@ pub struct Counts {
 pub(crate) struct Work<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
+    /// Most iterations of one quadratic program.
+    pub program_iterations: u32,
 }
 
 const FORWARD: &str = "forward_count";
@@ -40,8 +43,15 @@ const TANGENT: &str = "tangent_count";
 const QP: &str = "qp_count";
 
 impl<'a, 'p> Work<'a, 'p> {
-    pub fn new(problem: &'a mut argmin::core::Problem<&'p Problem>, kind: GradientKind) -> Self {
-        Self { problem, kind }
+    pub fn new(
+        problem: &'a mut argmin::core::Problem<&'p Problem>,
+        settings: &FitSettings,
+    ) -> Self {
+        Self {
+            problem,
+            kind: settings.gradient,
+            program_iterations: settings.stopping.program_iterations,
+        }
     }
 
     /// The problem itself, for what costs no solve.

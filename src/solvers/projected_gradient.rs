@@ -6,10 +6,11 @@
 //! always the last. Metric and projection are those of functions, `sum_f 1/T integral (delta p_f /
 //! size_f)^2 dt`, with the sizes at the start of the search.
 
+use super::infeasible::no_step;
 use super::point::Work;
 use super::{Descend, Point, Step};
 use crate::constraints::TOLERANCE;
-use crate::qp::{ConicStatus, project};
+use crate::qp::{ConicStatus, project_within};
 
 /// Sufficient decrease along the feasible direction.
 const DECREASE: f64 = 1e-4;
@@ -33,7 +34,7 @@ impl Descend for ProjectedGradient {
         }
         let target = match self.target(work, point) {
             Ok(target) => target,
-            Err(status) => return Step::Stuck(status.sentence().into()),
+            Err(status) => return no_step(work.problem(), point, status),
         };
         let direction = difference(&target, &point.parameters);
         let slope = dot(&point.gradient.euclidean, &direction);
@@ -55,6 +56,7 @@ impl Descend for ProjectedGradient {
                 return Step::Moved {
                     point: next,
                     length: share,
+                    hindered: false,
                 };
             }
             share *= 0.5;
@@ -96,7 +98,8 @@ impl ProjectedGradient {
             return Ok(target);
         }
         work.count_qp();
-        let projection = project(constraints, &target, &self.metric);
+        let projection =
+            project_within(work.program_iterations, constraints, &target, &self.metric);
         match projection.status {
             ConicStatus::Solved | ConicStatus::Almost
                 if constraints.hold(&projection.theta, TOLERANCE) =>

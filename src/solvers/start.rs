@@ -4,6 +4,8 @@ use crate::constraints::{Constraints, TOLERANCE};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project};
 
+use super::conflict::{conflict, feasibility};
+
 /// What became of a start.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Start {
@@ -19,6 +21,9 @@ pub enum Start {
     /// No point does: these constraints contradict each other, and would not without any one of
     /// them.
     Contradiction(Vec<String>),
+    /// No point does: a contradiction is among these constraints, but some of them may have no part
+    /// in it.
+    ContradictionAmong(Vec<String>),
     /// The projection could not be solved.
     Unsolved(ConicStatus),
 }
@@ -43,52 +48,42 @@ impl Problem {
             let projection = project(&self.constraints, start, &metric);
             match projection.status {
                 ConicStatus::Solved | ConicStatus::Almost => moved = projection.theta,
-                ConicStatus::Infeasible => {
-                    return Start::Contradiction(conflict(&self.constraints, start, &metric));
-                }
-                status => return Start::Unsolved(status),
+                status => return self.contradiction(start, &metric, status),
             }
         }
         match self.constraints.hold(&moved, TOLERANCE) {
             true => Start::Moved {
-                parameters: moved,
+                parameters: self.with_mass(start, &metric, moved),
                 constraint: worst.name,
             },
             // Clipping to contradictory bounds leaves a violation that no projection removes.
-            false => Start::Contradiction(conflict(&self.constraints, start, &metric)),
+            false => self.contradiction(start, &metric, ConicStatus::Stalled),
         }
     }
-}
 
-/// Names of constraints that contradict each other, none of which could be left out: each group is
-/// left out in turn, for good where the rest still contradicts itself.
-fn conflict(constraints: &Constraints, start: &[f64], metric: &[f64]) -> Vec<String> {
-    let contradicts = |candidate: &Constraints| {
-        project(candidate, start, metric).status == ConicStatus::Infeasible
-    };
-    let mut left = constraints.clone();
-    let mut i = 0;
-    while i < left.groups.len() {
-        let mut without = left.clone();
-        without.groups.remove(i);
-        if contradicts(&without) {
-            left = without;
-        } else {
-            i += 1;
+    /// `moved`, or where that has no positive mass the nearest point to `start` that has one, if there
+    /// is any in the constraint set.
+    fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
+        let positive = |theta: &[f64]| self.functions.device(theta).mass.iter().all(|m| *m > 0.0);
+        if positive(&moved) || !positive(start) {
+            return moved;
+        }
+        let constraints = self.constraints_with_mass(start);
+        let nearest = project(&constraints, start, metric);
+        match constraints.hold(&nearest.theta, TOLERANCE) && positive(&nearest.theta) {
+            true => nearest.theta,
+            false => moved,
         }
     }
-    let mut i = 0;
-    while i < left.cones.len() {
-        let mut without = left.clone();
-        without.cones.remove(i);
-        if contradicts(&without) {
-            left = without;
-        } else {
-            i += 1;
+
+    /// What is known about constraints into which `start` could not be moved: its projection ended
+    /// with `status`.
+    fn contradiction(&self, start: &[f64], metric: &[f64], status: ConicStatus) -> Start {
+        let judge = |candidate: &Constraints| feasibility(candidate, start, metric);
+        match conflict(&self.constraints, &judge) {
+            Some(found) if found.minimal => Start::Contradiction(found.names),
+            Some(found) => Start::ContradictionAmong(found.names),
+            None => Start::Unsolved(status),
         }
     }
-    let groups = left.groups.into_iter().map(|g| g.name);
-    groups
-        .chain(left.cones.into_iter().map(|c| c.name))
-        .collect()
 }

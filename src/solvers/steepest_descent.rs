@@ -49,6 +49,7 @@ impl Descend for SteepestDescent {
             Some((length, parameters, evaluation)) => Step::Moved {
                 point: work.complete(parameters, evaluation),
                 length,
+                hindered: false,
             },
             None => Step::Stuck(format!("none of the {TRIALS} trial steps lowers the cost")),
         }

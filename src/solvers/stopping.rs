@@ -2,6 +2,7 @@
 
 use super::outcome::{Outcome, Status};
 use super::recorder::Row;
+use crate::qp::Subproblem;
 use std::time::Duration;
 
 /// Stopping tests. The iteration limit always holds; of the others those that are given.
@@ -23,6 +24,9 @@ pub struct Stopping {
     pub step: Option<f64>,
     /// Wall-clock limit.
     pub limit: Option<Duration>,
+    /// Most iterations of one quadratic program ([`Subproblem::ITERATIONS`] by default); one that needs
+    /// more has stalled.
+    pub program_iterations: u32,
 }
 
 impl Default for Stopping {
@@ -45,6 +49,7 @@ impl Stopping {
             tolerance: None,
             step: None,
             limit: None,
+            program_iterations: Subproblem::ITERATIONS,
         }
     }
 
@@ -59,10 +64,12 @@ impl Stopping {
         tests.iter().any(Option::is_some)
     }
 
-    /// The outcome that the latest iteration brings, if any. `previous_cost` is J before it.
-    pub(crate) fn after(&self, row: &Row, previous_cost: f64) -> Option<Outcome> {
+    /// The outcome that the latest iteration brings, if any. `previous_cost` is J before it; a small
+    /// step that was `hindered` is no sign of convergence.
+    pub(crate) fn after(&self, row: &Row, previous_cost: f64, hindered: bool) -> Option<Outcome> {
+        let small_step = || (!hindered).then(|| self.small_step(row, previous_cost));
         self.ratios_met(row)
-            .or_else(|| self.small_step(row, previous_cost))
+            .or_else(|| small_step().flatten())
             .map(|reason| Outcome::new(Status::Converged, reason))
             .or_else(|| self.out_of_iterations(row.iteration))
     }

@@ -40,6 +40,8 @@ impl WeightRule {
 pub struct PathPoint {
     /// Factor on the penalties.
     pub weight: f64,
+    /// Iterations of the fit, all its starts together.
+    pub iterations: u64,
     /// Misfit of the readings; chi-square where they have a sigma.
     pub misfit: f64,
     /// `sum |L theta - target|^2` of the penalties on the path, without the weight.
@@ -223,6 +225,7 @@ impl Walk<'_> {
         let degrees_of_freedom = degrees_of_freedom(&problem, &found);
         Ok(PathPoint {
             weight,
+            iterations: found.rungs.iter().map(|rung| rung.iterations).sum(),
             misfit,
             roughness: roughness(&problem, self.which, &self.from),
             degrees_of_freedom,

@@ -130,6 +130,8 @@ fn the_table() {
     let mut settings = insta::Settings::clone_current();
     settings.add_filter(r"(?m)^time \(s\) .*$", "time (s) [seconds]");
     // What an optimum leaves of the errors is left to the machine.
+    settings.add_filter(r"to \de-1\d", "to [tiny]");
+    settings.add_filter(r" \de-1\d", "[tiny]");
     settings.add_filter(r"\d\.\d{3}e-1\d", "   [tiny]");
     settings.add_filter(r"\d\.\d{3}e-[6-9]", "  [tiny]");
     settings.add_filter(r"\d\.\de-([6-9]|1\d)", "[tiny]");

@@ -110,3 +110,77 @@ fn a_start_without_motion() {
         "{stderr}"
     );
 }
+
+/// Constraints that no device with a motion satisfies: what is kept is the start as given.
+fn infeasible(constraint: &str) -> (String, Value) {
+    let bench = Workbench::with_small_model();
+    let model = MODEL
+        .replace("method: lbfgs", "method: gauss-newton")
+        .replace("fit:", &format!("constraints: [{constraint}]\nfit:"));
+    bench.write("model.yaml", &model);
+    let stdout = bench.run_to(3, &["fit", "model.yaml", "--out", "run"]);
+    assert_eq!(status(&bench, "run"), "infeasible");
+    let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
+    let number = |pointer: &str| result.pointer(pointer).and_then(Value::as_f64);
+    assert_eq!(number("/functions/mass/min"), Some(2.0));
+    assert_eq!(number("/cost/final"), number("/cost/initial"));
+    assert!(number("/constraints/max_violation").is_some_and(|v| v > 0.1));
+    let finite = |column: Vec<f64>| column.iter().all(|x| x.is_finite());
+    assert!(finite(column(&bench.read("run/functions.csv"), "mass_kg")));
+    assert!(finite(column(&bench.read("run/trajectory.csv"), "y_m")));
+    // The folder is that of a finished run.
+    bench.run_to(0, &["predict", "run", "--initial", "1,0"]);
+    (stdout, result)
+}
+
+#[test]
+fn a_mass_that_must_pass_zero() {
+    let (stdout, result) = infeasible("{function: mass, at: 1.0, value: -1.0}");
+    let reason = result["outcome"]["reason"].as_str().expect("text");
+    assert!(reason.contains("the mass is -1 kg"), "{reason}");
+    assert!(stdout.contains("infeasible: no start within the constraints has a motion"));
+}
+
+#[test]
+fn a_damping_that_must_overflow() {
+    let (_, result) = infeasible("{function: damping, at: 0.0, value: -1e20}");
+    let reason = result["outcome"]["reason"].as_str().expect("text");
+    assert!(reason.contains("the motion overflows"), "{reason}");
+}
+
+/// A run that failed is said to have; one whose history is empty is a run like any other.
+#[test]
+fn failed_and_empty_runs_are_read_back() {
+    let bench = Workbench::with_small_model();
+    let failing = MODEL.replace("start: 2.0", "start: 1e-200");
+    bench.write("failing.yaml", &failing);
+    bench.run(&["fit", "failing.yaml", "--out", "failed"]);
+    for command in [
+        &["compare", "failed"][..],
+        &["predict", "failed", "--initial", "1,0"],
+    ] {
+        let (code, _, stderr) = bench.run(command);
+        assert_eq!(code, 2, "{stderr}");
+        insta::allow_duplicates! {
+            insta::assert_snapshot!(stderr, @"
+            error: failed/result.json: this run failed and found no device
+              found: the start cannot be evaluated: the motion overflows at t = 0.100000 s
+              expected: the result of a run that found one
+            ");
+        }
+    }
+    let still = MODEL.replace("iterations: 5", "iterations: 0");
+    bench.write("still.yaml", &still);
+    bench.run_to(0, &["fit", "still.yaml", "--out", "still"]);
+    assert_eq!(bench.read("still/history.csv").lines().count(), 1);
+    let stdout = bench.run_to(0, &["compare", "still", "still"]);
+    assert!(stdout.contains("iterations"), "{stdout}");
+    // A number that JSON cannot hold.
+    let result = bench.read("still/result.json");
+    let mut result: Value = serde_json::from_str(&result).expect("JSON");
+    result["cost"]["ratio"] = Value::Null;
+    result["gradient"]["initial_norm_squared"] = Value::Null;
+    bench.write("still/result.json", &result.to_string());
+    bench.run_to(0, &["compare", "still"]);
+    bench.run_to(0, &["predict", "still", "--initial", "1,0"]);
+}

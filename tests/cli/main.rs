@@ -8,5 +8,7 @@ mod ending;
 mod models;
 mod predict;
 mod regressions;
+mod results;
 mod simulate;
+mod story;
 mod workbench;

@@ -144,6 +144,7 @@ fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
         step: positive("step", &stop.step)?,
         // A limit beyond what a Duration holds is no limit.
         limit: seconds.and_then(|s| Duration::try_from_secs_f64(s).ok()),
+        program_iterations: Stopping::default().program_iterations,
     };
     // Exactly so many iterations are only asked for by naming them.
     let tolerance = match (given.has_test(), &stop.iterations) {

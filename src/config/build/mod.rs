@@ -24,6 +24,8 @@ pub struct Model {
     pub title: String,
     /// What is fitted.
     pub problem: Problem,
+    /// The start as it is given, before it was moved into the constraints.
+    pub given_start: Vec<f64>,
     /// How it is fitted.
     pub settings: FitSettings,
     /// The rule that chooses the weight of some penalties, whose weight in `problem` is 1.
@@ -110,6 +112,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let places = constraints::build(file, &mut problem, &mut warnings)?;
     problem.soft = problem.constraints.take_soft();
     let settings = fit::build(file, &problem, weight_rule.is_some())?;
+    let given_start = problem.functions.start();
     // A simulation is of the functions as they are given.
     if !matches!(purpose, Purpose::Simulate { .. }) {
         constraints::move_start(file, &mut problem, &places, &mut warnings)?;
@@ -122,6 +125,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     Ok(Model {
         title: title(file),
         problem,
+        given_start,
         settings,
         weight_rule,
         truth,

@@ -34,7 +34,7 @@ pub struct Measures {
     pub misfit_unit: &'static str,
     /// `J/J0`.
     pub cost_ratio: f64,
-    /// Iterations of the solver.
+    /// Iterations of the solver, those along a path of weights included.
     pub iterations: u64,
     /// Wall-clock time, s.
     pub seconds: f64,
@@ -76,7 +76,8 @@ impl Measures {
                 false => "m^2 s",
             },
             cost_ratio: document.cost.ratio,
-            iterations: document.counts.iterations,
+            iterations: document.counts.iterations
+                + document.weights.as_ref().map_or(0, |w| w.iterations()),
             seconds: document.seconds,
             errors,
             smallest_mass: smallest(&device.mass),

@@ -51,8 +51,14 @@ impl Cell {
     }
 }
 
-/// A number with four digits.
+/// Sizes below this are what rounding leaves: one digit says all there is to say.
+pub(super) const ROUNDING: f64 = 1e-12;
+
+/// A number with four digits; with one where it is rounding.
 pub(super) fn short(x: f64) -> String {
+    if x != 0.0 && x.abs() < ROUNDING {
+        return format!("{x:.0e}");
+    }
     let rounded = format!("{x:.3e}");
     let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse().ok());
     match exponent {
@@ -217,10 +223,12 @@ mod tests {
             -0.0992,
             123_456.0,
             1e-3,
+            -2.22e-15,
         ];
         let texts = shown.map(short);
         let expected = [
             "0", "0.9950", "0.1000", "139.8", "8.130e-5", "-0.09920", "1.235e5", "0.001000",
+            "-2e-15",
         ];
         assert_eq!(texts, expected);
     }

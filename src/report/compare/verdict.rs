@@ -2,7 +2,9 @@
 
 use super::measures::Errors;
 use super::run::ComparedRun;
+use super::table::ROUNDING;
 use super::{CLOSE, MATCHED, RECOVERED};
+use crate::report::cost::CostKind;
 use crate::report::document::ResultDocument;
 
 /// The line: whether the motion is matched, and whether the device is the true one.
@@ -13,7 +15,7 @@ pub(super) fn verdict(run: &ComparedRun, errors: Option<&Errors>) -> String {
     };
     if errors.within(RECOVERED) {
         let digits = errors.k_over_m_relative.max(errors.c_over_m_relative);
-        let mut text = format!("the true device: k/m and c/m to {digits:.1e}");
+        let mut text = format!("the true device: k/m and c/m to {}", size(digits));
         if errors.mass_relative >= RECOVERED {
             let off = percent(errors.mass_relative);
             text += &format!(", but m, c and k off by a common factor (m by {off})");
@@ -74,10 +76,9 @@ fn residual_share(run: &ComparedRun) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// The cost is a chi-square: every record has a sigma.
+/// The misfit is a chi-square: every record has a sigma.
 pub(super) fn is_chi_square(document: &ResultDocument) -> bool {
-    let definition = &document.model.cost_definition;
-    definition.contains("chi-square") && !definition.contains("integral (y")
+    document.model.cost_kind == CostKind::ChiSquare
 }
 
 /// How far `k/m` and `c/m` are from the truth; only the one that is off, if the other is not.
@@ -95,6 +96,14 @@ fn distances(errors: &Errors) -> String {
         damping
     } else {
         format!("{stiffness}, {damping}")
+    }
+}
+
+/// A small number with two digits; with one where it is rounding.
+fn size(x: f64) -> String {
+    match x < ROUNDING {
+        true => format!("{x:.0e}"),
+        false => format!("{x:.1e}"),
     }
 }
 

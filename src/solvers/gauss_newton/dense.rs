@@ -65,8 +65,9 @@ fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> (DMatrix<f64
                 motion,
                 &direction,
             );
+            // The readings may end before the motion does.
             let seen = change.displacement.iter().step_by(readings.stride());
-            for (i, dy) in seen.enumerate() {
+            for (i, dy) in seen.take(readings.values().len()).enumerate() {
                 jacobian[(row, j)] = readings.weight(i).sqrt() * dy;
                 row += 1;
             }

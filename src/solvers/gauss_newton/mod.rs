@@ -9,6 +9,7 @@
 mod dense;
 mod structured;
 
+use super::infeasible::no_step;
 use super::point::Work;
 use super::{Descend, Point, Step};
 use crate::constraints;
@@ -83,6 +84,7 @@ impl Descend for GaussNewton {
         let scales = proximal_scales(problem, point);
         let mut evaluation = problem.workspace();
         let mut trouble = None;
+        let before = self.damping;
         while self.damping <= MOST_DAMPING {
             let weight = self.damping * point.evaluation.cost;
             for (d, s) in sub.proximal.iter_mut().zip(&scales) {
@@ -99,23 +101,34 @@ impl Descend for GaussNewton {
             let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
             let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
             let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
+            if trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
+                // What is left of the step by damping away the programs that stalled.
+                break;
+            }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
+                if trouble.is_some() {
+                    // The next programs are others: they get the chance to be solved with less.
+                    self.damping = before;
+                }
                 return Step::Moved {
                     point: work.complete(proposal.parameters, evaluation),
                     length: 1.0,
+                    hindered: trouble.is_some(),
                 };
             }
-            if let Some(reason) = at_minimum(problem, point, &proposal) {
+            if trouble.is_none()
+                && let Some(reason) = at_minimum(problem, point, &proposal)
+            {
                 return Step::Minimum(reason);
             }
             self.damping *= 8.0;
         }
         self.damping = FIRST_DAMPING;
-        Step::Stuck(match trouble {
-            Some(status) => status.sentence().into(),
-            None => "no Gauss-Newton step lowers the cost".into(),
-        })
+        match trouble {
+            Some(status) => no_step(problem, point, status),
+            None => Step::Stuck("no Gauss-Newton step lowers the cost".into()),
+        }
     }
 }
 
@@ -139,10 +152,15 @@ fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<S
     if proposal.predicted <= unseen {
         return Some("the linearised cost cannot be lowered any further".into());
     }
-    let device = problem.functions.device(&proposal.parameters);
-    let change = problem.relative_change(&point.evaluation, &device);
+    let change = change(problem, point, proposal);
     (change <= SMALLEST_CHANGE)
         .then(|| format!("no function is to change by more than {change:.1e} of its size"))
+}
+
+/// The largest change of a function that a proposal asks for, relative to the function's size.
+fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
+    let device = problem.functions.device(&proposal.parameters);
+    problem.relative_change(&point.evaluation, &device)
 }
 
 /// The best step that the subproblem offers in the constraint set.
@@ -175,7 +193,7 @@ fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
         }
     }
     work.count_qp();
-    let solution = sub.solve();
+    let solution = sub.solve_within(work.program_iterations);
     match solution.status {
         ConicStatus::Solved | ConicStatus::Almost => {
             let parameters = moved(&solution.z);

@@ -34,7 +34,14 @@ pub(in crate::config::build) fn move_start(
             problem.functions = problem.functions.clone().with_start(&parameters);
             Ok(())
         }
-        Start::Contradiction(names) => Err(contradiction(file, places, &names)),
+        Start::Contradiction(names) => {
+            let hint = "leaving out any one of them resolves it";
+            Err(contradiction(file, places, &names, hint))
+        }
+        Start::ContradictionAmong(names) => {
+            let hint = "some of them may have no part in it";
+            Err(contradiction(file, places, &names, hint))
+        }
         Start::Unsolved(status) => Err(file
             .error_at("constraints", "no start inside the constraints was found")
             .found(status.sentence())
@@ -42,7 +49,7 @@ pub(in crate::config::build) fn move_start(
     }
 }
 
-fn contradiction(file: &ModelFile, places: &[Place], names: &[String]) -> InputError {
+fn contradiction(file: &ModelFile, places: &[Place], names: &[String], hint: &str) -> InputError {
     let mut left: Vec<&Place> = places.iter().collect();
     let mut last: Option<(usize, &str)> = None;
     let mut rows = Vec::new();
@@ -67,7 +74,7 @@ fn contradiction(file: &ModelFile, places: &[Place], names: &[String]) -> InputE
         1 => file.error_at(key, "this constraint contradicts itself"),
         _ => file
             .error_at(key, "these constraints contradict each other")
-            .hint("leaving out any one of them resolves it"),
+            .hint(hint),
     };
     error
         .found(super::listed(rows.iter().map(String::as_str)))

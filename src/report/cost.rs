@@ -1,0 +1,84 @@
+//! What the cost J of a problem is, in words and by its kind.
+
+use crate::constraints::RowGroup;
+use crate::functions::{Penalty, Quantity};
+use crate::objective::Weighting;
+use crate::problem::Problem;
+use serde::{Deserialize, Serialize};
+
+/// How the misfit in J is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CostKind {
+    /// `integral (y - y_obs)^2 dt` for every experiment: no record has a sigma.
+    Integral,
+    /// `sum ((y - y_obs)/sigma)^2` for every experiment: every record has a sigma.
+    ChiSquare,
+    /// Some records have a sigma and some have none.
+    Mixed,
+}
+
+impl CostKind {
+    /// The kind of a problem's misfit.
+    pub fn of(problem: &Problem) -> Self {
+        let readings = problem
+            .experiments
+            .iter()
+            .filter_map(|e| e.readings.as_ref());
+        let integral = |w: Weighting| matches!(w, Weighting::Integral { .. });
+        let kinds: Vec<bool> = readings.map(|r| integral(r.weighting())).collect();
+        match (kinds.contains(&true), kinds.contains(&false)) {
+            (true, true) => CostKind::Mixed,
+            (false, true) => CostKind::ChiSquare,
+            (_, false) => CostKind::Integral,
+        }
+    }
+
+    fn misfit(self) -> &'static str {
+        match self {
+            CostKind::Integral => {
+                "integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s)"
+            }
+            CostKind::ChiSquare => "sum over the readings of ((y - y_obs)/sigma)^2 (chi-square)",
+            CostKind::Mixed => {
+                "integral (y - y_obs)^2 dt over the records without sigma (trapezoid rule over the \
+                 readings, m^2 s) + sum of ((y - y_obs)/sigma)^2 over the readings with sigma \
+                 (chi-square)"
+            }
+        }
+    }
+}
+
+/// The whole of J with all its factors, as [`Problem::evaluate`] computes it: the misfit and every
+/// penalty that the problem has, with its weight.
+pub fn cost_definition(problem: &Problem) -> String {
+    let quantities: Vec<Quantity> = problem.functions.iter().map(|f| f.quantity).collect();
+    let misfit = CostKind::of(problem).misfit().to_string();
+    let smooth = (problem.penalties.iter()).map(|p| penalty(p, quantities[p.function].symbol()));
+    let jumps = problem.variations.iter().map(|variation| {
+        let symbol = quantities[variation.function].symbol();
+        format!("{:?} * total variation of {symbol}", variation.weight)
+    });
+    let terms: Vec<String> = std::iter::once(misfit)
+        .chain(smooth)
+        .chain(jumps)
+        .chain(problem.soft.iter().map(soft))
+        .collect();
+    format!("J = {}", terms.join(" + "))
+}
+
+fn penalty(penalty: &Penalty, symbol: &str) -> String {
+    let integrand = match penalty.order {
+        0 if penalty.target.iter().all(|t| *t == 0.0) => format!("{symbol}^2"),
+        0 => format!("({symbol} - reference)^2"),
+        1 => format!("(d{symbol}/dt)^2"),
+        q => format!("(d^{q}{symbol}/dt^{q})^2"),
+    };
+    format!("{:?} * integral {integrand} dt", penalty.weight)
+}
+
+fn soft(group: &RowGroup) -> String {
+    let weight = group.soft.unwrap_or(0.0);
+    let name = &group.name;
+    format!("{weight:?} * mean over its rows of (excess beyond `{name}`)^2")
+}

@@ -1,0 +1,266 @@
+//! What `result.json` says, held against the tables beside it.
+
+use crate::workbench::{Workbench, column};
+use serde_json::Value;
+
+/// A device with every kind of term in J, far enough from the truth that each costs something.
+const EVERYTHING: &str = "format: 1
+title: Every term
+experiments:
+  - data: readings.csv
+    initial: {displacement: 1.0, velocity: 0.5}
+grid: {nodes: 401, method: rk4}
+functions:
+  mass:
+    basis: polynomial
+    degree: 2
+    start: [1.0, 0.01, 0.001]
+    smooth: {order: 1, weight: 0.3}
+  damping:
+    basis: b-spline
+    knots: 5
+    start: 0.2
+    smooth: [{order: 0, weight: 0.02, reference: 0.05}, {order: 2, weight: 0.004}]
+  stiffness:
+    basis: piecewise-linear
+    knots: 6
+    start: 1.1
+    variation: {weight: 0.01}
+constraints:
+  - {function: stiffness, at: [0.0, 10.0], value: 1.2, soft: 0.5}
+fit: {stop: {iterations: 4}}
+";
+
+fn bench() -> Workbench {
+    let bench = Workbench::empty();
+    let device = "format: 1
+experiments:
+  - initial: {displacement: 1.0, velocity: 0.5}
+grid: {nodes: 401, method: rk4, duration: 10.0}
+functions:
+  mass: {fixed: 1.0}
+  damping: {fixed: 0.1}
+  stiffness: {fixed: 1.0}
+";
+    bench.write("device.yaml", device);
+    bench.run_to(0, &["simulate", "device.yaml", "--out", "readings.csv"]);
+    bench
+}
+
+fn fitted(bench: &Workbench, model: &str) -> Value {
+    bench.write("model.yaml", model);
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    serde_json::from_str(&bench.read("run/result.json")).expect("JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// Trapezoid rule.
+fn integral(values: &[f64], step: f64) -> f64 {
+    let pairs = values.windows(2).map(|w| 0.5 * (w[0] + w[1]));
+    pairs.sum::<f64>() * step
+}
+
+/// Central differences at the inner nodes.
+fn slopes(values: &[f64], step: f64) -> Vec<f64> {
+    let slope = |w: &[f64]| (w[2] - w[0]) / (2.0 * step);
+    values.windows(3).map(slope).collect()
+}
+
+fn squares(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|x| x * x).collect()
+}
+
+/// Every term of the sentence, computed from the tables alone, adds up to the cost.
+#[test]
+fn the_sentence_is_the_whole_cost() {
+    let bench = bench();
+    let result = fitted(&bench, EVERYTHING);
+    assert_eq!(result["model"]["cost_kind"], "integral");
+    assert_eq!(
+        result["model"]["cost_definition"],
+        "J = integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s) \
+         + 0.3 * integral (dm/dt)^2 dt \
+         + 0.02 * integral (c - reference)^2 dt \
+         + 0.004 * integral (d^2c/dt^2)^2 dt \
+         + 0.01 * total variation of k \
+         + 0.5 * mean over its rows of (excess beyond `stiffness(0) = 1.2`)^2 \
+         + 0.5 * mean over its rows of (excess beyond `stiffness(10) = 1.2`)^2"
+    );
+    let (motion, functions) = (
+        bench.read("run/trajectory.csv"),
+        bench.read("run/functions.csv"),
+    );
+    let step = 10.0 / 400.0;
+    let (found, observed) = (column(&motion, "y_m"), column(&motion, "observed_y_m"));
+    let residual: Vec<f64> = found.iter().zip(&observed).map(|(a, b)| a - b).collect();
+    let mass = column(&functions, "mass_kg");
+    let damping = column(&functions, "damping_N_s_per_m");
+    let stiffness = column(&functions, "stiffness_N_per_m");
+    let off: Vec<f64> = damping.iter().map(|c| c - 0.05).collect();
+    let bends = slopes(&slopes(&damping, step), step);
+    let ends = [stiffness[0], stiffness[400]].map(|k| (k - 1.2).powi(2));
+    let misfit = integral(&squares(&residual), step);
+    let terms = [
+        0.3 * integral(&squares(&slopes(&mass, step)), step),
+        0.02 * integral(&squares(&off), step),
+        0.004 * integral(&squares(&bends), step),
+        0.01 * stiffness
+            .windows(2)
+            .map(|w| (w[1] - w[0]).abs())
+            .sum::<f64>(),
+        0.5 * (ends[0] + ends[1]),
+    ];
+    assert!(terms.iter().all(|term| *term > 0.0), "{terms:?}");
+    let close = |found: f64, expected: f64, tolerance: f64| {
+        assert!(
+            (found / expected - 1.0).abs() < tolerance,
+            "{found} {expected}"
+        );
+    };
+    close(number(&result["cost"]["misfit"]), misfit, 1e-12);
+    // The differences leave out up to two cells of 400 at either end.
+    let regularisation = number(&result["cost"]["regularisation"]);
+    close(regularisation, terms.iter().sum(), 0.02);
+    close(
+        number(&result["cost"]["final"]),
+        misfit + regularisation,
+        1e-12,
+    );
+}
+
+/// The factors of the powers of t make the function in the table.
+#[test]
+fn polynomials_are_given_in_powers_of_t() {
+    let bench = bench();
+    let result = fitted(&bench, EVERYTHING);
+    let powers: Vec<f64> = (result["functions"]["mass"]["powers"].as_array())
+        .expect("a list")
+        .iter()
+        .map(number)
+        .collect();
+    assert_eq!(powers.len(), 3);
+    let functions = bench.read("run/functions.csv");
+    let times = column(&functions, "t_s");
+    for (t, mass) in times.iter().zip(column(&functions, "mass_kg")) {
+        let value = powers[0] + powers[1] * t + powers[2] * t * t;
+        // Rounding of three terms of the function's own size.
+        assert!((value / mass - 1.0).abs() < 1e-14, "{t}: {value} {mass}");
+    }
+    for other in ["damping", "stiffness"] {
+        assert!(
+            result["functions"][other].get("powers").is_none(),
+            "{other}"
+        );
+    }
+}
+
+#[test]
+fn the_kind_of_the_cost_follows_the_sigmas() {
+    let bench = bench();
+    let with = "    sigma: {displacement: 0.1}\n    initial";
+    let all = EVERYTHING.replace("    initial", with);
+    assert_eq!(fitted(&bench, &all)["model"]["cost_kind"], "chi-square");
+    let second = "  - {data: readings.csv, initial: {displacement: 1.0, velocity: 0.5}}\ngrid";
+    let some = all.replace("grid", second);
+    let result = fitted(&bench, &some);
+    assert_eq!(result["model"]["cost_kind"], "mixed");
+    let sentence = result["model"]["cost_definition"].as_str().expect("text");
+    assert!(sentence.contains("records without sigma") && sentence.contains("chi-square"));
+}
+
+/// What a soft constraint costs is in J, and that it is broken is said, in the result and in words.
+#[test]
+fn soft_constraints_that_are_broken_are_said_to_be() {
+    let bench = bench();
+    let result = fitted(&bench, EVERYTHING);
+    let slack = result["constraints"]["slack"].as_array().expect("a list");
+    let stiffness = column(&bench.read("run/functions.csv"), "stiffness_N_per_m");
+    let ends = [
+        ("stiffness(0) = 1.2", stiffness[0]),
+        ("stiffness(10) = 1.2", stiffness[400]),
+    ];
+    assert_eq!(slack.len(), 2);
+    for (entry, (name, value)) in slack.iter().zip(ends) {
+        assert_eq!(entry["name"], name);
+        assert_eq!(entry["rows"], 1);
+        // Each row is computed from the knots, the column from the table: rounding apart.
+        assert!((number(&entry["largest"]) - (value - 1.2).abs()).abs() < 1e-12);
+        assert!((number(&entry["price"]) - 0.5 * (value - 1.2).powi(2)).abs() < 1e-12);
+    }
+    // None is a hard one.
+    assert_eq!(result["constraints"]["max_violation"], 0.0);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    assert!(
+        summary.contains("soft `stiffness(0) = 1.2` is broken by up to "),
+        "{summary}"
+    );
+    assert!(summary.contains(" on 1 row\n"), "{summary}");
+    // Where the data agree with it, nothing is said.
+    let agreed = EVERYTHING
+        .replace("value: 1.2", "value: 1.0")
+        .replace("at: [0.0, 10.0]", "at: 0.0")
+        .replace(
+            "  - {function",
+            "  - {function: mass, min: 0.1, soft: 1}\n  - {function",
+        );
+    let result = fitted(&bench, &agreed);
+    let broken = result["constraints"]["slack"].as_array().expect("a list");
+    assert!(
+        broken.iter().all(|entry| entry["name"] != "mass >= 0.1"),
+        "{broken:?}"
+    );
+}
+
+/// A coarse fit starts a finer one whose knots contain its own: the finer one begins at the coarse
+/// cost and does not end above it.
+#[test]
+fn a_coarse_fit_starts_a_finer_one() {
+    let bench = bench();
+    let noise = ["--noise", "0.02", "--seed", "3", "--out", "readings.csv"];
+    bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
+    let model = |knots: usize, start: [&str; 3]| {
+        let [mass, damping, stiffness] = start;
+        format!(
+            "format: 1
+experiments:
+  - data: readings.csv
+    initial: {{displacement: 1.0, velocity: 0.5}}
+grid: {{method: rk4}}
+functions:
+  mass: {{basis: piecewise-linear, knots: {knots}, start: {mass}, smooth: {{order: 1, weight: 0.001}}}}
+  damping: {{basis: b-spline, knots: {knots}, start: {damping}}}
+  stiffness: {{basis: piecewise-constant, knots: {knots}, start: {stiffness}}}
+constraints:
+  - {{function: stiffness, at: 0.0, value: 1.0}}
+fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
+"
+        )
+    };
+    bench.write("coarse.yaml", &model(6, ["1.3", "0.3", "1.0"]));
+    bench.run_to(0, &["fit", "coarse.yaml"]);
+    let columns = ["mass_kg", "damping_N_s_per_m", "stiffness_N_per_m"]
+        .map(|name| format!("{{data: runs/coarse/functions.csv, column: {name}}}"));
+    bench.write(
+        "fine.yaml",
+        &model(11, columns.each_ref().map(String::as_str)),
+    );
+    bench.run_to(0, &["fit", "fine.yaml"]);
+    let cost = |run: &str, key: &str| {
+        let result: Value = serde_json::from_str(&bench.read(run)).expect("JSON");
+        number(&result["cost"][key])
+    };
+    let reached = cost("runs/coarse/result.json", "final");
+    let begun = cost("runs/fine/result.json", "initial");
+    let found = cost("runs/fine/result.json", "final");
+    // The table has all digits, and every coarse function is a fine one: what is left is the rounding
+    // of a projection, a few hundred additions.
+    assert!((begun / reached - 1.0).abs() < 1e-9, "{begun} {reached}");
+    assert!(found <= begun, "{found} {begun}");
+    assert!(
+        found < 0.999 * reached,
+        "twice the knots explain more noise: {found} {reached}"
+    );
+}

@@ -1,0 +1,97 @@
+//! The story of the README in one command: what the paper's fit does not find, what positivity alone
+//! does not find either, and what is known that brings the true device back.
+
+use crate::workbench::Workbench;
+use serde_json::Value;
+
+const MODELS: [&str; 7] = [
+    "paper",
+    "paper-positive",
+    "paper-smooth",
+    "linear-mass",
+    "knots",
+    "spline",
+    "noisy",
+];
+
+/// The shipped models on 401 nodes, with readings made on as many, and a fifth of the paper's
+/// iterations.
+fn bench() -> Workbench {
+    let bench = Workbench::with_shipped_models();
+    let simulate = ["simulate", "models/paper-device.yaml", "--nodes", "401"];
+    let noise = ["--noise", "0.1", "--seed", "1", "--out", "data/noisy.csv"];
+    bench.run_to(0, &[&simulate[..], &["--out", "data/paper.csv"]].concat());
+    bench.run_to(0, &[&simulate[..], &noise].concat());
+    for name in MODELS {
+        let file = format!("models/{name}.yaml");
+        let model = bench.read(&file);
+        assert!(model.contains("nodes: 2000"), "{name}");
+        let model = model
+            .replace("nodes: 2000", "nodes: 401")
+            .replace("iterations: 1000", "iterations: 200");
+        bench.write(&file, &model);
+    }
+    bench
+}
+
+#[test]
+fn one_command_tells_what_finds_the_device() {
+    let bench = bench();
+    let files = MODELS.map(|name| format!("models/{name}.yaml"));
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let stdout = bench.run_to(0, &[&["compare"], &files[..], &["--json"]].concat());
+    let document: Value = serde_json::from_str(&stdout).expect("JSON");
+    let runs = document["runs"].as_array().expect("runs");
+    let names: Vec<&str> = runs.iter().filter_map(|run| run["name"].as_str()).collect();
+    assert_eq!(names, MODELS);
+    let number = |run: &Value, pointer: &str| -> f64 {
+        let value = run.pointer(pointer).and_then(Value::as_f64);
+        value.unwrap_or_else(|| panic!("{pointer} of {run}"))
+    };
+    let verdict = |run: &Value| run["verdict"].as_str().expect("text").to_owned();
+    let [paper, positive, known @ .., noisy] = runs.as_slice() else {
+        panic!("{names:?}");
+    };
+
+    // The paper's fit has mass and damping of the wrong sign or size; positivity alone has not, fits
+    // better, and is as wrong.
+    assert_eq!(paper["true_device"], false);
+    assert_eq!(positive["true_device"], false);
+    assert!(verdict(positive).starts_with("matches the motion (J/J0 "));
+    for run in [paper, positive] {
+        assert!(
+            verdict(run).contains("another device: k/m off by "),
+            "{run}"
+        );
+        assert!(number(run, "/errors/k_over_m_relative") > 0.1, "{run}");
+    }
+    assert!(number(positive, "/misfit") < 0.1 * number(paper, "/misfit"));
+    assert!(number(positive, "/smallest_mass") >= 0.05);
+    assert!(number(positive, "/smallest_damping") >= 0.0);
+
+    // Smooth and normalised, few parameters, knots, splines: the device, and what it does elsewhere.
+    // The readings are those of the stepper and the truth costs no roughness: rounding is left.
+    for run in known {
+        assert_eq!(run["true_device"], true, "{run}");
+        assert_eq!(run["status"], "converged", "{run}");
+        assert!(verdict(run).starts_with("the true device: k/m and c/m to "));
+        assert!(number(run, "/errors/mass") < 1e-6, "{run}");
+        assert!(number(run, "/roughness/mass") < 1e-6 * number(positive, "/roughness/mass"));
+        assert!(number(run, "/max_violation") <= 1e-9);
+    }
+
+    // Noise costs digits, not the device: 401 readings of 0.1 m in 3 m.
+    assert!(number(noisy, "/errors/k_over_m_relative") < 0.05, "{noisy}");
+    assert!(number(noisy, "/errors/mass") < 0.05, "{noisy}");
+    assert_eq!(noisy["misfit_unit"], "1");
+    assert!(verdict(noisy).contains("to the true device") || noisy["true_device"] == true);
+    // The iterations on the way to the weight are counted.
+    assert!(number(noisy, "/iterations") >= 9.0, "{noisy}");
+
+    // From other initial states: the matched record predicts nothing, the device everything.
+    let elsewhere = |run: &Value| number(run, "/predictions/4/cost");
+    assert!(elsewhere(paper) > 1.0 && elsewhere(positive) > 1.0);
+    assert!(known.iter().all(|run| elsewhere(run) < 1e-9));
+    assert!(elsewhere(noisy) < 1.0, "{}", elsewhere(noisy));
+    assert_eq!(document["left_out"], Value::Array(Vec::new()));
+}

@@ -1,0 +1,97 @@
+//! The start from the equation of motion: what fixes the common scale of m, c and k, and what only
+//! looks as if it did.
+
+mod common;
+
+use kmcfit::constraints::RowGroup;
+use kmcfit::dynamics::{Device, Method};
+use kmcfit::functions::{CoefficientFunction, Quantity};
+use kmcfit::problem::Problem;
+use kmcfit::solvers::equation_error;
+
+const NODES: usize = 401;
+const START: f64 = 2.0;
+
+/// Free motion of m = 1, c = 0, k = 1.5, a force of zero if asked for; m and k are constants to be
+/// found from a mass of 2, c is fixed at `damping`, or sought if that is `None`.
+fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
+    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let damping = match damping {
+        Some(value) => CoefficientFunction::fixed(Quantity::Damping, vec![value; NODES]),
+        None => CoefficientFunction::constant(Quantity::Damping, 0.5, NODES),
+    };
+    let list = vec![
+        CoefficientFunction::constant(Quantity::Mass, START, NODES),
+        damping,
+        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+    ];
+    let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
+    if silent_force {
+        problem.experiments[0].force = Some(vec![0.0; NODES]);
+    }
+    problem
+}
+
+/// `value` as the only value of parameter `j`.
+fn fixed(j: usize, value: f64) -> RowGroup {
+    let mut group = RowGroup::new("fixed");
+    group.push([(j, 1.0)], [value, value], [0.0, 0.0]);
+    group
+}
+
+/// The differences are of order 4 and the smoothing is as rough as the noise that it estimates: the
+/// ratio of k to m is found to per mille.
+fn close(found: f64, expected: f64) {
+    assert!(
+        (found - expected).abs() < 5e-3 * expected.abs().max(1.0),
+        "{found} {expected}"
+    );
+}
+
+/// What says nothing about the scale leaves the mass at its start: without that the equation is
+/// solved best by a device of nothing.
+#[test]
+fn the_mass_keeps_its_mean_where_nothing_fixes_the_scale() {
+    let mut with_zero = problem(None, false);
+    with_zero.constraints.groups.push(fixed(1, 0.0));
+    let mut bounded = problem(None, false);
+    let mut group = RowGroup::new("mass > 0");
+    group.push([(0, 1.0)], [0.05, f64::INFINITY], [0.0, 0.0]);
+    bounded.constraints.groups.push(group);
+    let cases = [
+        ("nothing", problem(None, false)),
+        ("a function fixed at zero", problem(Some(0.0), false)),
+        ("a force that is zero", problem(None, true)),
+        ("an equality with zero", with_zero),
+        ("an inequality", bounded),
+    ];
+    for (name, problem) in cases {
+        let found = equation_error(&problem, &problem.functions.start()).unwrap();
+        println!("{name}: {found:?}");
+        close(found[0], START);
+        close(*found.last().unwrap(), 1.5 * START);
+    }
+}
+
+#[test]
+fn a_fixed_function_or_value_sets_the_scale() {
+    // c = 0.1 is known, so m is 1, not 2.
+    let known = problem(Some(0.1), false);
+    let found = equation_error(&known, &known.functions.start()).unwrap();
+    assert!((found[0] - 1.0).abs() < 0.1, "{found:?}");
+    // k = 3 is demanded, so m is 2 k/m apart from it; an equality far smaller than the start as well.
+    for value in [3.0, 3e-7] {
+        let mut demanded = problem(None, false);
+        demanded.constraints.groups.push(fixed(2, value));
+        let found = equation_error(&demanded, &demanded.functions.start()).unwrap();
+        assert!(
+            (found[0] / (value / 1.5) - 1.0).abs() < 5e-3,
+            "{value}: {found:?}"
+        );
+    }
+}
