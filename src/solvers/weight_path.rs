@@ -1,7 +1,8 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
+use super::executor::search;
 use super::gauss_newton::linearise_at;
-use super::{Counts, Fit, FitSettings, Initial, Row, Status, fit};
+use super::{Counts, Fit, FitSettings, Row, Rung, Status, fit};
 use crate::dynamics::Breakdown;
 use crate::objective::Weighting;
 use crate::problem::Problem;
@@ -80,8 +81,6 @@ const LARGEST: f64 = 1e4;
 /// Decades that the path spans, and points per decade.
 const DECADES: f64 = 8.0;
 const PER_DECADE: f64 = 1.0;
-/// Halvings of the interval in which the discrepancy rule's weight lies.
-const REFINEMENTS: u32 = 4;
 /// Random vectors of the trace estimate (Hutchinson); its error is about sqrt(2 dof / 16).
 const PROBES: usize = 16;
 /// Seed of those vectors.
@@ -134,17 +133,12 @@ pub fn choose_weight(
         observe,
         from: start.to_vec(),
         last: None,
+        rungs: Vec::new(),
         counts: Counts::default(),
         elapsed: Duration::ZERO,
     };
-    let mut points = Vec::new();
-    for weight in weights(problem) {
-        points.push(walk.visit(weight)?);
-        if walk.ended() {
-            break;
-        }
-    }
-    refine_discrepancy(problem, &mut walk, &mut points)?;
+    let weights = weights(problem);
+    let points = walk.both_ways(&weights)?;
     let picks = [
         discrepancy(problem, &points),
         l_curve(&points),
@@ -158,12 +152,7 @@ pub fn choose_weight(
     // Without a pick the weakest smoothing comes nearest to what the rule asks for.
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(which, points[chosen].weight);
-    let mut found = fit(
-        &weighted,
-        &points[chosen].parameters,
-        &walk.settings,
-        walk.observe,
-    )?;
+    let mut found = walk.again(&weighted, &points[chosen].parameters)?;
     found.counts = walk.counts + found.counts;
     found.elapsed += walk.elapsed;
     if let Ok(evaluation) = weighted.evaluate(start) {
@@ -179,7 +168,9 @@ pub fn choose_weight(
     Ok((path, weighted, found))
 }
 
-/// A walk along the path: every fit starts where the last one ended.
+/// A walk along the path. The first fit climbs the ladder of [`fit`]; every other starts where its
+/// neighbour ended, and needs none: a fit that explains the record is followed while its weight
+/// changes, also to weights so large that it explains the record no longer.
 struct Walk<'a> {
     problem: &'a Problem,
     settings: FitSettings,
@@ -187,16 +178,44 @@ struct Walk<'a> {
     observe: &'a mut dyn FnMut(&Row),
     from: Vec<f64>,
     last: Option<Status>,
+    rungs: Vec<Rung>,
     counts: Counts,
     elapsed: Duration,
 }
 
 impl Walk<'_> {
+    /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
+    /// at the middle a fit explains the record, which it need not at the largest weight, and
+    /// converges fast, which it need not at the smallest.
+    fn both_ways(&mut self, weights: &[f64]) -> Result<Vec<PathPoint>, Breakdown> {
+        let middle = weights.len() / 2;
+        let mut points = vec![self.visit(weights[middle])?];
+        for &weight in weights[..middle].iter().rev() {
+            if self.ended() {
+                return Ok(points);
+            }
+            points.insert(0, self.visit(weight)?);
+        }
+        self.from.clone_from(&points[middle].parameters);
+        for &weight in &weights[middle + 1..] {
+            if self.ended() {
+                return Ok(points);
+            }
+            points.push(self.visit(weight)?);
+        }
+        Ok(points)
+    }
+
     fn visit(&mut self, weight: f64) -> Result<PathPoint, Breakdown> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
-        let found = fit(&problem, &self.from, &self.settings, self.observe)?;
-        // From here on every fit starts where its neighbour ended.
-        self.settings.initial = Initial::Functions;
+        let from = std::mem::take(&mut self.from);
+        let found = match self.last {
+            None => fit(&problem, &from, &self.settings, self.observe)?,
+            Some(_) => search(&problem, &from, &self.settings, None, self.observe)?,
+        };
+        if self.last.is_none() {
+            self.rungs.clone_from(&found.rungs);
+        }
         self.last = Some(found.outcome.status);
         self.counts = self.counts + found.counts;
         self.elapsed += found.elapsed;
@@ -212,6 +231,15 @@ impl Walk<'_> {
             degrees_of_freedom,
             gcv: n * misfit / (n - degrees_of_freedom).powi(2),
             parameters: self.from.clone(),
+        })
+    }
+
+    /// The fit at a point of the path once more, with the rungs that led onto the path.
+    fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, Breakdown> {
+        let found = search(problem, from, &self.settings, None, self.observe)?;
+        Ok(Fit {
+            rungs: self.rungs.clone(),
+            ..found
         })
     }
 
@@ -271,28 +299,6 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
 fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usize> {
     let limit = problem.largest_chi_square()?;
     points.iter().position(|p| p.misfit <= limit)
-}
-
-/// Halves, on the log scale, the interval between the first weight that satisfies the rule and the
-/// last that does not.
-fn refine_discrepancy(
-    problem: &Problem,
-    walk: &mut Walk,
-    points: &mut Vec<PathPoint>,
-) -> Result<(), Breakdown> {
-    for _ in 0..REFINEMENTS {
-        let Some(first) = discrepancy(problem, points).filter(|i| *i > 0) else {
-            return Ok(());
-        };
-        if walk.ended() {
-            return Ok(());
-        }
-        let weight = (points[first].weight * points[first - 1].weight).sqrt();
-        walk.from.clone_from(&points[first].parameters);
-        let point = walk.visit(weight)?;
-        points.insert(first, point);
-    }
-    Ok(())
 }
 
 /// The point of largest curvature of (log misfit, log roughness) along the path.
