@@ -225,7 +225,7 @@ impl Walk<'_> {
         let degrees_of_freedom = degrees_of_freedom(&problem, &found);
         Ok(PathPoint {
             weight,
-            iterations: found.rungs.iter().map(|rung| rung.iterations).sum(),
+            iterations: iterations(&found),
             misfit,
             roughness: roughness(&problem, self.which, &self.from),
             degrees_of_freedom,
@@ -246,6 +246,12 @@ impl Walk<'_> {
     fn ended(&self) -> bool {
         matches!(self.last, Some(Status::Interrupted | Status::TimeLimit))
     }
+}
+
+/// The iterations of a fit: those of every rung where it climbed the ladder.
+fn iterations(found: &Fit) -> u64 {
+    let rungs: u64 = found.rungs.iter().map(|rung| rung.iterations).sum();
+    rungs.max(found.history.len() as u64)
 }
 
 fn weights(problem: &Problem) -> Vec<f64> {
