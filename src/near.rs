@@ -6,6 +6,14 @@ const LONGEST_WORD: usize = 64;
 /// Shortest word that is taken for the beginning of a longer one.
 const SHORTEST_STEM: usize = 3;
 
+/// Words that are near the opposite of what they mean, and what they mean.
+const MEANT: [(&str, &str); 4] = [
+    ("decreasing", "nonincreasing"),
+    ("falling", "nonincreasing"),
+    ("increasing", "nondecreasing"),
+    ("rising", "nondecreasing"),
+];
+
 /// The candidate that `word` is probably a misspelling of.
 ///
 /// Capitals, `-`, `_` and spaces do not count. A candidate is near when at most one letter in
@@ -19,7 +27,11 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     candidates
         .into_iter()
         .filter_map(|candidate| {
-            let near = distance(&word, &plain(candidate));
+            let other = plain(candidate);
+            if let Some((_, meant)) = MEANT.iter().find(|(other, _)| *other == word) {
+                return (other == *meant).then_some((0, candidate));
+            }
+            let near = distance(&word, &other);
             // `y` for `y_m`: a name without its unit.
             let bare = candidate
                 .split_once('_')
@@ -83,6 +95,10 @@ mod tests {
         ] {
             assert_eq!(nearest(word, keys), near, "{word}");
         }
+        let shapes = ["non-increasing", "non-decreasing", "convex", "concave"];
+        assert_eq!(nearest("decreasing", shapes), Some("non-increasing"));
+        assert_eq!(nearest("increasing", shapes), Some("non-decreasing"));
+        assert_eq!(nearest("non-decreasin", shapes), Some("non-decreasing"));
         assert_eq!(nearest(&"m".repeat(10_000), keys), None);
     }
 }

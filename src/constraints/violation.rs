@@ -32,6 +32,9 @@ impl RowGroup {
     pub fn relative_violation(&self, i: usize, theta: &[f64]) -> f64 {
         let value: f64 = self.rows.row(i).map(|(j, a)| a * theta[j]).sum();
         let [lower, upper] = self.bounds(i);
+        if value.is_nan() {
+            return f64::INFINITY;
+        }
         (lower - value).max(value - upper) / self.scale(i, theta).max(f64::MIN_POSITIVE)
     }
 }
@@ -49,6 +52,9 @@ impl Cone {
             return 0.0;
         };
         let norm = parts.iter().map(|p| p * p).sum::<f64>().sqrt();
+        if (norm - bound).is_nan() {
+            return f64::INFINITY;
+        }
         (norm - bound) / norm.max(bound.abs()).max(f64::MIN_POSITIVE)
     }
 }

@@ -69,17 +69,22 @@ pub struct Solution {
     pub multipliers: Vec<f64>,
     /// Multipliers of the equality rows, same convention.
     pub equality_multipliers: Vec<f64>,
+    /// For each cone the multiplier of its bound, the first part: not negative, and what half the
+    /// cost would lose per unit by which the bound gave way.
+    pub cone_multipliers: Vec<f64>,
 }
 
 /// One row of Clarabel's `A x + s = b`, and where its multiplier goes.
 #[derive(Clone, Copy)]
 enum Origin {
-    /// A definition of an auxiliary variable, whose multiplier nobody asks for.
+    /// A definition of an auxiliary variable or a later row of a cone, whose multiplier nobody asks
+    /// for.
     Auxiliary,
     Equality(usize),
     Upper(usize),
     Lower(usize),
-    Cone,
+    /// The first row of a cone.
+    Cone(usize),
 }
 
 /// Rows, cones and multiplier targets in Clarabel's form; every linear row scaled to size 1.
@@ -156,7 +161,8 @@ impl Subproblem {
         let duals = solution
             .multipliers
             .iter_mut()
-            .chain(&mut solution.equality_multipliers);
+            .chain(&mut solution.equality_multipliers)
+            .chain(&mut solution.cone_multipliers);
         duals.for_each(|m| *m /= scale);
         solution
     }
@@ -167,6 +173,7 @@ impl Subproblem {
             z: vec![0.0; self.variables],
             multipliers: vec![0.0; self.inequalities.len()],
             equality_multipliers: vec![0.0; self.equalities.len()],
+            cone_multipliers: vec![0.0; self.cones.len()],
         }
     }
 
@@ -243,12 +250,16 @@ impl Subproblem {
             .filter(|(n, _)| *n > 0)
             .map(|(_, c)| c)
             .collect();
-        for cone in &self.cones {
+        for (k, cone) in self.cones.iter().enumerate() {
             for i in 0..cone.rows.len() {
                 // s = A z - right must lie in the cone: rows enter with a minus sign, unscaled.
                 let row = cone.rows.row(i).map(|(j, a)| (j, -a));
                 conic.rows.push(row, -cone.rows.right()[i]);
-                conic.origins.push((Origin::Cone, 1.0));
+                let origin = match i {
+                    0 => Origin::Cone(k),
+                    _ => Origin::Auxiliary,
+                };
+                conic.origins.push((origin, 1.0));
             }
             conic.cones.push(SecondOrderConeT(cone.rows.len()));
         }
@@ -268,7 +279,8 @@ impl Subproblem {
             match *origin {
                 Origin::Equality(i) => solution.equality_multipliers[i] = multiplier,
                 Origin::Upper(i) | Origin::Lower(i) => solution.multipliers[i] += multiplier,
-                Origin::Auxiliary | Origin::Cone => {}
+                Origin::Cone(k) => solution.cone_multipliers[k] = multiplier,
+                Origin::Auxiliary => {}
             }
         }
         solution

@@ -1,6 +1,6 @@
 //! Which constraints are active at a point, and how hard the data push against them.
 
-use crate::constraints::RowGroup;
+use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::Point;
@@ -9,10 +9,11 @@ use crate::solvers::Point;
 /// program brings a row that it does not mean to touch.
 const NEAR: f64 = 1e-6;
 /// A push counts if giving way by one per cent of the row's scale would lower J by more than this
-/// share of it, or of [`NOTHING`] of what there is to explain, where J is less.
+/// share of it, and by more than [`ROUNDING`] of what there is to explain.
 const PUSH: f64 = 1e-6;
-/// A cost below this share of the misfit of no motion is rounding.
-const NOTHING: f64 = 1e-12;
+/// Rounding of a change of J, as a share of the misfit of no motion: residuals are rounded in the
+/// last digits of the motion, and a change of the motion in the thousands of steps that make it.
+const ROUNDING: f64 = 1e-12;
 
 /// A group of constraints with active rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,38 +70,60 @@ fn span(&[from, to]: &[f64; 2]) -> String {
 /// of a projection: they are those of the step of steepest descent that the constraints stop.
 pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> {
     let constraints = &problem.constraints;
-    let near: Vec<Vec<usize>> = constraints
-        .groups
-        .iter()
-        .map(|g| near_rows(g, point))
+    let near: Vec<Vec<usize>> = (constraints.groups.iter())
+        .map(|group| near_rows(group, point))
         .collect();
-    if near.iter().all(Vec::is_empty) {
+    let near_cones: Vec<Vec<usize>> = (constraints.cones.iter())
+        .map(|group| near_cones(group, point))
+        .collect();
+    if near.iter().chain(&near_cones).all(Vec::is_empty) {
         return Vec::new();
     }
     let multipliers = multipliers(problem, point);
-    let worth = point
-        .evaluation
-        .cost
-        .max(NOTHING * problem.misfit_of_silence());
+    let gain_that_counts =
+        (PUSH * point.evaluation.cost).max(ROUNDING * problem.misfit_of_silence());
+    let counts = |scale: f64, multiplier: f64| 0.01 * scale * multiplier > gain_that_counts;
     let groups = constraints.groups.iter().zip(near).enumerate();
-    groups
-        .filter(|(_, (_, rows))| !rows.is_empty())
-        .map(|(g, (group, rows))| {
-            let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m[g][i].abs());
-            let counts = |&i: &usize| {
-                let gain = 0.01 * group.scale(i, &point.parameters) * multiplier(i);
-                gain > PUSH * worth
-            };
-            let pushed: Vec<usize> = rows.iter().copied().filter(counts).collect();
-            ActiveGroup {
-                name: group.name.clone(),
-                rows: rows.len(),
-                spans: spans(group, &rows),
-                pushed: spans(group, &pushed),
-                multiplier: rows.iter().map(|&i| multiplier(i)).sum(),
-            }
-        })
-        .collect()
+    let rows = groups.map(|(g, (group, rows))| {
+        let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.rows[g][i].abs());
+        let pushed = |&i: &usize| counts(group.scale(i, &point.parameters), multiplier(i));
+        let pushed: Vec<usize> = rows.iter().copied().filter(pushed).collect();
+        ActiveGroup {
+            name: group.name.clone(),
+            rows: rows.len(),
+            spans: spans(&group.times, &rows),
+            pushed: spans(&group.times, &pushed),
+            multiplier: rows.iter().map(|&i| multiplier(i)).sum(),
+        }
+    });
+    let groups = constraints.cones.iter().zip(near_cones).enumerate();
+    let cones = groups.map(|(g, (group, cones))| {
+        let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.cones[g][i].abs());
+        let pushed = |&i: &usize| counts(bound(&group.cones[i], point), multiplier(i));
+        let pushed: Vec<usize> = cones.iter().copied().filter(pushed).collect();
+        let times: Vec<[f64; 2]> = group.times.iter().map(|t| [*t, *t]).collect();
+        ActiveGroup {
+            name: group.name.clone(),
+            rows: cones.len(),
+            spans: spans(&times, &cones),
+            pushed: spans(&times, &pushed),
+            multiplier: cones.iter().map(|&i| multiplier(i)).sum(),
+        }
+    });
+    rows.chain(cones).filter(|active| active.rows > 0).collect()
+}
+
+/// The size of a cone's bound at the point.
+fn bound(cone: &Cone, point: &Point) -> f64 {
+    let values = cone.rows.multiply(&point.parameters);
+    values
+        .first()
+        .map_or(0.0, |v| (v - cone.rows.right()[0]).abs())
+}
+
+fn near_cones(group: &ConeGroup, point: &Point) -> Vec<usize> {
+    let is_near = |i: &usize| group.cones[*i].violation(&point.parameters) >= -NEAR;
+    (0..group.cones.len()).filter(is_near).collect()
 }
 
 fn near_rows(group: &RowGroup, point: &Point) -> Vec<usize> {
@@ -109,11 +132,11 @@ fn near_rows(group: &RowGroup, point: &Point) -> Vec<usize> {
 }
 
 /// Joins the time spans of rows that follow each other.
-fn spans(group: &RowGroup, rows: &[usize]) -> Vec<[f64; 2]> {
+fn spans(times: &[[f64; 2]], rows: &[usize]) -> Vec<[f64; 2]> {
     let mut joined: Vec<[f64; 2]> = Vec::new();
     let mut last = None;
     for &i in rows {
-        let [from, to] = group.times[i];
+        let [from, to] = times[i];
         match joined.last_mut() {
             Some(span) if last.is_some_and(|last| last + 1 == i) && from >= span[0] => {
                 span[1] = span[1].max(to);
@@ -125,8 +148,14 @@ fn spans(group: &RowGroup, rows: &[usize]) -> Vec<[f64; 2]> {
     joined
 }
 
-/// Multipliers of J by group and row; `None` if the quadratic program fails.
-fn multipliers(problem: &Problem, point: &Point) -> Option<Vec<Vec<f64>>> {
+/// Multipliers of J by group and row, and by group and cone.
+struct Multipliers {
+    rows: Vec<Vec<f64>>,
+    cones: Vec<Vec<f64>>,
+}
+
+/// The multipliers at `point`; `None` if the quadratic program fails.
+fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
     let sizes = problem.natural_sizes(&point.evaluation);
     let duration = problem.oscillator.grid.duration();
     let metric = problem.functions.relative_metric(&sizes, duration);
@@ -146,8 +175,14 @@ fn multipliers(problem: &Problem, point: &Point) -> Option<Vec<Vec<f64>>> {
     let solution = sub.solve();
     let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
     solved.then(|| {
-        let mut multipliers = solution.by_group(&places);
-        multipliers.iter_mut().flatten().for_each(|m| *m *= scale);
-        multipliers
+        let mut rows = solution.by_group(&places);
+        rows.iter_mut().flatten().for_each(|m| *m *= scale);
+        let mut each = solution.cone_multipliers.iter().map(|m| m * scale);
+        let groups = problem.constraints.cones.iter();
+        let cones = groups.map(|g| each.by_ref().take(g.cones.len()).collect());
+        Multipliers {
+            rows,
+            cones: cones.collect(),
+        }
     })
 }

@@ -45,10 +45,9 @@ impl Problem {
         let mut moved = start.to_vec();
         self.constraints.clip(&mut moved);
         if !self.constraints.hold(&moved, 0.0) {
-            let projection = project(&self.constraints, start, &metric);
-            match projection.status {
-                ConicStatus::Solved | ConicStatus::Almost => moved = projection.theta,
-                status => return self.contradiction(start, &metric, status),
+            match self.inside(start, &metric) {
+                Ok(theta) => moved = theta,
+                Err(status) => return self.contradiction(start, &metric, status),
             }
         }
         match self.constraints.hold(&moved, TOLERANCE) {
@@ -59,6 +58,27 @@ impl Problem {
             // Clipping to contradictory bounds leaves a violation that no projection removes.
             false => self.contradiction(start, &metric, ConicStatus::Stalled),
         }
+    }
+
+    /// The projection of `start`. Where its program stalls, any point that it reached inside the set,
+    /// or the nearest one in another metric, is as good to start from.
+    fn inside(&self, start: &[f64], metric: &[f64]) -> Result<Vec<f64>, ConicStatus> {
+        let mut first = None;
+        for metric in [
+            metric,
+            &self.functions.gram_diagonal(),
+            &vec![1.0; start.len()],
+        ] {
+            let projection = project(&self.constraints, start, metric);
+            if self.constraints.hold(&projection.theta, TOLERANCE) {
+                return Ok(projection.theta);
+            }
+            let status = *first.get_or_insert(projection.status);
+            if status == ConicStatus::Infeasible {
+                break;
+            }
+        }
+        Err(first.unwrap_or(ConicStatus::Stalled))
     }
 
     /// `moved`, or where that has no positive mass the nearest point to `start` that has one, if there
