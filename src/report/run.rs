@@ -16,7 +16,7 @@ use crate::dynamics::Device;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, Quantity, Ratios};
 use crate::solvers::{
-    ActiveGroup, Fit, PathPoint, Row, Rung, WeightPath, WeightRule, active_constraints,
+    ActiveGroup, Fit, PathPoint, Row, Rung, Status, WeightPath, WeightRule, active_constraints,
 };
 use std::collections::BTreeMap;
 use std::io;
@@ -123,7 +123,11 @@ impl Run<'_> {
         let worst = problem
             .constraints
             .largest_violation(&self.fit.best.parameters);
-        let active = active_constraints(problem, &self.fit.best);
+        // What pushes where is a matter of points that satisfy the constraints.
+        let active = match self.fit.outcome.status {
+            Status::Infeasible => Vec::new(),
+            _ => active_constraints(problem, &self.fit.best),
+        };
         ConstraintSummary {
             max_violation: worst.map_or(0.0, |v| v.relative),
             active: active.into_iter().map(active_summary).collect(),

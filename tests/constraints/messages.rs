@@ -360,7 +360,7 @@ fn shapes_and_ranges() {
     m.yaml:11:39: constraints[0].shape: unknown choice
       found: `decreasing`
       expected: one of: non-increasing, non-decreasing, convex, concave, or a list of such
-      hint: did you mean `non-decreasing`?
+      hint: did you mean `non-increasing`?
     ");
     assert_snapshot!(message("[{function: mass, shape: []}]"), @"
     m.yaml:11:39: constraints[0].shape: the list is empty
@@ -537,4 +537,24 @@ fn what_always_holds() {
     let constant =
         text("[{function: damping, shape: convex}]").replace("basis: nodal", "basis: constant");
     assert_snapshot!(said(&constant), @r#"no error ["constraints[0].shape says nothing: it holds for all functions"]"#);
+}
+
+#[test]
+fn a_mass_must_be_left() {
+    for held in [
+        "max: 0.0",
+        "at: 1.0, value: 0.0",
+        "mean: -1.0",
+        "integral: -2.0",
+    ] {
+        let said = message(&format!("[{{function: mass, {held}}}]"));
+        assert!(said.contains("this leaves no mass"), "{held}: {said}");
+    }
+    assert!(message("[{function: damping, max: -1.0}]").starts_with("no error"));
+}
+
+#[test]
+fn a_shape_by_half_its_name_is_not_taken_for_the_opposite() {
+    let said = message("[{function: mass, shape: decreasing}]");
+    assert!(said.contains("did you mean `non-increasing`?"), "{said}");
 }

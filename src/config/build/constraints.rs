@@ -12,6 +12,7 @@ use crate::config::ModelFile;
 use crate::config::spec::ConstraintSpec;
 use crate::constraints::{Constraints, Impossible, Statement};
 use crate::error::InputError;
+use crate::functions::Quantity;
 use crate::problem::Problem;
 
 /// The name of a group of rows, and the key of the model that it comes from.
@@ -82,6 +83,9 @@ fn add(
     places: &mut Vec<Place>,
     warnings: &mut Vec<String>,
 ) -> Result<(), InputError> {
+    if soft.is_none() {
+        leaves_a_mass(file, key, statement)?;
+    }
     let built = statement.build(&problem.oscillator.grid, &problem.functions);
     let mut rows = built.map_err(|why| impossible(file, key, why))?;
     if rows.is_empty() {
@@ -95,6 +99,38 @@ fn add(
     }));
     problem.constraints.extend(rows);
     Ok(())
+}
+
+/// The equation of motion needs a mass above zero: what holds it at or below is refused.
+fn leaves_a_mass(file: &ModelFile, key: &str, statement: &Statement) -> Result<(), InputError> {
+    let held = match statement {
+        Statement::Bounds {
+            of: Quantity::Mass,
+            max: Some(max),
+            ..
+        } => max.least(),
+        Statement::Value {
+            of: Quantity::Mass,
+            value,
+            ..
+        }
+        | Statement::Mean {
+            of: Quantity::Mass,
+            value,
+        }
+        | Statement::Integral {
+            of: Quantity::Mass,
+            value,
+        } => *value,
+        _ => return Ok(()),
+    };
+    if held > 0.0 {
+        return Ok(());
+    }
+    Err(file
+        .error_at(key, "this leaves no mass: it must be positive at all times")
+        .found(held)
+        .expected("a number greater than 0"))
 }
 
 fn names(constraints: &Constraints) -> impl Iterator<Item = &String> {

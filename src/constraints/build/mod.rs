@@ -41,6 +41,16 @@ pub enum Limit {
     },
 }
 
+impl Limit {
+    /// Its smallest value.
+    pub fn least(&self) -> f64 {
+        match self {
+            Limit::Number(value) => *value,
+            Limit::Nodal { values, .. } => values.iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+}
+
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -29,11 +29,18 @@ pub(super) fn says_nothing(
             of: Quantity::Stiffness,
             shape: Shape::NonIncreasing | Shape::NonDecreasing,
         } => "a monotone stiffness",
+        Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
+            Quantity::Mass => "a slope of the mass in one direction",
+            Quantity::Stiffness => "a slope of the stiffness in one direction",
+            Quantity::Damping => return None,
+        },
         _ => return None,
     };
     let forced = problem.experiments.iter().any(|e| e.force.is_some());
     let held = problem.functions.iter().any(holds_scale);
-    if forced || held || !problem.penalties.is_empty() || bounded_on_both_sides(file) {
+    let smoothed = problem.penalties.iter().any(|p| p.weight > 0.0)
+        || problem.variations.iter().any(|v| v.weight > 0.0);
+    if forced || held || smoothed || bounded_on_both_sides(file) {
         return None;
     }
     Some(format!(
@@ -41,6 +48,11 @@ pub(super) fn says_nothing(
          k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the \
          functions on both sides, or smooth them"
     ))
+}
+
+/// Whether limits of a slope leave one sign to it and no size.
+fn one_way(min: Option<f64>, max: Option<f64>) -> bool {
+    matches!((min, max), (None, Some(0.0)) | (Some(0.0), None))
 }
 
 /// Whether a function cannot follow a change of the common scale `s(t)`: it is known and not zero,
