@@ -117,7 +117,7 @@ impl Problem {
 /// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
-/// A [`Breakdown`] if the fit at the largest weight has no motion at its start.
+/// A [`Breakdown`] if the fit at the middle weight, the first, has no motion at its start.
 pub fn choose_weight(
     problem: &Problem,
     start: &[f64],
