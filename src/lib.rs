@@ -61,7 +61,7 @@
 //! ```
 //! use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 //! use kmcfit::functions::{Basis, CoefficientFunction, Functions, Quantity};
-//! use kmcfit::objective::{GradientKind, Readings, Weighting};
+//! use kmcfit::objective::{Channel, GradientKind, Weighting};
 //! use kmcfit::problem::{Experiment, Problem};
 //! use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 //!
@@ -90,12 +90,8 @@
 //! ];
 //! let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
 //! let weighting = Weighting::Integral { spacing: grid.step() };
-//! let record = Experiment {
-//!     name: "free decay".into(),
-//!     initial,
-//!     force: None,
-//!     readings: Some(Readings::new(motion.displacement, 1, weighting)),
-//! };
+//! let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
+//! let record = Experiment::free("free decay", initial, nodes).with_channel(channel);
 //! let problem = Problem::new(oscillator, functions, vec![record]);
 //!
 //! let settings = FitSettings {
@@ -128,4 +124,5 @@ pub mod observations;
 pub mod problem;
 pub mod qp;
 pub mod report;
+pub mod signal;
 pub mod solvers;

@@ -1,21 +1,75 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
 use crate::constraints::{Constraints, RowGroup};
-use crate::dynamics::{Oscillator, State};
+use crate::dynamics::{Excitation, Oscillator, State};
 use crate::functions::{Functions, Penalty, Variation};
-use crate::objective::{Readings, Weighting};
+use crate::objective::{Channel, Weighting};
 
-/// One record of the device's motion.
+/// One record of a device's motion.
 #[derive(Debug, Clone)]
 pub struct Experiment {
     /// Name for reports.
     pub name: String,
-    /// Displacement and velocity at the first node.
+    /// Displacement and velocity at the first node; where they are sought, the start of the search.
     pub initial: State,
-    /// Force at the nodes, N; `None` is free motion.
-    pub force: Option<Vec<f64>>,
-    /// What was measured; `None` for an experiment that is only simulated.
-    pub readings: Option<Readings>,
+    /// The scalars that displacement and velocity at the first node are, where they are sought.
+    pub sought: [Option<usize>; 2],
+    /// What drives the motion; `None` is free motion.
+    pub excitation: Option<Excitation>,
+    /// Number of nodes of its motion: a record may end before the grid does.
+    pub nodes: usize,
+    /// Which device of [`Functions::assemblies`] moves.
+    pub device: usize,
+    /// What was measured; none for an experiment that is only simulated.
+    pub channels: Vec<Channel>,
+}
+
+impl Experiment {
+    /// Free motion of the main device over `nodes` nodes from a known state, without readings.
+    pub fn free(name: impl Into<String>, initial: State, nodes: usize) -> Self {
+        Self {
+            name: name.into(),
+            initial,
+            sought: [None; 2],
+            excitation: None,
+            nodes,
+            device: 0,
+            channels: Vec::new(),
+        }
+    }
+
+    /// With one more channel of readings.
+    #[must_use]
+    pub fn with_channel(mut self, channel: Channel) -> Self {
+        self.channels.push(channel);
+        self
+    }
+
+    /// Under an excitation.
+    #[must_use]
+    pub fn with_excitation(mut self, excitation: Excitation) -> Self {
+        self.excitation = Some(excitation);
+        self
+    }
+
+    /// The state at the first node, for the values `scalars` of all scalars.
+    pub fn initial_state(&self, scalars: &[f64]) -> State {
+        let value = |sought: Option<usize>, known: f64| sought.map_or(known, |i| scalars[i]);
+        State {
+            displacement: value(self.sought[0], self.initial.displacement),
+            velocity: value(self.sought[1], self.initial.velocity),
+        }
+    }
+
+    /// Whether nothing drives the motion.
+    pub fn is_free(&self) -> bool {
+        self.excitation.as_ref().is_none_or(Excitation::is_zero)
+    }
+
+    /// Number of readings of all channels.
+    pub fn reading_count(&self) -> usize {
+        self.channels.iter().map(Channel::len).sum()
+    }
 }
 
 /// What is fitted: an oscillator, how its functions are represented, and the records.
@@ -51,32 +105,65 @@ impl Problem {
         }
     }
 
-    /// The misfit of no motion at all: what there is to explain.
-    pub fn misfit_of_silence(&self) -> f64 {
-        let silence = vec![0.0; self.oscillator.grid.nodes()];
-        let readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
-        readings.map(|r| r.cost(&silence)).sum()
+    /// Number of parameters of functions and scalars.
+    pub fn parameters(&self) -> usize {
+        self.functions.parameters()
     }
 
-    /// The same problem with only the first part of the readings, `share` of each record.
+    /// The start of the search.
+    pub fn start(&self) -> Vec<f64> {
+        self.functions.start()
+    }
+
+    /// The part of `theta` that belongs to the scalars.
+    pub fn scalars<'a>(&self, theta: &'a [f64]) -> &'a [f64] {
+        &theta[self.functions.scalar_range()]
+    }
+
+    /// All channels of all experiments.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.experiments.iter().flat_map(|e| &e.channels)
+    }
+
+    /// Number of readings of all experiments.
+    pub fn reading_count(&self) -> usize {
+        self.channels().map(Channel::len).sum()
+    }
+
+    /// The misfit of no motion at all: what there is to explain.
+    pub fn misfit_of_silence(&self) -> f64 {
+        let silence = |c: &Channel| c.cost(&vec![0.0; c.len()]);
+        self.channels().map(silence).sum()
+    }
+
+    /// The same problem with only the first part of the readings, `share` of the time of each
+    /// record.
     #[must_use]
     pub fn first_part(&self, share: f64) -> Self {
         let mut part = self.clone();
+        let grid = &self.oscillator.grid;
         for experiment in &mut part.experiments {
-            if let Some(readings) = &mut experiment.readings {
-                let count = (readings.values().len() as f64 * share).ceil() as usize;
-                readings.truncate(count.max(2));
+            let length = (experiment.nodes - 1) as f64 * grid.step();
+            let end = grid.start() + share * length;
+            for channel in &mut experiment.channels {
+                let count = channel.times().partition_point(|t| *t <= end);
+                *channel = channel.first(count.max(2));
             }
         }
         part
     }
 
-    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading per node.
+    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading of the
+    /// displacement per node, over the whole grid.
     pub fn supports_continuous(&self) -> bool {
-        let fits =
-            |r: &Readings| r.stride() == 1 && matches!(r.weighting(), Weighting::Integral { .. });
-        self.experiments
-            .iter()
-            .all(|e| e.readings.as_ref().is_some_and(fits))
+        let nodes = self.oscillator.grid.nodes();
+        let fits = |c: &Channel| {
+            c.stride() == Some(1)
+                && c.len() == nodes
+                && matches!(c.weighting(), Weighting::Integral { .. })
+        };
+        let one =
+            |e: &Experiment| e.nodes == nodes && e.channels.len() == 1 && fits(&e.channels[0]);
+        self.experiments.iter().all(one)
     }
 }

@@ -514,15 +514,11 @@ fn problem(functions: Functions) -> Problem {
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let experiment = Experiment {
-        name: "none".into(),
-        initial: State {
-            displacement: 1.0,
-            velocity: 0.0,
-        },
-        force: None,
-        readings: None,
+    let initial = State {
+        displacement: 1.0,
+        velocity: 0.0,
     };
+    let experiment = Experiment::free("none", initial, oscillator.grid.nodes());
     Problem::new(oscillator, functions, vec![experiment])
 }
 

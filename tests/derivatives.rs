@@ -4,7 +4,9 @@ mod common;
 
 use common::reference::{Inputs, motion};
 use kmcfit::dynamics::adjoint::discrete;
-use kmcfit::dynamics::{Device, DeviceTangent, Grid, Method, Oscillator, State, Term, Trajectory};
+use kmcfit::dynamics::{
+    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term, Trajectory,
+};
 use kmcfit::objective::GradientKind;
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
@@ -56,7 +58,8 @@ impl Case {
 
     fn adjoint_gradient(&self) -> DeviceTangent {
         let oscillator = self.oscillator();
-        let force = Some(self.force.as_slice());
+        let excitation = Excitation::force_at_nodes(&self.force);
+        let force = Some(&excitation);
         let motion = oscillator
             .forward(&self.device, self.initial, force)
             .unwrap();
@@ -135,7 +138,8 @@ proptest! {
     #[test]
     fn the_adjoint_is_the_transpose_of_the_tangent(case in case(), other in case()) {
         let oscillator = case.oscillator();
-        let force = Some(case.force.as_slice());
+        let excitation = Excitation::force_at_nodes(&case.force);
+        let force = Some(&excitation);
         let motion = oscillator.forward(&case.device, case.initial, force).unwrap();
         // A direction and weights of the right length, taken from an unrelated case.
         let cut = |f: &[f64]| -> Vec<f64> {
@@ -167,7 +171,7 @@ proptest! {
     fn the_forward_solve_is_the_textbook_one(case in case()) {
         let oscillator = case.oscillator();
         let ours = oscillator
-            .forward(&case.device, case.initial, Some(&case.force))
+            .forward(&case.device, case.initial, Some(&Excitation::force_at_nodes(&case.force)))
             .unwrap();
         let inputs = Inputs {
             mass: case.device.mass.clone(),

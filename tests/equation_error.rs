@@ -4,7 +4,7 @@
 mod common;
 
 use kmcfit::constraints::RowGroup;
-use kmcfit::dynamics::{Device, Method};
+use kmcfit::dynamics::{Device, Excitation, Method};
 use kmcfit::functions::{CoefficientFunction, Quantity};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::equation_error;
@@ -32,7 +32,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     ];
     let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
     if silent_force {
-        problem.experiments[0].force = Some(vec![0.0; NODES]);
+        problem.experiments[0].excitation = Some(Excitation::force_at_nodes(&vec![0.0; NODES]));
     }
     problem
 }

@@ -4,7 +4,7 @@ mod common;
 
 use kmcfit::dynamics::{Device, Grid, Method, Oscillator, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit::objective::{GradientKind, Readings, Weighting};
+use kmcfit::objective::{Channel, GradientKind, Weighting};
 use kmcfit::problem::{Experiment, Problem};
 use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 
@@ -37,12 +37,8 @@ fn problem() -> Problem {
         CoefficientFunction::fixed(Quantity::Damping, vec![0.05; nodes]),
         CoefficientFunction::constant(Quantity::Stiffness, 130.0, nodes),
     ];
-    let experiment = Experiment {
-        name: "free decay".into(),
-        initial: common::INITIAL,
-        force: None,
-        readings: Some(Readings::new(observed, STRIDE, weighting)),
-    };
+    let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
     let functions = Functions::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }

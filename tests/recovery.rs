@@ -175,7 +175,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
             let mut unit = vec![0.0; theta.len()];
             unit[j] = 1.0;
             let direction = kmcfit::dynamics::DeviceTangent {
-                device: problem.functions.direction(&unit),
+                device: problem.functions.direction(&unit, 0),
                 initial: kmcfit::dynamics::State {
                     displacement: 0.0,
                     velocity: 0.0,

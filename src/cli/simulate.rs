@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let device = problem.functions.device(&problem.functions.start());
     let motion = problem
         .oscillator
-        .forward(&device, experiment.initial, experiment.force.as_deref())
+        .forward(&device, experiment.initial, experiment.excitation.as_ref())
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     let mut readings = motion.displacement;
     if let Some(noise) = &noise {

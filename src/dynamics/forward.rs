@@ -2,7 +2,7 @@
 
 use super::stages::{Rhs, advance};
 use super::tableau::{MIDPOINT, RK4, Tableau};
-use super::{Device, Grid, Method, State, Term};
+use super::{Device, Excitation, Grid, Method, State, Term};
 use std::fmt;
 
 /// What moves: the grid, the stepper and the force terms. The coefficient values are a [`Device`].
@@ -25,6 +25,21 @@ pub struct Trajectory {
     pub velocity: Vec<f64>,
 }
 
+impl Trajectory {
+    /// A motion of zeros over `nodes` nodes.
+    pub fn zeros(nodes: usize) -> Self {
+        Self {
+            displacement: vec![0.0; nodes],
+            velocity: vec![0.0; nodes],
+        }
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.displacement.len()
+    }
+}
+
 /// Why a motion could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
@@ -45,8 +60,8 @@ pub struct Breakdown {
     pub node: usize,
     /// Time of that node, s.
     pub time: f64,
-    /// The value found there: the mass in kg, the last finite displacement or the largest residual
-    /// in m.
+    /// The value found there: the mass in kg, the last finite displacement in m or the largest residual
+    /// in its own unit.
     pub value: f64,
 }
 
@@ -58,7 +73,7 @@ impl fmt::Display for Breakdown {
             Cause::Overflow => write!(f, "the motion overflows at t = {time:.6} s"),
             Cause::CostOverflow => write!(
                 f,
-                "the cost overflows: the motion and a reading are {value:.3e} m apart at t = \
+                "the cost overflows: the motion and a reading are {value:.3e} apart at t = \
                  {time:.6} s"
             ),
         }
@@ -68,25 +83,27 @@ impl fmt::Display for Breakdown {
 impl std::error::Error for Breakdown {}
 
 impl Oscillator {
-    /// The motion of `device` from `initial` under `force` (N at the nodes; `None` is no force).
+    /// The motion of `device` from `initial` under `excitation` (`None` is free motion), over the
+    /// whole grid.
     ///
     /// # Errors
     /// A [`Breakdown`] if the mass is not positive at some node or the motion overflows.
     ///
     /// # Panics
-    /// If the lengths of `device` or `force` do not fit the grid and the terms.
+    /// If `device` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
         device: &Device,
         initial: State,
-        force: Option<&[f64]>,
+        excitation: Option<&Excitation>,
     ) -> Result<Trajectory, Breakdown> {
-        let mut trajectory = Trajectory::default();
-        self.forward_into(device, initial, force, &mut trajectory)?;
+        let mut trajectory = Trajectory::zeros(self.grid.nodes());
+        self.forward_into(device, initial, excitation, &mut trajectory)?;
         Ok(trajectory)
     }
 
-    /// [`Oscillator::forward`] into storage that is used again.
+    /// [`Oscillator::forward`] into storage that is used again, over as many nodes as `trajectory`
+    /// has: a record may end before the grid does.
     ///
     /// # Errors
     /// As [`Oscillator::forward`].
@@ -94,13 +111,11 @@ impl Oscillator {
         &self,
         device: &Device,
         initial: State,
-        force: Option<&[f64]>,
+        excitation: Option<&Excitation>,
         trajectory: &mut Trajectory,
     ) -> Result<(), Breakdown> {
         self.require_positive_mass(device)?;
-        trajectory.displacement.resize(self.grid.nodes(), 0.0);
-        trajectory.velocity.resize(self.grid.nodes(), 0.0);
-        let rhs = self.rhs(device, force);
+        let rhs = self.rhs(device, excitation, trajectory.nodes());
         match self.method {
             Method::Midpoint => sweep(&MIDPOINT, rhs, initial, trajectory),
             Method::Rk4 => sweep(&RK4, rhs, initial, trajectory),
@@ -108,7 +123,12 @@ impl Oscillator {
         self.require_finite(trajectory)
     }
 
-    pub(super) fn rhs<'a>(&'a self, device: &'a Device, force: Option<&'a [f64]>) -> Rhs<'a> {
+    pub(super) fn rhs<'a>(
+        &'a self,
+        device: &'a Device,
+        excitation: Option<&'a Excitation>,
+        motion_nodes: usize,
+    ) -> Rhs<'a> {
         let nodes = self.grid.nodes();
         assert_eq!(
             device.coefficients.len(),
@@ -119,11 +139,18 @@ impl Oscillator {
             device.functions().all(|f| f.len() == nodes),
             "functions on the nodes"
         );
-        assert!(force.is_none_or(|f| f.len() == nodes), "force on the nodes");
+        assert!(
+            (1..=nodes).contains(&motion_nodes),
+            "a motion within the grid"
+        );
+        assert!(
+            excitation.is_none_or(|e| e.covers(motion_nodes)),
+            "an excitation as long as the motion"
+        );
         Rhs {
             terms: &self.terms,
             device,
-            force,
+            excitation,
             dt: self.grid.step(),
         }
     }
@@ -140,10 +167,11 @@ impl Oscillator {
         let finite =
             |i: usize| trajectory.displacement[i].is_finite() && trajectory.velocity[i].is_finite();
         // A motion that has left the finite numbers never returns, so the last node tells.
-        if finite(self.grid.nodes() - 1) {
+        let nodes = trajectory.nodes();
+        if finite(nodes - 1) {
             return Ok(());
         }
-        let node = (0..self.grid.nodes()).find(|&i| !finite(i)).unwrap_or(0);
+        let node = (0..nodes).find(|&i| !finite(i)).unwrap_or(0);
         let last = trajectory.displacement[node.saturating_sub(1)];
         Err(self.breakdown(Cause::Overflow, node, last))
     }
@@ -165,7 +193,7 @@ fn sweep<const S: usize>(
     trajectory: &mut Trajectory,
 ) {
     let (mut y, mut v) = (initial.displacement, initial.velocity);
-    let nodes = trajectory.displacement.len();
+    let nodes = trajectory.nodes();
     trajectory.displacement[0] = y;
     trajectory.velocity[0] = v;
     for i in 0..nodes - 1 {

@@ -1,19 +1,22 @@
 //! The motion of one device, its linearisation and its adjoints.
 //!
-//! `m(t) y'' + sum_j p_j(t) phi_j(y, y') = f(t)` with `y(0)`, `y'(0)` given, stepped by an explicit
+//! `m(t) (y'' + b''(t)) + sum_j p_j(t) phi_j(y, y') = f(t)` with `y(0)`, `y'(0)` given, stepped by an explicit
 //! Runge–Kutta method ([`Method`]) on an equally spaced [`Grid`]. Coefficient functions live on the
 //! nodes and are interpolated linearly in between, so a stage at mid-step sees the mean of two nodes.
 //!
 //! * [`Oscillator::forward`]: the motion ([`Trajectory`]), or where it broke down ([`Breakdown`]);
+//! * [`Oscillator::sense`]: what a sensor at any time sees of it;
 //! * [`Oscillator::tangent`]: its directional derivative;
 //! * [`adjoint::discrete`]: the exact transpose of the stepper;
 //! * [`adjoint::continuous`]: Eq. 13 of the paper, discretised as the paper does.
 
 pub mod adjoint;
 mod device;
+mod excitation;
 mod forward;
 mod grid;
 pub mod quadrature;
+mod sense;
 mod stages;
 mod step_jacobian;
 mod tableau;
@@ -21,9 +24,11 @@ mod tangent;
 mod term;
 
 pub use device::{Device, State};
+pub use excitation::{Excitation, Stepwise};
 pub use forward::{Breakdown, Cause, Oscillator, Trajectory};
 pub use grid::Grid;
+pub use sense::{ChannelKind, Place, Sensed, Surroundings};
 pub use step_jacobian::{StateChange, StepJacobian};
 pub use tableau::Method;
 pub use tangent::DeviceTangent;
-pub use term::Term;
+pub use term::{MOST_TERMS, Term};

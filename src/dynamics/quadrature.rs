@@ -20,6 +20,17 @@ pub fn trapezoid_weights(nodes: usize, dt: f64) -> Vec<f64> {
     weights
 }
 
+/// The weights of the trapezoid rule over any increasing `times`.
+pub fn trapezoid_weights_at(times: &[f64]) -> Vec<f64> {
+    let mut weights = vec![0.0; times.len()];
+    for (i, pair) in times.windows(2).enumerate() {
+        let half = 0.5 * (pair[1] - pair[0]);
+        weights[i] += half;
+        weights[i + 1] += half;
+    }
+    weights
+}
+
 /// Central differences, one-sided at the ends.
 ///
 /// # Panics

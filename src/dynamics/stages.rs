@@ -1,14 +1,14 @@
 //! The stages of one step: the one place where the equation of motion is evaluated.
 
 use super::tableau::{Position, Tableau};
-use super::{Device, Term};
+use super::{Device, Excitation, Term};
 
 /// The right-hand side of one experiment on one device.
 #[derive(Clone, Copy)]
 pub(super) struct Rhs<'a> {
     pub terms: &'a [Term],
     pub device: &'a Device,
-    pub force: Option<&'a [f64]>,
+    pub excitation: Option<&'a Excitation>,
     pub dt: f64,
 }
 
@@ -27,18 +27,31 @@ pub(super) struct Slopes {
 }
 
 impl Rhs<'_> {
-    /// `y'' = f/m - sum_j p_j phi_j / m`.
+    /// `y'' = f/m - sum_j p_j phi_j / m - b''`.
     ///
     /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
     /// these are the paper's operations in the paper's order, and its run depends on every bit.
     #[inline(always)]
-    fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
+    pub fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
         let mass = position.of(&self.device.mass, i);
-        let mut a = self.force.map_or(0.0, |f| position.of(f, i) / mass);
+        let force = self.excitation.and_then(|e| e.force.as_ref());
+        let mut a = force.map_or(0.0, |f| f.at(i, position) / mass);
         for (term, p) in self.terms.iter().zip(&self.device.coefficients).rev() {
             a -= position.of(p, i) * term.phi(y, v) / mass;
         }
-        a
+        match self.excitation.and_then(|e| e.base.as_ref()) {
+            Some(base) => a - base.at(i, position),
+            None => a,
+        }
+    }
+
+    /// What the mass resists: `y'' + b''` for the acceleration `y'' = a`.
+    #[inline(always)]
+    pub fn absolute(&self, i: usize, position: Position, a: f64) -> f64 {
+        match self.excitation.and_then(|e| e.base.as_ref()) {
+            Some(base) => a + base.at(i, position),
+            None => a,
+        }
     }
 
     /// Mass and partial derivatives of [`Rhs::acceleration`].

@@ -2,7 +2,7 @@
 
 use super::stages::{Rhs, Stages, advance};
 use super::tableau::{MIDPOINT, Position, RK4, Tableau};
-use super::{Device, Method, Oscillator, State, Trajectory};
+use super::{Device, Excitation, Method, Oscillator, State, Trajectory};
 
 /// Change of the state `(y, v)` at the right node of a step.
 pub type StateChange = [f64; 2];
@@ -34,11 +34,11 @@ impl Oscillator {
     pub fn step_jacobians(
         &self,
         device: &Device,
-        force: Option<&[f64]>,
+        excitation: Option<&Excitation>,
         states: &Trajectory,
     ) -> Vec<StepJacobian> {
-        let rhs = self.rhs(device, force);
-        let steps = 0..self.grid.nodes() - 1;
+        let rhs = self.rhs(device, excitation, states.nodes());
+        let steps = 0..states.nodes() - 1;
         match self.method {
             Method::Midpoint => steps.map(|i| step(&MIDPOINT, rhs, states, i)).collect(),
             Method::Rk4 => steps.map(|i| step(&RK4, rhs, states, i)).collect(),
@@ -99,7 +99,7 @@ fn column<const S: usize>(
         let (y, v) = (base.y[s], base.v[s]);
         let slopes = rhs.slopes(i, position, y, v);
         let push = match seed {
-            Seed::Function(0, node) => position.share(node) * base.a[s],
+            Seed::Function(0, node) => position.share(node) * rhs.absolute(i, position, base.a[s]),
             Seed::Function(f, node) => position.share(node) * rhs.terms[f - 1].phi(y, v),
             _ => 0.0,
         };

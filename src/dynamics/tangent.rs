@@ -2,7 +2,7 @@
 
 use super::stages::{Rhs, Stages, advance};
 use super::tableau::{MIDPOINT, RK4, Tableau};
-use super::{Device, Method, Oscillator, State, Trajectory};
+use super::{Device, Excitation, Method, Oscillator, State, Trajectory};
 
 /// A direction in which device and initial state change.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,16 +15,16 @@ pub struct DeviceTangent {
 
 impl Oscillator {
     /// Directional derivative of [`Oscillator::forward`] at `trajectory` (which must be the motion of
-    /// `device` under `force`) along `direction`: the change of displacement and velocity per unit
+    /// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
     /// step, exact for the discrete motion.
     pub fn tangent(
         &self,
         device: &Device,
-        force: Option<&[f64]>,
+        excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         direction: &DeviceTangent,
     ) -> Trajectory {
-        let rhs = self.rhs(device, force);
+        let rhs = self.rhs(device, excitation, trajectory.nodes());
         match self.method {
             Method::Midpoint => sweep(&MIDPOINT, rhs, trajectory, direction),
             Method::Rk4 => sweep(&RK4, rhs, trajectory, direction),
@@ -39,10 +39,7 @@ fn sweep<const S: usize>(
     direction: &DeviceTangent,
 ) -> Trajectory {
     let nodes = trajectory.displacement.len();
-    let mut out = Trajectory {
-        displacement: vec![0.0; nodes],
-        velocity: vec![0.0; nodes],
-    };
+    let mut out = Trajectory::zeros(nodes);
     let (mut dy, mut dv) = (direction.initial.displacement, direction.initial.velocity);
     (out.displacement[0], out.velocity[0]) = (dy, dv);
     for i in 0..nodes - 1 {
@@ -78,7 +75,8 @@ fn stage_changes<const S: usize>(
             change.v[s] += rhs.dt * change.a[r] * a;
         }
         let slopes = rhs.slopes(i, position, base.y[s], base.v[s]);
-        let mut push = -position.of(&direction.mass, i) * base.a[s];
+        let inertia = rhs.absolute(i, position, base.a[s]);
+        let mut push = -position.of(&direction.mass, i) * inertia;
         for (term, dp) in rhs.terms.iter().zip(&direction.coefficients) {
             push -= position.of(dp, i) * term.phi(base.y[s], base.v[s]);
         }

@@ -1,25 +1,50 @@
-//! All functions of a device, their parameters in one vector.
+//! All functions and scalars that are fitted, their parameters in one vector.
 
-use super::{CoefficientFunction, Gram};
+use super::{CoefficientFunction, Gram, Scalar};
 use crate::dynamics::Device;
 use crate::dynamics::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
 
-/// The functions of one device: mass first, then one per force term. Their parameters stand one
-/// after the other in one vector `theta`.
+/// The functions to be found and the scalars beside them. Their parameters stand one after the other
+/// in one vector `theta`, functions first.
+///
+/// The first functions make up the main device: mass, then one per force term. Further ones belong
+/// to single experiments and replace one of the main device there: each device is a list of
+/// functions ([`Functions::assembly`]).
 #[derive(Debug, Clone)]
 pub struct Functions {
     list: Vec<CoefficientFunction>,
     ranges: Vec<Range<usize>>,
     grams: Vec<Gram>,
+    devices: Vec<Vec<usize>>,
+    scalars: Vec<Scalar>,
     nodes: usize,
     step: f64,
 }
 
 impl Functions {
-    /// Collects `list` (mass first) on `nodes` nodes of step `step` (s); `None` if some basis is
-    /// linearly dependent on the grid or the list is empty.
+    /// Collects `list` (mass first) on `nodes` nodes of step `step` (s), as the functions of one
+    /// device; `None` if some basis is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
+        let main = (0..list.len()).collect();
+        Self::with_devices(list, vec![main], nodes, step)
+    }
+
+    /// [`Functions::new`] with several devices: each is a list of indices into `list`, mass first.
+    ///
+    /// # Panics
+    /// If there is no device, or one names a function that is not there.
+    pub fn with_devices(
+        list: Vec<CoefficientFunction>,
+        devices: Vec<Vec<usize>>,
+        nodes: usize,
+        step: f64,
+    ) -> Option<Self> {
+        assert!(!devices.is_empty(), "at least the main device");
+        assert!(
+            devices.iter().flatten().all(|f| *f < list.len()),
+            "devices of the functions in the list"
+        );
         let weights = trapezoid_weights(nodes, step);
         let grams: Option<Vec<Gram>> = list
             .iter()
@@ -37,12 +62,50 @@ impl Functions {
             list,
             ranges,
             grams: grams?,
+            devices,
+            scalars: Vec::new(),
             nodes,
             step,
         })
     }
 
-    /// The functions, mass first.
+    /// The same functions with numbers to be fitted beside them.
+    #[must_use]
+    pub fn with_scalars(mut self, scalars: Vec<Scalar>) -> Self {
+        self.scalars = scalars;
+        self
+    }
+
+    /// The numbers that are fitted beside the functions.
+    pub fn scalars(&self) -> &[Scalar] {
+        &self.scalars
+    }
+
+    /// Where the scalars stand in `theta`.
+    pub fn scalar_range(&self) -> Range<usize> {
+        let first = self.function_parameters();
+        first..first + self.scalars.len()
+    }
+
+    /// The functions that make up each device, mass first; the main device is the first.
+    pub fn assemblies(&self) -> &[Vec<usize>] {
+        &self.devices
+    }
+
+    /// The functions that make up device `device`, mass first.
+    pub fn assembly(&self, device: usize) -> &[usize] {
+        &self.devices[device]
+    }
+
+    /// Function `index` of the list.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn get(&self, index: usize) -> &CoefficientFunction {
+        &self.list[index]
+    }
+
+    /// The functions: those of the main device, mass first, then those of single experiments.
     pub fn iter(&self) -> impl Iterator<Item = &CoefficientFunction> {
         self.list.iter()
     }
@@ -52,8 +115,12 @@ impl Functions {
         self.nodes
     }
 
-    /// Number of all parameters.
+    /// Number of all parameters, scalars included.
     pub fn parameters(&self) -> usize {
+        self.function_parameters() + self.scalars.len()
+    }
+
+    fn function_parameters(&self) -> usize {
         self.ranges.last().map_or(0, |r| r.end)
     }
 
@@ -64,7 +131,10 @@ impl Functions {
 
     /// The start of the search.
     pub fn start(&self) -> Vec<f64> {
-        self.list.iter().flat_map(|f| f.start.clone()).collect()
+        let functions = self.list.iter().flat_map(|f| f.start.iter().copied());
+        functions
+            .chain(self.scalars.iter().map(|s| s.start))
+            .collect()
     }
 
     /// The same functions with another start of the search.
@@ -77,59 +147,87 @@ impl Functions {
         for (function, range) in self.list.iter_mut().zip(&self.ranges) {
             function.start.copy_from_slice(&theta[range.clone()]);
         }
+        let scalars = self.scalar_range();
+        for (scalar, start) in self.scalars.iter_mut().zip(&theta[scalars]) {
+            scalar.start = *start;
+        }
         self
     }
 
     /// A device of the right shape, all zero.
     pub fn empty_device(&self) -> Device {
-        Device::zeros(self.nodes, self.list.len() - 1)
+        Device::zeros(self.nodes, self.devices[0].len() - 1)
     }
 
-    /// The device with parameters `theta`.
+    /// The main device with parameters `theta`.
     pub fn device(&self, theta: &[f64]) -> Device {
         let mut device = self.empty_device();
-        self.device_into(theta, &mut device);
+        self.device_into(theta, 0, &mut device);
         device
     }
 
-    /// [`Functions::device`] into storage that is used again.
-    pub fn device_into(&self, theta: &[f64], device: &mut Device) {
-        let parts = self.list.iter().zip(&self.ranges);
-        for ((function, range), values) in parts.zip(device.functions_mut()) {
-            function.values_into(&theta[range.clone()], values);
+    /// Device `which` with parameters `theta`, into storage that is used again.
+    pub fn device_into(&self, theta: &[f64], which: usize, device: &mut Device) {
+        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+            self.list[f].values_into(&theta[self.ranges[f].clone()], values);
         }
     }
 
-    /// `B theta` without the fixed parts: the change of the device along a direction.
-    pub fn direction(&self, theta: &[f64]) -> Device {
+    /// Every function of the list at the nodes, for the parameters `theta`.
+    pub fn values(&self, theta: &[f64]) -> Vec<Vec<f64>> {
+        let parts = self.list.iter().zip(&self.ranges);
+        let each = parts.map(|(function, range)| {
+            let mut values = vec![0.0; self.nodes];
+            function.values_into(&theta[range.clone()], &mut values);
+            values
+        });
+        each.collect()
+    }
+
+    /// `B theta` of device `which` without the fixed parts: its change along a direction.
+    pub fn direction(&self, theta: &[f64], which: usize) -> Device {
         let mut device = self.empty_device();
-        let parts = self.list.iter().zip(&self.ranges);
-        for ((function, range), values) in parts.zip(device.functions_mut()) {
-            function.design.multiply_add(&theta[range.clone()], values);
+        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+            let range = self.ranges[f].clone();
+            self.list[f].design.multiply_add(&theta[range], values);
         }
         device
     }
 
-    /// `B^T` applied to nodal values: Euclidean gradient in nodal values to Euclidean gradient in
-    /// parameters.
+    /// Adds `B^T` applied to nodal values of device `which` to `out`: Euclidean gradient in nodal
+    /// values to Euclidean gradient in parameters.
+    pub fn add_transpose(&self, nodal: &Device, which: usize, out: &mut [f64]) {
+        for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
+            let range = self.ranges[f].clone();
+            self.list[f]
+                .design
+                .transpose_multiply_add(values, &mut out[range]);
+        }
+    }
+
+    /// [`Functions::add_transpose`] of the main device to zero.
     pub fn transpose(&self, nodal: &Device) -> Vec<f64> {
         let mut out = vec![0.0; self.parameters()];
-        let parts = self.list.iter().zip(&self.ranges);
-        for ((function, range), values) in parts.zip(nodal.functions()) {
-            function
-                .design
-                .transpose_multiply_add(values, &mut out[range.clone()]);
-        }
+        self.add_transpose(nodal, 0, &mut out);
         out
     }
 
-    /// Diagonal of `G`, all functions: the squared L2 norm of each parameter's function, s.
-    pub fn gram_diagonal(&self) -> Vec<f64> {
-        self.grams.iter().flat_map(Gram::diagonal).collect()
+    /// Length of the record, s: a scalar weighs as much as a constant function of its value.
+    fn duration(&self) -> f64 {
+        self.step * (self.nodes - 1) as f64
     }
 
-    /// Diagonal of `sum_f 1/T integral (p_f / size_f)^2 dt` in the parameters, with a size for each
-    /// function and `T = duration`. A function of size zero takes the largest size of all.
+    /// Diagonal of `G`: the squared L2 norm of each parameter's function, s. That of a scalar is the
+    /// length of the record.
+    pub fn gram_diagonal(&self) -> Vec<f64> {
+        let scalars = self.scalars.iter().map(|_| self.duration());
+        let functions = self.grams.iter().flat_map(Gram::diagonal);
+        functions.chain(scalars).collect()
+    }
+
+    /// Diagonal of `sum_f 1/T integral (p_f / size_f)^2 dt + sum_s (x_s / size_s)^2` in the
+    /// parameters, with a size for each function of the list and `T = duration`. A function of size
+    /// zero takes the largest size of all.
     pub fn relative_metric(&self, sizes: &[f64], duration: f64) -> Vec<f64> {
         let largest = sizes
             .iter()
@@ -142,17 +240,31 @@ impl Functions {
                 *g /= duration * size * size;
             }
         }
+        let scalars = self.scalar_range();
+        for (g, scalar) in metric[scalars].iter_mut().zip(&self.scalars) {
+            *g = 1.0 / (scalar.size * scalar.size);
+        }
         metric
     }
 
-    /// `G theta`, all functions.
+    /// `G theta`, all functions and scalars.
     pub fn gram_multiply(&self, theta: &[f64]) -> Vec<f64> {
-        self.each_gram(theta, Gram::multiply)
+        let mut out = self.each_gram(theta, Gram::multiply);
+        let scalars = self.scalar_range();
+        for (out, x) in out[scalars.clone()].iter_mut().zip(&theta[scalars]) {
+            *out = x * self.duration();
+        }
+        out
     }
 
-    /// `G^-1 dual`, all functions.
+    /// `G^-1 dual`, all functions and scalars.
     pub fn gram_solve(&self, dual: &[f64]) -> Vec<f64> {
-        self.each_gram(dual, Gram::solve)
+        let mut out = self.each_gram(dual, Gram::solve);
+        let scalars = self.scalar_range();
+        for (out, x) in out[scalars.clone()].iter_mut().zip(&dual[scalars]) {
+            *out = x / self.duration();
+        }
+        out
     }
 
     fn each_gram(&self, input: &[f64], apply: fn(&Gram, &[f64], &mut [f64])) -> Vec<f64> {
@@ -164,14 +276,24 @@ impl Functions {
     }
 
     /// `integral sum_j (B_j theta_j)^2 dt` by the trapezoid rule, summed over the functions node by
-    /// node: G^2 of the paper when `theta` is the L2 gradient.
+    /// node, plus `T x^2` for each scalar: G^2 of the paper when `theta` is the L2 gradient.
     pub fn norm_squared(&self, theta: &[f64]) -> f64 {
         let mut squares = vec![0.0; self.nodes];
-        for values in self.direction(theta).functions() {
-            for (sum, value) in squares.iter_mut().zip(values) {
+        let mut values = vec![0.0; self.nodes];
+        for (function, range) in self.list.iter().zip(&self.ranges) {
+            values.fill(0.0);
+            function
+                .design
+                .multiply_add(&theta[range.clone()], &mut values);
+            for (sum, value) in squares.iter_mut().zip(&values) {
                 *sum += value * value;
             }
         }
-        trapezoid(&squares, self.step)
+        let scalars = theta[self.scalar_range()].iter().map(|x| x * x);
+        let functions = trapezoid(&squares, self.step);
+        match self.scalars.is_empty() {
+            true => functions,
+            false => functions + self.duration() * scalars.sum::<f64>(),
+        }
     }
 }

@@ -11,6 +11,7 @@ mod gram;
 mod penalty;
 mod quantity;
 mod ratios;
+mod scalar;
 mod variation;
 
 pub use basis::Basis;
@@ -20,6 +21,7 @@ pub use gram::Gram;
 pub use penalty::Penalty;
 pub use quantity::Quantity;
 pub use ratios::Ratios;
+pub use scalar::{Prior, Scalar, Value};
 pub use variation::Variation;
 
 use crate::dynamics::Grid;

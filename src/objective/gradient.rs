@@ -2,7 +2,7 @@
 
 use super::Evaluation;
 use crate::dynamics::quadrature::trapezoid_weights;
-use crate::dynamics::{Device, Trajectory, adjoint};
+use crate::dynamics::{Device, State, Trajectory, adjoint};
 use crate::problem::Problem;
 
 /// Which adjoint computes the gradient.
@@ -44,8 +44,7 @@ impl Problem {
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
         let (mut euclidean, mut l2) = match kind {
             GradientKind::Discrete => {
-                let nodal = self.discrete_gradient(evaluation);
-                let euclidean = self.functions.transpose(&nodal);
+                let euclidean = self.discrete_gradient(evaluation);
                 let l2 = self.functions.gram_solve(&euclidean);
                 (euclidean, l2)
             }
@@ -66,7 +65,8 @@ impl Problem {
     }
 
     fn is_regularised(&self) -> bool {
-        !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
+        let priors = self.functions.scalars().iter().any(|s| s.prior.is_some());
+        priors || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
     }
 
     fn penalty_gradient(&self, theta: &[f64]) -> Vec<f64> {
@@ -82,30 +82,49 @@ impl Problem {
         for group in &self.soft {
             group.add_price_gradient(theta, &mut gradient);
         }
+        for (index, scalar) in self.functions.scalar_range().zip(self.functions.scalars()) {
+            if let Some(prior) = scalar.prior {
+                gradient[index] += 2.0 * (theta[index] - prior.mean) / prior.sigma.powi(2);
+            }
+        }
         gradient
     }
 
-    /// Euclidean gradient in nodal values.
-    fn discrete_gradient(&self, evaluation: &Evaluation) -> Device {
-        let mut total = self.functions.empty_device();
-        for (experiment, motion) in self.experiments.iter().zip(&evaluation.trajectories) {
-            let Some(readings) = &experiment.readings else {
+    /// Euclidean gradient of the misfit in the parameters.
+    fn discrete_gradient(&self, evaluation: &Evaluation) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.parameters()];
+        let mut nodal = self.empty_devices();
+        let mut scalars = vec![0.0; evaluation.scalars.len()];
+        for (e, experiment) in self.experiments.iter().enumerate() {
+            if experiment.channels.is_empty() {
                 continue;
-            };
-            let source = Trajectory {
-                displacement: readings.source(&motion.displacement),
-                velocity: vec![0.0; motion.velocity.len()],
-            };
+            }
+            let view = self.view(evaluation, e);
+            let mut source = Trajectory::zeros(experiment.nodes);
+            let total = &mut nodal[experiment.device];
+            for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
+                let slopes = channel.slopes(predicted);
+                channel.add_transpose(view, &slopes, &mut source, total, &mut scalars);
+            }
             let share = adjoint::discrete::gradient(
                 &self.oscillator,
-                &evaluation.device,
-                experiment.force.as_deref(),
-                motion,
+                view.device,
+                view.excitation,
+                view.motion,
                 &source,
             );
-            add(&mut total, &share.device);
+            add(total, &share.device);
+            add_initial(experiment.sought, share.initial, &mut scalars);
         }
-        total
+        for (which, nodal) in nodal.iter().enumerate() {
+            self.functions.add_transpose(nodal, which, &mut gradient);
+        }
+        gradient[self.functions.scalar_range()].copy_from_slice(&scalars);
+        gradient
+    }
+
+    fn empty_devices(&self) -> Vec<Device> {
+        vec![self.functions.empty_device(); self.functions.assemblies().len()]
     }
 
     /// Euclidean gradient in the parameters, and the parameters of the L2 gradient.
@@ -114,35 +133,55 @@ impl Problem {
             self.supports_continuous(),
             "Eq. 13 needs one reading per node and no sigma"
         );
-        let mut total = self.functions.empty_device();
-        for (experiment, motion) in self.experiments.iter().zip(&evaluation.trajectories) {
-            let Some(readings) = &experiment.readings else {
-                continue;
-            };
+        let mut nodal = self.empty_devices();
+        let mut scalars = vec![0.0; evaluation.scalars.len()];
+        for (e, experiment) in self.experiments.iter().enumerate() {
+            let view = self.view(evaluation, e);
             let share = adjoint::continuous::gradient(
                 &self.oscillator,
-                &evaluation.device,
-                motion,
-                readings.values(),
+                view.device,
+                view.excitation,
+                view.motion,
+                experiment.channels[0].observed(),
             );
-            add(&mut total, &share);
+            add(&mut nodal[experiment.device], &share.device);
+            add_initial(experiment.sought, share.initial, &mut scalars);
         }
+        let mut euclidean = vec![0.0; self.parameters()];
+        euclidean[self.functions.scalar_range()].copy_from_slice(&scalars);
         let grid = &self.oscillator.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
-        let mut weighted = total.clone();
-        for values in weighted.functions_mut() {
-            values.iter_mut().zip(&weights).for_each(|(g, w)| *g *= w);
+        for (which, total) in nodal.iter().enumerate() {
+            let mut weighted = total.clone();
+            for values in weighted.functions_mut() {
+                values.iter_mut().zip(&weights).for_each(|(g, w)| *g *= w);
+            }
+            self.functions
+                .add_transpose(&weighted, which, &mut euclidean);
         }
-        let euclidean = self.functions.transpose(&weighted);
         let mut l2 = self.functions.gram_solve(&euclidean);
         // One value per node: the functions themselves, without a round trip through the weights.
-        let parts = self.functions.iter().zip(self.functions.ranges());
-        for ((function, range), values) in parts.zip(total.functions()) {
-            if matches!(function.design, crate::functions::Design::Identity) {
-                l2[range.clone()].copy_from_slice(values);
+        if let [total] = nodal.as_slice() {
+            let parts = self.functions.iter().zip(self.functions.ranges());
+            for ((function, range), values) in parts.zip(total.functions()) {
+                if matches!(function.design, crate::functions::Design::Identity) {
+                    l2[range.clone()].copy_from_slice(values);
+                }
             }
         }
         (euclidean, l2)
+    }
+}
+
+/// Adds a gradient with respect to an initial state to the scalars that it is.
+fn add_initial(sought: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
+    for (index, slope) in sought
+        .into_iter()
+        .zip([gradient.displacement, gradient.velocity])
+    {
+        if let Some(index) = index {
+            scalars[index] += slope;
+        }
     }
 }
 

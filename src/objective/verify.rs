@@ -47,12 +47,12 @@ impl Problem {
 
     /// `J(to) - J(from)` without the cancellation of two rounded costs.
     pub fn cost_difference(&self, from: &Evaluation, to: &Evaluation) -> f64 {
-        let motions = from.trajectories.iter().zip(&to.trajectories);
-        let pairs = self.experiments.iter().zip(motions);
-        let misfit: f64 = pairs
-            .filter_map(|(experiment, (from, to))| {
-                let readings = experiment.readings.as_ref()?;
-                Some(readings.cost_difference(&from.displacement, &to.displacement))
+        let predictions = from.predictions.iter().zip(&to.predictions);
+        let experiments = self.experiments.iter().zip(predictions);
+        let misfit: f64 = experiments
+            .flat_map(|(experiment, (from, to))| {
+                let channels = experiment.channels.iter().zip(from.iter().zip(to));
+                channels.map(|(channel, (from, to))| channel.cost_difference(from, to))
             })
             .sum();
         misfit + (to.regularisation - from.regularisation)

@@ -3,12 +3,14 @@
 use super::factor::Symmetric;
 use crate::constraints::{Cone, Rows};
 
-/// Minimise `|F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
+/// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
 /// cones.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Subproblem {
     /// Number of variables.
     pub variables: usize,
+    /// What the cost has besides, whatever `z` is.
+    pub constant: f64,
     /// `F` and `f`.
     pub residuals: Rows,
     /// `d`, one per variable, not negative.
@@ -32,6 +34,7 @@ impl Subproblem {
     pub fn new(variables: usize) -> Self {
         Self {
             variables,
+            constant: 0.0,
             residuals: Rows::new(),
             proximal: vec![0.0; variables],
             absolute: Rows::new(),
@@ -54,7 +57,15 @@ impl Subproblem {
         self.upper.push(upper);
     }
 
-    /// `|F z - f|^2 + sum d z^2 + sum w |T z - t|`.
+    /// More variables: their indices. They have no proximal term.
+    pub fn add_variables(&mut self, count: usize) -> Vec<usize> {
+        let indices = self.variables..self.variables + count;
+        self.variables += count;
+        self.proximal.resize(self.variables, 0.0);
+        indices.collect()
+    }
+
+    /// `constant + |F z - f|^2 + sum d z^2 + sum w |T z - t|`.
     pub fn value(&self, z: &[f64]) -> f64 {
         let tz = self.absolute.multiply(z);
         let jumps = tz
@@ -66,7 +77,7 @@ impl Subproblem {
         let fit = fz.iter().zip(self.residuals.right());
         let near = self.proximal.iter().zip(z);
         let squares: f64 = fit.map(|(a, b)| (a - b) * (a - b)).sum();
-        jumps + squares + near.map(|(d, z)| d * z * z).sum::<f64>()
+        self.constant + jumps + squares + near.map(|(d, z)| d * z * z).sum::<f64>()
     }
 
     /// The minimiser without the inequalities and cones; `None` if it cannot be found to

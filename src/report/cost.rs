@@ -2,7 +2,6 @@
 
 use crate::constraints::RowGroup;
 use crate::functions::{Penalty, Quantity};
-use crate::objective::Weighting;
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
@@ -21,12 +20,9 @@ pub enum CostKind {
 impl CostKind {
     /// The kind of a problem's misfit.
     pub fn of(problem: &Problem) -> Self {
-        let readings = problem
-            .experiments
-            .iter()
-            .filter_map(|e| e.readings.as_ref());
-        let integral = |w: Weighting| matches!(w, Weighting::Integral { .. });
-        let kinds: Vec<bool> = readings.map(|r| integral(r.weighting())).collect();
+        let kinds: Vec<bool> = (problem.channels())
+            .map(|c| !c.weighting().is_sigma())
+            .collect();
         match (kinds.contains(&true), kinds.contains(&false)) {
             (true, true) => CostKind::Mixed,
             (false, true) => CostKind::ChiSquare,

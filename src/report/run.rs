@@ -209,17 +209,16 @@ impl Run<'_> {
     }
 
     fn experiment_summaries(&self) -> Vec<ExperimentSummary> {
-        let motions = &self.fit.best.evaluation.trajectories;
-        let pairs = self.model.problem.experiments.iter().zip(motions);
+        let predictions = &self.fit.best.evaluation.predictions;
+        let pairs = self.model.problem.experiments.iter().zip(predictions);
         pairs
-            .filter_map(|(experiment, motion)| {
-                let readings = experiment.readings.as_ref()?;
-                let count = readings.values().len();
-                let squares = readings.residuals(&motion.displacement).map(|r| r * r);
+            .filter_map(|(experiment, predictions)| {
+                let (channel, predicted) = experiment.channels.iter().zip(predictions).next()?;
+                let squares = channel.residuals(predicted).map(|r| r * r);
                 Some(ExperimentSummary {
                     name: experiment.name.clone(),
-                    readings: count,
-                    rms_residual: (squares.sum::<f64>() / count as f64).sqrt(),
+                    readings: channel.len(),
+                    rms_residual: (squares.sum::<f64>() / channel.len() as f64).sqrt(),
                 })
             })
             .collect()
@@ -276,10 +275,12 @@ impl Run<'_> {
             table = table
                 .column(name("y_m"), motion.displacement.clone())
                 .column(name("v_m_per_s"), motion.velocity.clone());
-            if let Some(readings) = &experiment.readings {
+            if let [channel] = experiment.channels.as_slice()
+                && let Some(stride) = channel.stride()
+            {
                 let mut observed = vec![f64::NAN; motion.displacement.len()];
-                for (i, value) in readings.values().iter().enumerate() {
-                    observed[i * readings.stride()] = *value;
+                for (i, value) in channel.observed().iter().enumerate() {
+                    observed[i * stride] = *value;
                 }
                 table = table.column(name("observed_y_m"), observed);
             }
@@ -298,16 +299,13 @@ impl Run<'_> {
         let problem = &self.model.problem;
         let several = problem.experiments.len() > 1;
         for (i, experiment) in problem.experiments.iter().enumerate() {
-            let Some(readings) = &experiment.readings else {
+            let Some(channel) = experiment.channels.first() else {
                 continue;
             };
-            let times: Vec<f64> = (0..readings.values().len())
-                .map(|j| problem.oscillator.grid.time(j * readings.stride()))
-                .collect();
-            let channel = ("displacement y", "m", times.as_slice(), readings.values());
+            let times = channel.times();
             for mut figure in [
-                figures::observation(&[channel]),
-                self.motion(i, &times, readings.values()),
+                figures::observation(&[("displacement y", "m", times, channel.observed())]),
+                self.motion(i, times, channel.observed()),
             ] {
                 if several {
                     figure.name = format!("{}-{}", figure.name, i + 1);

@@ -5,16 +5,13 @@
 //! of a wrong period; noise biases it, which the fit that follows removes.
 
 use super::gauss_newton::{add_penalties, add_variations};
+use super::kinematics::Kinematics;
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
+use crate::dynamics::Stepwise;
 use crate::dynamics::quadrature::trapezoid_weights;
-use crate::objective::{Readings, Weighting};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 
-/// Rounds of the search for the smoothing weight: each halves its decimal exponent's interval.
-const ROUNDS: u32 = 14;
-/// Decimal exponents of the smoothing weight between no smoothing and a parabola.
-const EXPONENTS: [f64; 2] = [-12.0, 16.0];
 /// A pull towards the start, relative to the equation's own weight: it decides what the equation
 /// leaves open and nothing else.
 const PULL: f64 = 1e-9;
@@ -22,31 +19,26 @@ const PULL: f64 = 1e-9;
 /// A clipped solution is used if it keeps this share of the plain one's decrease: the fit that
 /// follows needs a start, not an optimum.
 const KEPT: f64 = 0.999;
-/// Readings whose noise is below this share of their size are taken as they are.
-const NOISELESS: f64 = 1e-6;
-
-/// Displacement, velocity and acceleration at the readings but the two at each end.
-struct Kinematics {
-    first: usize,
-    y: Vec<f64>,
-    v: Vec<f64>,
-    a: Vec<f64>,
-}
-
 /// Parameters from the equation error, under the problem's penalties and constraints.
 ///
 /// # Errors
 /// How the convex problem ended, if not with a solution.
 pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, ConicStatus> {
-    let mut sub = Subproblem::new(problem.functions.parameters());
-    for experiment in &problem.experiments {
-        add_experiment(problem, experiment, start, &mut sub);
+    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+        .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
+        .collect();
+    let start = &with_initial_states(problem, start, &motions);
+    let mut sub = Subproblem::new(problem.parameters());
+    for (experiment, motion) in problem.experiments.iter().zip(&motions) {
+        if let Some(motion) = motion {
+            add_experiment(problem, experiment, motion, start, &mut sub);
+        }
     }
     add_penalties(problem, start, &mut sub);
     add_variations(problem, start, &mut sub);
     let held = with_scale_held(problem, start);
     sub.constrain(&held, start);
-    let sizes: Vec<f64> = (problem.functions.device(start).functions())
+    let sizes: Vec<f64> = (problem.functions.values(start).iter())
         .map(|f| {
             f.iter()
                 .fold(0.0f64, |m, p| m.max(p.abs()))
@@ -122,9 +114,11 @@ fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
 fn equation_fixes_scale(problem: &Problem) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|v| *v != 0.0);
     let fixed = problem.functions.iter().any(|f| nonzero(&f.offset));
-    let measured = problem.experiments.iter().filter(|e| e.readings.is_some());
-    let mut forces = measured.filter_map(|e| e.force.as_deref());
-    fixed || forces.any(nonzero)
+    let mut measured = problem
+        .experiments
+        .iter()
+        .filter(|e| !e.channels.is_empty());
+    fixed || measured.any(|e| !e.is_free())
 }
 
 /// Whether some equality tells `theta` from `s theta`: `a theta = b` does unless `b` is zero. An
@@ -140,32 +134,40 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     })
 }
 
-fn add_experiment(problem: &Problem, experiment: &Experiment, start: &[f64], sub: &mut Subproblem) {
-    let Some(readings) = &experiment.readings else {
-        return;
-    };
-    let spacing = problem.oscillator.grid.step() * readings.stride() as f64;
-    let Some(motion) = kinematics(readings, spacing) else {
-        return;
-    };
-    let device = problem.functions.device(start);
+fn add_experiment(
+    problem: &Problem,
+    experiment: &Experiment,
+    motion: &Kinematics,
+    start: &[f64],
+    sub: &mut Subproblem,
+) {
+    let assembly = problem.functions.assembly(experiment.device);
+    let mut device = problem.functions.empty_device();
+    problem
+        .functions
+        .device_into(start, experiment.device, &mut device);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let force_scale = (size(&device.mass) * size(&motion.a))
         .max(size(&device.coefficients[1]) * size(&motion.y))
-        / size(&motion.y).max(f64::MIN_POSITIVE);
-    for i in 0..motion.y.len() {
-        let node = (motion.first + i) * readings.stride();
-        let weight = readings.weight(motion.first + i).sqrt() / force_scale;
-        let force = experiment.force.as_ref().map_or(0.0, |f| f[node]);
+        / motion.size.max(f64::MIN_POSITIVE);
+    let force = experiment
+        .excitation
+        .as_ref()
+        .and_then(|e| e.force.as_ref());
+    let base = experiment.excitation.as_ref().and_then(|e| e.base.as_ref());
+    let [force, base] = [force, base].map(|part| part.map(Stepwise::at_nodes));
+    for (i, &node) in motion.nodes.iter().enumerate() {
+        let weight = motion.weight.sqrt() / force_scale;
+        let force = force.as_ref().map_or(0.0, |f| f[node]);
+        let base = base.as_ref().map_or(0.0, |b| b[node]);
         let terms = problem.oscillator.terms.iter();
-        let responses = std::iter::once(motion.a[i])
+        let responses = std::iter::once(motion.a[i] + base)
             .chain(terms.map(|term| term.phi(motion.y[i], motion.v[i])));
         let mut entries = Vec::new();
         let mut error = -force;
-        let parts = problem.functions.iter().zip(problem.functions.ranges());
-        for (((function, range), values), response) in parts.zip(device.functions()).zip(responses)
-        {
+        for ((&f, values), response) in assembly.iter().zip(device.functions()).zip(responses) {
             error += values[node] * response;
+            let (function, range) = (problem.functions.get(f), &problem.functions.ranges()[f]);
             let row = function.design.row(node);
             entries.extend(row.map(|(j, b)| (range.start + j, weight * b * response)));
         }
@@ -173,75 +175,24 @@ fn add_experiment(problem: &Problem, experiment: &Experiment, start: &[f64], sub
     }
 }
 
-/// Smoothed readings and their derivatives by differences of order 4; `None` for too few readings.
-fn kinematics(readings: &Readings, spacing: f64) -> Option<Kinematics> {
-    let y = smoothed(readings)?;
-    let h = spacing;
-    let each = |f: &dyn Fn(&[f64]) -> f64| y.windows(5).map(f).collect::<Vec<f64>>();
-    Some(Kinematics {
-        first: 2,
-        v: each(&|w| (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / (12.0 * h)),
-        a: each(&|w| (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h)),
-        y: each(&|w| w[2]),
-    })
-}
-
-/// The smoothest curve (third differences) whose distance from the readings is their noise.
-fn smoothed(readings: &Readings) -> Option<Vec<f64>> {
-    let observed = readings.values();
-    if observed.len() < 8 {
-        return None;
-    }
-    let noise = match readings.weighting() {
-        Weighting::Sigma(sigma) => sigma,
-        Weighting::Integral { .. } => noise_level(observed),
-    };
-    let size = observed.iter().map(|y| y * y).sum::<f64>() / observed.len() as f64;
-    if noise <= NOISELESS * size.sqrt() {
-        return Some(observed.to_vec());
-    }
-    let [mut low, mut high] = EXPONENTS;
-    let mut best = observed.to_vec();
-    for _ in 0..ROUNDS {
-        let middle = 0.5 * (low + high);
-        let candidate = smooth(observed, 10f64.powf(middle))?;
-        let pairs = candidate.iter().zip(observed);
-        let mean_square =
-            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / observed.len() as f64;
-        if mean_square.sqrt() <= noise {
-            (low, best) = (middle, candidate);
-        } else {
-            high = middle;
+/// `start` with the initial states that are sought taken from the motions, where these begin.
+fn with_initial_states(
+    problem: &Problem,
+    start: &[f64],
+    motions: &[Option<Kinematics>],
+) -> Vec<f64> {
+    let mut theta = start.to_vec();
+    let first = problem.functions.scalar_range().start;
+    for (experiment, motion) in problem.experiments.iter().zip(motions) {
+        let Some(state) = motion.as_ref().and_then(|m| m.initial) else {
+            continue;
+        };
+        let values = [state.displacement, state.velocity];
+        for (index, value) in experiment.sought.into_iter().zip(values) {
+            if let Some(index) = index {
+                theta[first + index] = value;
+            }
         }
     }
-    Some(best)
-}
-
-/// Standard deviation of the noise from fourth differences, which a smooth motion hardly has: their
-/// variance is 70 times that of white noise.
-fn noise_level(observed: &[f64]) -> f64 {
-    let fourth = observed
-        .windows(5)
-        .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
-    let squares: f64 = fourth.map(|d| d * d).sum();
-    (squares / (70.0 * (observed.len() - 4) as f64)).sqrt()
-}
-
-/// Minimises `|y - observed|^2 + weight |third differences of y|^2`.
-fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
-    let mut sub = Subproblem::new(observed.len());
-    for (i, y) in observed.iter().enumerate() {
-        sub.residuals.push([(i, 1.0)], *y);
-    }
-    let root = weight.sqrt();
-    for i in 0..observed.len() - 3 {
-        let row = [
-            (i, -root),
-            (i + 1, 3.0 * root),
-            (i + 2, -3.0 * root),
-            (i + 3, root),
-        ];
-        sub.residuals.push(row, 0.0);
-    }
-    sub.solve_plain()
+    theta
 }

@@ -7,6 +7,7 @@ mod equation_error;
 mod executor;
 mod gauss_newton;
 mod infeasible;
+mod kinematics;
 mod ladder;
 mod lbfgs;
 mod line_search;

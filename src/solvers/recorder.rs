@@ -80,7 +80,11 @@ impl Recorder {
                 self.initial_norm_squared,
             ),
             step,
-            relative_change: problem.relative_change(&before.evaluation, &after.evaluation.device),
+            relative_change: problem.relative_change(
+                &before.evaluation,
+                &before.parameters,
+                &after.parameters,
+            ),
         });
         self.keep_snapshot(iteration, after);
     }

@@ -4,7 +4,6 @@ use super::executor::search;
 use super::gauss_newton::linearise_at;
 use super::{Counts, Fit, FitSettings, Row, Rung, Status, fit};
 use crate::dynamics::Breakdown;
-use crate::objective::Weighting;
 use crate::problem::Problem;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -100,16 +99,9 @@ impl Problem {
     /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
     /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
-        let mut readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
-        let known = readings.all(|r| matches!(r.weighting(), Weighting::Sigma(_)));
+        let known = self.channels().all(|c| c.weighting().is_sigma());
         let n = self.reading_count() as f64;
         known.then(|| n + 2.0 * (2.0 * n).sqrt())
-    }
-
-    /// Number of readings of all experiments.
-    pub fn reading_count(&self) -> usize {
-        let readings = self.experiments.iter().filter_map(|e| e.readings.as_ref());
-        readings.map(|r| r.values().len()).sum()
     }
 }
 

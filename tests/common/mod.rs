@@ -6,7 +6,7 @@ pub mod reference;
 
 use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit::objective::{Readings, Weighting};
+use kmcfit::objective::{Channel, Weighting};
 use kmcfit::problem::{Experiment, Problem};
 
 pub const DURATION: f64 = 25.0;
@@ -49,12 +49,8 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .map(|(q, value)| CoefficientFunction::nodal(q, vec![value; nodes]))
         .collect();
     let weighting = Weighting::Integral { spacing: step };
-    let experiment = Experiment {
-        name: "free decay".into(),
-        initial: INITIAL,
-        force: None,
-        readings: Some(Readings::new(observed, 1, weighting)),
-    };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Functions::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }
@@ -107,12 +103,8 @@ pub fn problem_of(
         Some(sigma) => Weighting::Sigma(sigma),
         None => Weighting::Integral { spacing: step },
     };
-    let experiment = Experiment {
-        name: "free decay".into(),
-        initial: INITIAL,
-        force: None,
-        readings: Some(Readings::new(observed, 1, weighting)),
-    };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Functions::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }

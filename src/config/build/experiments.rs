@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::dynamics::{Grid, State};
 use crate::error::InputError;
-use crate::objective::{Readings, Weighting};
+use crate::objective::{Channel, Weighting};
 use crate::observations::{Table, equally_spaced, resample};
 use crate::problem::Experiment;
 
@@ -147,18 +147,15 @@ pub(super) fn build(
                 (Purpose::Simulate { .. }, _) | (_, None) => None,
                 (_, Some(record)) => Some(place(file, purpose, grid, record, weighting)?),
             };
-            Ok(Experiment {
-                name: spec
-                    .name
-                    .as_ref()
-                    .map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone()),
-                initial: State {
-                    displacement: spec.initial.displacement.0,
-                    velocity: spec.initial.velocity.0,
-                },
-                force: None,
-                readings,
-            })
+            let name = (spec.name.as_ref())
+                .map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone());
+            let initial = State {
+                displacement: spec.initial.displacement.0,
+                velocity: spec.initial.velocity.0,
+            };
+            let mut experiment = Experiment::free(name, initial, grid.nodes());
+            experiment.channels.extend(readings);
+            Ok(experiment)
         })
         .collect()
 }
@@ -183,7 +180,7 @@ fn place(
     grid: &Grid,
     record: Record,
     sigma: Option<f64>,
-) -> Result<Readings, InputError> {
+) -> Result<Channel, InputError> {
     let (steps, intervals) = (grid.nodes() - 1, record.values.len() - 1);
     let (values, stride) = if steps.is_multiple_of(intervals) {
         (record.values, steps / intervals)
@@ -208,5 +205,7 @@ fn place(
         Some(sigma) => Weighting::Sigma(sigma),
         None => Weighting::Integral { spacing },
     };
-    Ok(Readings::new(values, stride, weighting))
+    Ok(Channel::displacement_at_nodes(
+        values, stride, weighting, grid,
+    ))
 }

@@ -102,7 +102,7 @@ fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputEr
     match file.spec.fit.as_ref().and_then(|f| f.gradient) {
         Some(Gradient::Discrete) | None => Ok(GradientKind::Discrete),
         Some(Gradient::Continuous) => {
-            let has_readings = problem.experiments.iter().any(|e| e.readings.is_some());
+            let has_readings = problem.experiments.iter().any(|e| !e.channels.is_empty());
             if has_readings && !problem.supports_continuous() {
                 return Err(file
                     .error_at(

@@ -6,7 +6,7 @@
 //! show the difference; [`super::discrete`] has no floor.
 
 use crate::dynamics::quadrature::{curvature, midpoint, slope};
-use crate::dynamics::{Device, Oscillator, Trajectory};
+use crate::dynamics::{Device, DeviceTangent, Excitation, Oscillator, State, Trajectory};
 
 /// Gradient of `J = integral (y - y_obs)^2 dt` with respect to all functions, in the L2 inner
 /// product: functions of time at the nodes, not multiplied by quadrature weights.
@@ -14,17 +14,31 @@ use crate::dynamics::{Device, Oscillator, Trajectory};
 /// Integrates, backward from `z = z' = 0` at the end,
 /// `m z'' + (2 m' - C) z' + (m'' - C' + K) z = 2 (y - y_obs)` with `C = sum_j p_j dphi_j/dv` and
 /// `K = sum_j p_j dphi_j/dy` along the motion (for the paper's terms `C = c`, `K = k`), and returns
-/// `-z y''` for the mass and `-z phi_j` for term `j`. Derivatives are taken by differences, `y''`
-/// too. The stepper is the explicit midpoint rule whatever the forward solve uses, in the order of
-/// operations of the paper's run.
+/// `-z (y'' + b'')` for the mass and `-z phi_j` for term `j`. Derivatives are taken by differences,
+/// `y''` too. The stepper is the explicit midpoint rule whatever the forward solve uses, in the order
+/// of operations of the paper's run.
+///
+/// The gradient with respect to the initial state are numbers: `dJ/dv(0) = m z` and
+/// `dJ/dy(0) = C z - (m z)'` at the beginning.
+///
+/// # Panics
+/// If the motion ends before the grid does.
 pub fn gradient(
     oscillator: &Oscillator,
     device: &Device,
+    excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
-) -> Device {
-    let z = adjoint_motion(oscillator, device, trajectory, observed);
-    let acceleration = curvature(&trajectory.displacement, oscillator.grid.step());
+) -> DeviceTangent {
+    let nodes = oscillator.grid.nodes();
+    assert_eq!(trajectory.nodes(), nodes, "a motion over the whole grid");
+    let dt = oscillator.grid.step();
+    let (z, first_slope) = adjoint_motion(oscillator, device, trajectory, observed);
+    let mut acceleration = curvature(&trajectory.displacement, dt);
+    if let Some(base) = excitation.and_then(|e| e.base.as_ref()) {
+        let base = base.at_nodes();
+        acceleration.iter_mut().zip(base).for_each(|(a, b)| *a += b);
+    }
     let against = |response: &dyn Fn(usize) -> f64| -> Vec<f64> {
         z.iter()
             .enumerate()
@@ -34,21 +48,29 @@ pub fn gradient(
     let phi = |i: usize, j: usize| {
         oscillator.terms[j].phi(trajectory.displacement[i], trajectory.velocity[i])
     };
-    Device {
-        mass: against(&|i| acceleration[i]),
-        coefficients: (0..oscillator.terms.len())
-            .map(|j| against(&|i| phi(i, j)))
-            .collect(),
+    let (c, _) = linearised_coefficients(oscillator, device, trajectory);
+    let momentum_slope = slope(&device.mass, dt)[0] * z[0] + device.mass[0] * first_slope;
+    DeviceTangent {
+        device: Device {
+            mass: against(&|i| acceleration[i]),
+            coefficients: (0..oscillator.terms.len())
+                .map(|j| against(&|i| phi(i, j)))
+                .collect(),
+        },
+        initial: State {
+            displacement: c[0] * z[0] - momentum_slope,
+            velocity: device.mass[0] * z[0],
+        },
     }
 }
 
-/// The adjoint displacement `z` at the nodes.
+/// The adjoint displacement `z` at the nodes, and `z'` at the first.
 fn adjoint_motion(
     oscillator: &Oscillator,
     device: &Device,
     trajectory: &Trajectory,
     observed: &[f64],
-) -> Vec<f64> {
+) -> (Vec<f64>, f64) {
     let dt = oscillator.grid.step();
     let (m, y) = (&device.mass, &trajectory.displacement);
     let (c, k) = linearised_coefficients(oscillator, device, trajectory);
@@ -74,7 +96,7 @@ fn adjoint_motion(
         w += l2w;
         out[j] = z;
     }
-    out
+    (out, w)
 }
 
 /// `(C, K)` at the nodes: what damping and stiffness the motion sees when it is disturbed.

@@ -2,26 +2,26 @@
 
 use crate::dynamics::stages::{Rhs, Stages};
 use crate::dynamics::tableau::{MIDPOINT, RK4, Tableau};
-use crate::dynamics::{Device, DeviceTangent, Method, Oscillator, State, Trajectory};
+use crate::dynamics::{Device, DeviceTangent, Excitation, Method, Oscillator, State, Trajectory};
 
 /// Gradient of a scalar cost of the motion with respect to the nodal values of all functions and
 /// to the initial state, in the Euclidean inner product of the nodal values.
 ///
 /// `source` holds the derivative of the cost with respect to displacement and velocity at every
-/// node; `trajectory` must be the motion of `device` under `force`. The result is the transpose of
+/// node; `trajectory` must be the motion of `device` under `excitation`. The result is the transpose of
 /// [`Oscillator::tangent`] applied to `source`, to rounding.
 ///
 /// Per stage, backwards, with `k̄` the multiplier of the stage's increment:
-/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā a/m` go to the
+/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 pub fn gradient(
     oscillator: &Oscillator,
     device: &Device,
-    force: Option<&[f64]>,
+    excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> DeviceTangent {
-    let rhs = oscillator.rhs(device, force);
+    let rhs = oscillator.rhs(device, excitation, trajectory.nodes());
     match oscillator.method {
         Method::Midpoint => sweep(&MIDPOINT, rhs, trajectory, source),
         Method::Rk4 => sweep(&RK4, rhs, trajectory, source),
@@ -35,7 +35,7 @@ fn sweep<const S: usize>(
     source: &Trajectory,
 ) -> DeviceTangent {
     let nodes = trajectory.displacement.len();
-    let mut gradient = Device::zeros(nodes, rhs.terms.len());
+    let mut gradient = Device::zeros(rhs.device.mass.len(), rhs.terms.len());
     let mut adjoint = State {
         displacement: source.displacement[nodes - 1],
         velocity: source.velocity[nodes - 1],
@@ -82,7 +82,8 @@ fn step_back<const S: usize>(
         before.velocity += v_bar[s];
 
         let push = -a_bar / slopes.mass;
-        position.spread(&mut gradient.mass, i, push * stages.a[s]);
+        let inertia = rhs.absolute(i, position, stages.a[s]);
+        position.spread(&mut gradient.mass, i, push * inertia);
         for (term, g) in rhs.terms.iter().zip(&mut gradient.coefficients) {
             position.spread(g, i, push * term.phi(y, v));
         }

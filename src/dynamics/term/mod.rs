@@ -1,6 +1,10 @@
 //! Force terms: each is a coefficient function times a response `phi(y, v)`; one file each.
 
+mod coulomb_friction;
+mod cubic_stiffness;
 mod damping;
+mod offset;
+mod quadratic_damping;
 mod stiffness;
 
 /// A force term `p(t) phi(y, v)` of the equation of motion.
@@ -10,7 +14,21 @@ pub enum Term {
     Damping,
     /// `k(t) y`, k in N/m.
     Stiffness,
+    /// `p(t) y^3`, p in N/m^3.
+    CubicStiffness,
+    /// `p(t) |v| v`, p in N s^2/m^2.
+    QuadraticDamping,
+    /// `p(t) v / sqrt(v^2 + width^2)`, p in N: a sign of `v` that is smooth over the width.
+    CoulombFriction {
+        /// Speed below which friction gives way, m/s; positive.
+        width: f64,
+    },
+    /// `p(t)`, in N: a constant push to the left.
+    Offset,
 }
+
+/// The most terms that an oscillator can have: one of each kind.
+pub const MOST_TERMS: usize = 6;
 
 impl Term {
     /// The response `phi(y, v)`.
@@ -19,6 +37,10 @@ impl Term {
         match self {
             Term::Damping => damping::phi(y, v),
             Term::Stiffness => stiffness::phi(y, v),
+            Term::CubicStiffness => cubic_stiffness::phi(y, v),
+            Term::QuadraticDamping => quadratic_damping::phi(y, v),
+            Term::CoulombFriction { width } => coulomb_friction::phi(y, v, width),
+            Term::Offset => offset::phi(y, v),
         }
     }
 
@@ -28,6 +50,15 @@ impl Term {
         match self {
             Term::Damping => damping::partials(y, v),
             Term::Stiffness => stiffness::partials(y, v),
+            Term::CubicStiffness => cubic_stiffness::partials(y, v),
+            Term::QuadraticDamping => quadratic_damping::partials(y, v),
+            Term::CoulombFriction { width } => coulomb_friction::partials(y, v, width),
+            Term::Offset => offset::partials(y, v),
         }
+    }
+
+    /// Whether the response is proportional to the motion.
+    pub fn is_linear(self) -> bool {
+        matches!(self, Term::Damping | Term::Stiffness)
     }
 }

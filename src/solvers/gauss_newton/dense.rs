@@ -1,16 +1,14 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
-use crate::dynamics::DeviceTangent;
-use crate::dynamics::State;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use nalgebra::{DMatrix, DVector};
 
 /// The subproblem in `delta theta`: `|R delta - b|^2` with the triangular factor `R` of the weighted
-/// Jacobian `sqrt(w) dy/dtheta`, and the rest of the residuals as a row of its own.
+/// Jacobian `sqrt(w) dz/dtheta`, and the rest of the residuals as a row of its own.
 pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    let n = problem.functions.parameters();
+    let n = problem.parameters();
     let (jacobian, residuals) = weighted_jacobian(problem, evaluation);
     let mut sub = Subproblem::new(n);
     let rows = jacobian.nrows();
@@ -32,45 +30,30 @@ pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
     sub
 }
 
-/// `sqrt(w) dy/dtheta` (readings x parameters) and `sqrt(w) r`.
+/// `sqrt(w) dz/dtheta` (readings x parameters) and `sqrt(w) r`, for the predictions `z` of all
+/// channels.
 fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> (DMatrix<f64>, DVector<f64>) {
-    let n = problem.functions.parameters();
-    let residuals: Vec<f64> = (problem.experiments.iter().zip(&evaluation.trajectories))
-        .filter_map(|(e, motion)| Some((e.readings.as_ref()?, motion)))
-        .flat_map(|(readings, motion)| {
-            let all = readings.residuals(&motion.displacement).enumerate();
-            all.map(|(i, r)| readings.weight(i).sqrt() * r)
-        })
-        .collect();
+    let n = problem.parameters();
+    let mut roots = Vec::with_capacity(problem.reading_count());
+    let mut residuals = Vec::with_capacity(problem.reading_count());
+    for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+            for (i, r) in channel.residuals(predicted).enumerate() {
+                let root = channel.weight(i, r).sqrt();
+                roots.push(root);
+                residuals.push(root * r);
+            }
+        }
+    }
     let mut jacobian = DMatrix::zeros(residuals.len(), n);
     let mut unit = vec![0.0; n];
     for j in 0..n {
         unit[j] = 1.0;
-        let direction = DeviceTangent {
-            device: problem.functions.direction(&unit),
-            initial: State {
-                displacement: 0.0,
-                velocity: 0.0,
-            },
-        };
+        let changes = problem.predictions_tangent(evaluation, &unit);
         unit[j] = 0.0;
-        let mut row = 0;
-        for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
-            let Some(readings) = &experiment.readings else {
-                continue;
-            };
-            let change = problem.oscillator.tangent(
-                &evaluation.device,
-                experiment.force.as_deref(),
-                motion,
-                &direction,
-            );
-            // The readings may end before the motion does.
-            let seen = change.displacement.iter().step_by(readings.stride());
-            for (i, dy) in seen.take(readings.values().len()).enumerate() {
-                jacobian[(row, j)] = readings.weight(i).sqrt() * dy;
-                row += 1;
-            }
+        let all = changes.iter().flatten().flatten();
+        for (row, (change, root)) in all.zip(&roots).enumerate() {
+            jacobian[(row, j)] = root * change;
         }
     }
     (jacobian, DVector::from_vec(residuals))

@@ -13,8 +13,7 @@ use super::infeasible::no_step;
 use super::point::Work;
 use super::{Descend, Point, Step};
 use crate::constraints;
-use crate::dynamics::{DeviceTangent, State};
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 
@@ -159,8 +158,7 @@ fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<S
 
 /// The largest change of a function that a proposal asks for, relative to the function's size.
 fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
-    let device = problem.functions.device(&proposal.parameters);
-    problem.relative_change(&point.evaluation, &device)
+    problem.relative_change(&point.evaluation, &point.parameters, &proposal.parameters)
 }
 
 /// The best step that the subproblem offers in the constraint set.
@@ -230,32 +228,32 @@ fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f6
     near + problem.regularisation(parameters) + linear_misfit(problem, &point.evaluation, &delta)
 }
 
-/// `sum w (r + J delta)^2` over all readings.
+/// The cost of the readings with every prediction replaced by its linearisation, and every loss by
+/// the squares that stand for it.
 fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
-    let direction = DeviceTangent {
-        device: problem.functions.direction(delta),
-        initial: State {
-            displacement: 0.0,
-            velocity: 0.0,
-        },
-    };
-    let motions = problem.experiments.iter().zip(&evaluation.trajectories);
-    let misfits = motions.filter_map(|(experiment, motion)| {
-        let readings = experiment.readings.as_ref()?;
-        let force = experiment.force.as_deref();
-        let tangent = problem
-            .oscillator
-            .tangent(&evaluation.device, force, motion, &direction);
-        let pairs = motion.displacement.iter().zip(&tangent.displacement);
-        let moved: Vec<f64> = pairs.map(|(y, dy)| y + dy).collect();
-        Some(readings.cost(&moved))
-    });
-    misfits.sum()
+    let changes = problem.predictions_tangent(evaluation, delta);
+    let mut misfit = robust_surplus(problem, evaluation);
+    let predictions = evaluation.predictions.iter().zip(&changes);
+    for (experiment, (predictions, changes)) in problem.experiments.iter().zip(predictions) {
+        let pairs = predictions.iter().zip(changes);
+        for (channel, (predicted, change)) in experiment.channels.iter().zip(pairs) {
+            if channel.loss() == Loss::Squares {
+                let moved: Vec<f64> = predicted.iter().zip(change).map(|(z, d)| z + d).collect();
+                misfit += channel.cost(&moved);
+            } else {
+                let residuals = channel.residuals(predicted).zip(change).enumerate();
+                misfit += residuals
+                    .map(|(i, (r, d))| channel.weight(i, r) * (r + d) * (r + d))
+                    .sum::<f64>();
+            }
+        }
+    }
+    misfit
 }
 
 /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
-    let parameters = work.problem().functions.parameters();
+    let parameters = work.problem().parameters();
     work.count_tangents(if parameters <= FEW_PARAMETERS {
         parameters as u64
     } else {
@@ -267,17 +265,46 @@ fn linearise(work: &mut Work, point: &Point) -> Subproblem {
 /// [`linearise`] without counting, and the number of residual rows that belong to the readings:
 /// they come first.
 pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usize) {
-    let mut sub = if problem.functions.parameters() <= FEW_PARAMETERS {
+    let mut sub = if problem.parameters() <= FEW_PARAMETERS {
         dense::subproblem(problem, &point.evaluation)
     } else {
         structured::subproblem(problem, &point.evaluation)
     };
     let readings = sub.residuals.len();
+    sub.constant = robust_surplus(problem, &point.evaluation);
     add_penalties(problem, &point.parameters, &mut sub);
     add_variations(problem, &point.parameters, &mut sub);
+    add_priors(problem, &point.parameters, &mut sub);
     add_soft(problem, &point.parameters, &mut sub);
     sub.constrain(&problem.constraints, &point.parameters);
     (sub, readings)
+}
+
+/// The cost of the readings less the weighted squares that stand for it: none for least squares.
+fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let mut surplus = 0.0;
+    for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+            if channel.loss() != Loss::Squares {
+                let residuals = channel.residuals(predicted).enumerate();
+                let squares: f64 = residuals.map(|(i, r)| channel.weight(i, r) * r * r).sum();
+                surplus += channel.cost(predicted) - squares;
+            }
+        }
+    }
+    surplus
+}
+
+/// `(x + delta - mean) / sigma` of the scalars' priors as residual rows.
+pub(super) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+    let functions = &problem.functions;
+    for (index, scalar) in functions.scalar_range().zip(functions.scalars()) {
+        if let Some(prior) = scalar.prior {
+            let row = [(index, 1.0 / prior.sigma)];
+            sub.residuals
+                .push(row, (prior.mean - parameters[index]) / prior.sigma);
+        }
+    }
 }
 
 /// `sqrt(weight) (L (theta + delta) - target)` as residual rows.

@@ -3,92 +3,174 @@
 
 use crate::constraints::Rows;
 use crate::dynamics::{StepJacobian, Trajectory};
-use crate::objective::Evaluation;
+use crate::objective::{Channel, Evaluation, View};
 use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
+use crate::signal::SecondOrder;
 
 /// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
-/// trajectory per experiment; the first state of each is given and no unknown.
+/// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
 ///
-/// Residuals: `sqrt(w) (r + delta y)` for the readings. Equalities: every step, linearised,
+/// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
 /// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
 /// vanish where the states are a motion.
 pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    let parameters = problem.functions.parameters();
-    let per_experiment = 2 * (problem.oscillator.grid.nodes() - 1);
-    let variables = parameters + per_experiment * problem.experiments.len();
-    let mut sub = Subproblem::new(variables);
-    let motions = problem.experiments.iter().zip(&evaluation.trajectories);
-    for (e, (experiment, states)) in motions.enumerate() {
-        let steps = problem.oscillator.step_jacobians(
-            &evaluation.device,
-            experiment.force.as_deref(),
-            states,
-        );
-        let base = parameters + e * per_experiment;
-        add_steps(problem, base, &steps, states, &mut sub.equalities);
-        add_readings(experiment, base, states, &mut sub.residuals);
+    let parameters = problem.parameters();
+    let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
+    let mut sub = Subproblem::new(parameters + states);
+    let mut base = parameters;
+    for e in 0..problem.experiments.len() {
+        let experiment = &problem.experiments[e];
+        let view = problem.view(evaluation, e);
+        let steps = problem
+            .oscillator
+            .step_jacobians(view.device, view.excitation, view.motion);
+        let columns = Columns {
+            problem,
+            experiment,
+            base,
+        };
+        columns.add_steps(&steps, view.motion, &mut sub.equalities);
+        for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
+            columns.add_readings(channel, predicted, view, &mut sub);
+        }
+        base += 2 * (experiment.nodes - 1);
     }
     sub
 }
 
-/// Index of the displacement at node `i >= 1`; the velocity is the next one.
-fn state_index(base: usize, i: usize) -> usize {
-    base + 2 * (i - 1)
+/// Where the unknowns of one experiment stand.
+struct Columns<'a> {
+    problem: &'a Problem,
+    experiment: &'a Experiment,
+    base: usize,
 }
 
-fn add_steps(
-    problem: &Problem,
-    base: usize,
-    steps: &[StepJacobian],
-    states: &Trajectory,
-    equalities: &mut Rows,
-) {
-    let mut entries = Vec::new();
-    for (i, step) in steps.iter().enumerate() {
-        let ends = [step.end.displacement, step.end.velocity];
-        let next = [states.displacement[i + 1], states.velocity[i + 1]];
-        for q in 0..2 {
-            entries.clear();
-            entries.push((state_index(base, i + 1) + q, 1.0));
-            if i > 0 {
+impl Columns<'_> {
+    /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
+    /// first state that is known.
+    fn state(&self, i: usize, q: usize) -> Option<usize> {
+        match i {
+            0 => Some(self.scalar(self.experiment.sought[q]?)),
+            _ => Some(self.base + 2 * (i - 1) + q),
+        }
+    }
+
+    fn scalar(&self, index: usize) -> usize {
+        self.problem.functions.scalar_range().start + index
+    }
+
+    fn add_steps(&self, steps: &[StepJacobian], states: &Trajectory, equalities: &mut Rows) {
+        let mut entries = Vec::new();
+        for (i, step) in steps.iter().enumerate() {
+            let ends = [step.end.displacement, step.end.velocity];
+            let next = [states.displacement[i + 1], states.velocity[i + 1]];
+            for q in 0..2 {
+                entries.clear();
+                entries.extend(self.state(i + 1, q).map(|j| (j, 1.0)));
                 for s in 0..2 {
-                    entries.push((state_index(base, i) + s, -step.state[s][q]));
+                    entries.extend(self.state(i, s).map(|j| (j, -step.state[s][q])));
+                }
+                self.add_function_slopes(
+                    i,
+                    &|f, side| -[&step.left, &step.right][side][f][q],
+                    &mut entries,
+                );
+                equalities.push(entries.iter().copied(), ends[q] - next[q]);
+            }
+        }
+    }
+
+    /// What the functions' values at both ends of step `i` do, by `slope(function, side)`.
+    fn add_function_slopes(
+        &self,
+        i: usize,
+        slope: &dyn Fn(usize, usize) -> f64,
+        entries: &mut Vec<(usize, f64)>,
+    ) {
+        let functions = &self.problem.functions;
+        for (place, &f) in functions
+            .assembly(self.experiment.device)
+            .iter()
+            .enumerate()
+        {
+            let (function, range) = (functions.get(f), &functions.ranges()[f]);
+            for side in 0..2 {
+                let slope = slope(place, side);
+                if slope != 0.0 {
+                    let add = |(j, b): (usize, f64)| entries.push((range.start + j, slope * b));
+                    function.design.row(i + side).for_each(add);
                 }
             }
-            add_functions(problem, i, step, q, &mut entries);
-            equalities.push(entries.iter().copied(), ends[q] - next[q]);
         }
     }
-}
 
-/// What the functions' values at both ends of step `i` do to component `q` of the next state.
-fn add_functions(
-    problem: &Problem,
-    i: usize,
-    step: &StepJacobian,
-    q: usize,
-    entries: &mut Vec<(usize, f64)>,
-) {
-    let parts = problem.functions.iter().zip(problem.functions.ranges());
-    for (f, (function, range)) in parts.enumerate() {
-        for (node, slope) in [(i, step.left[f][q]), (i + 1, step.right[f][q])] {
-            if slope != 0.0 {
-                let add = |(j, b): (usize, f64)| entries.push((range.start + j, -slope * b));
-                function.design.row(node).for_each(add);
+    fn add_readings(&self, channel: &Channel, predicted: &[f64], view: View, sub: &mut Subproblem) {
+        let [gain, ..] = channel.sensor().values(view.scalars);
+        let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(channel.len());
+        for (i, place) in channel.places().iter().enumerate() {
+            let sensed = channel.sensed(view, i);
+            let mut entries = Vec::new();
+            for (j, slope) in sensed.states.iter().enumerate() {
+                if *slope != 0.0 {
+                    let index = self.state(place.step + j / 2, j % 2);
+                    entries.extend(index.map(|index| (index, gain * slope)));
+                }
+            }
+            let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
+            self.add_function_slopes(place.step, &slope, &mut entries);
+            let factors = [sensed.value, 1.0, channel.age(i)];
+            for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
+                entries.extend(index.map(|index| (self.scalar(index), factor)));
+            }
+            rows.push(entries);
+        }
+        let residuals = channel.residuals(predicted).enumerate();
+        if channel.filter().is_empty() {
+            for ((i, r), row) in residuals.zip(rows) {
+                let root = channel.weight(i, r).sqrt();
+                let row = row.into_iter().map(|(j, a)| (j, root * a));
+                sub.residuals.push(row, -root * r);
+            }
+        } else {
+            let filtered = add_filter(channel.filter(), rows, sub);
+            for ((i, r), index) in residuals.zip(filtered) {
+                let root = channel.weight(i, r).sqrt();
+                sub.residuals.push([(index, root)], -root * r);
             }
         }
     }
 }
 
-fn add_readings(experiment: &Experiment, base: usize, states: &Trajectory, residuals: &mut Rows) {
-    let Some(readings) = &experiment.readings else {
-        return;
-    };
-    let all = readings.residuals(&states.displacement).enumerate();
-    for (i, r) in all.filter(|(i, _)| *i > 0) {
-        let root = readings.weight(i).sqrt();
-        let y = state_index(base, i * readings.stride());
-        residuals.push([(y, root)], -root * r);
+/// Adds the filtered changes of the predictions as unknowns: every section is a recurrence, run
+/// forward over the record for all sections and then backward, from rest. Returns the index of each
+/// filtered prediction.
+fn add_filter(
+    filter: &[SecondOrder],
+    rows: Vec<Vec<(usize, f64)>>,
+    sub: &mut Subproblem,
+) -> Vec<usize> {
+    let mut signal = rows;
+    let mut indices = Vec::new();
+    for backward in [false, true] {
+        if backward {
+            signal.reverse();
+        }
+        for section in filter {
+            indices = sub.add_variables(signal.len());
+            for i in 0..signal.len() {
+                let mut entries = vec![(indices[i], 1.0)];
+                for (lag, b) in section.b.iter().enumerate().filter(|(lag, _)| *lag <= i) {
+                    entries.extend(signal[i - lag].iter().map(|(j, a)| (*j, -b * a)));
+                }
+                for (lag, a) in section.a.iter().enumerate().filter(|(lag, _)| *lag < i) {
+                    entries.push((indices[i - lag - 1], *a));
+                }
+                sub.equalities.push(entries, 0.0);
+            }
+            signal = indices.iter().map(|j| vec![(*j, 1.0)]).collect();
+        }
     }
+    indices.reverse();
+    indices
 }

@@ -36,7 +36,7 @@ pub(super) fn says_nothing(
         },
         _ => return None,
     };
-    let forced = problem.experiments.iter().any(|e| e.force.is_some());
+    let forced = problem.experiments.iter().any(|e| !e.is_free());
     let held = problem.functions.iter().any(holds_scale);
     let smoothed = problem.penalties.iter().any(|p| p.weight > 0.0)
         || problem.variations.iter().any(|v| v.weight > 0.0);

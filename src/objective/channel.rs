@@ -1,0 +1,504 @@
+//! One channel of a record: readings at times of their own, and what the model says of them.
+
+use super::{Loss, Sensor, Weighting};
+use crate::dynamics::quadrature::trapezoid_weights_at;
+use crate::dynamics::{
+    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
+};
+use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
+
+/// The readings of one sensor.
+///
+/// The model of reading `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
+/// displacement, velocity or acceleration of the motion ([`Oscillator::sense`]), `b_i` the same of the
+/// base where the sensor does not move with it, and `t_0` the time of the first reading. With a
+/// filter, model and readings are filtered alike before they are compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    kind: ChannelKind,
+    times: Vec<f64>,
+    places: Vec<Place>,
+    observed: Vec<f64>,
+    weighting: Weighting,
+    loss: Loss,
+    sensor: Sensor,
+    around: Vec<Surroundings>,
+    base: Vec<f64>,
+    filter: Vec<SecondOrder>,
+}
+
+/// The motion that a channel looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// Grid, stepper and terms.
+    pub oscillator: &'a Oscillator,
+    /// The device that moves.
+    pub device: &'a Device,
+    /// What drives it.
+    pub excitation: Option<&'a Excitation>,
+    /// Its motion.
+    pub motion: &'a Trajectory,
+    /// Values of all scalars.
+    pub scalars: &'a [f64],
+}
+
+/// How a view changes along a direction.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewTangent<'a> {
+    /// Change of the device.
+    pub device: &'a Device,
+    /// Change of the motion.
+    pub motion: &'a Trajectory,
+    /// Change of the scalars.
+    pub scalars: &'a [f64],
+}
+
+impl Channel {
+    /// Readings `values` (in the SI unit of `kind`) at `times` (s, increasing), a motion over the
+    /// first `nodes` nodes of `grid`; `None` unless there is a reading, one time for each, and all
+    /// times are within the motion.
+    pub fn new(
+        kind: ChannelKind,
+        times: Vec<f64>,
+        values: Vec<f64>,
+        weighting: Weighting,
+        grid: &Grid,
+        nodes: usize,
+    ) -> Option<Self> {
+        let place = |t: &f64| {
+            let place = Place::of(grid, *t)?;
+            match place.as_node() {
+                Some(node) => (node < nodes).then(|| Place::node(node, nodes)),
+                None => (place.step + 1 < nodes).then_some(place),
+            }
+        };
+        let places: Option<Vec<Place>> = times.iter().map(place).collect();
+        let fits = times.len() == values.len() && !values.is_empty();
+        fits.then_some(Self {
+            kind,
+            places: places?,
+            times,
+            observed: values,
+            weighting,
+            loss: Loss::Squares,
+            sensor: Sensor::default(),
+            around: Vec::new(),
+            base: Vec::new(),
+            filter: Vec::new(),
+        })
+    }
+
+    /// Displacements `values` (m) at the nodes `0, stride, 2 stride, ...` of `grid`.
+    ///
+    /// # Panics
+    /// If `stride` is zero, there are no values, or they do not fit on the grid.
+    pub fn displacement_at_nodes(
+        values: Vec<f64>,
+        stride: usize,
+        weighting: Weighting,
+        grid: &Grid,
+    ) -> Self {
+        let times = (0..values.len()).map(|i| grid.time(i * stride)).collect();
+        let kind = ChannelKind::Displacement;
+        let channel = Self::new(kind, times, values, weighting, grid, grid.nodes());
+        let channel = channel.expect("readings on the nodes of the grid");
+        assert!(stride > 0, "readings advance");
+        channel
+    }
+
+    /// With what a residual costs; only readings with a sigma can have another loss than squares.
+    ///
+    /// # Panics
+    /// If a robust loss meets readings without a sigma.
+    #[must_use]
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        assert!(
+            loss == Loss::Squares || self.weighting.is_sigma(),
+            "a robust loss needs a sigma"
+        );
+        self.loss = loss;
+        self
+    }
+
+    /// With gain, offset and drift.
+    #[must_use]
+    pub fn with_sensor(mut self, sensor: Sensor) -> Self {
+        self.sensor = sensor;
+        self
+    }
+
+    /// With force and acceleration of the base at the times of the readings, which an acceleration
+    /// depends on; without them both are taken as linear over each step.
+    ///
+    /// # Panics
+    /// If there is not one for each reading.
+    #[must_use]
+    pub fn with_surroundings(mut self, around: Vec<Surroundings>) -> Self {
+        assert_eq!(around.len(), self.times.len(), "one for each reading");
+        self.around = around;
+        self
+    }
+
+    /// With the motion of the base (of the channel's kind) added to the relative one: a sensor on
+    /// the mass that does not move with the base.
+    ///
+    /// # Panics
+    /// If there is not one for each reading.
+    #[must_use]
+    pub fn with_base(mut self, base: Vec<f64>) -> Self {
+        assert_eq!(base.len(), self.times.len(), "one for each reading");
+        self.base = base;
+        self
+    }
+
+    /// With a zero-phase filter for readings and model; the readings given so far are filtered.
+    #[must_use]
+    pub fn with_filter(mut self, filter: Vec<SecondOrder>) -> Self {
+        self.observed = zero_phase(&filter, &self.observed);
+        self.filter = filter;
+        self
+    }
+
+    /// With the weighting exchanged.
+    #[must_use]
+    pub fn with_weighting(mut self, weighting: Weighting) -> Self {
+        self.weighting = weighting;
+        self
+    }
+
+    /// The first `count` readings, at least one.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Self {
+        let mut part = self.clone();
+        let count = count.max(1);
+        part.times.truncate(count);
+        part.places.truncate(count);
+        part.observed.truncate(count);
+        part.around.truncate(count);
+        part.base.truncate(count);
+        part.weighting.truncate(count);
+        part
+    }
+
+    /// The same readings on another grid over the same time; `None` if they are not all on it.
+    pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
+        let unfiltered = Self::new(
+            self.kind,
+            self.times.clone(),
+            self.observed.clone(),
+            self.weighting.clone(),
+            grid,
+            nodes,
+        )?;
+        Some(Self {
+            places: unfiltered.places,
+            ..self.clone()
+        })
+    }
+
+    /// What is measured.
+    pub fn kind(&self) -> ChannelKind {
+        self.kind
+    }
+
+    /// Times of the readings, s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Where they are on the grid.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// The readings, filtered if the channel has a filter, in the SI unit of the kind.
+    pub fn observed(&self) -> &[f64] {
+        &self.observed
+    }
+
+    /// Number of readings; at least one.
+    pub fn len(&self) -> usize {
+        self.observed.len()
+    }
+
+    /// Never: a channel has a reading.
+    pub fn is_empty(&self) -> bool {
+        self.observed.is_empty()
+    }
+
+    /// How residuals are weighed.
+    pub fn weighting(&self) -> &Weighting {
+        &self.weighting
+    }
+
+    /// What a residual costs.
+    pub fn loss(&self) -> Loss {
+        self.loss
+    }
+
+    /// Gain, offset and drift.
+    pub fn sensor(&self) -> Sensor {
+        self.sensor
+    }
+
+    /// The filter's sections; none for no filter.
+    pub fn filter(&self) -> &[SecondOrder] {
+        &self.filter
+    }
+
+    /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
+    /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
+    pub fn stride(&self) -> Option<usize> {
+        let plain = self.kind == ChannelKind::Displacement
+            && self.sensor == Sensor::default()
+            && self.base.is_empty()
+            && self.filter.is_empty();
+        if !plain || self.places[0].as_node() != Some(0) {
+            return None;
+        }
+        let stride = match self.places.get(1) {
+            Some(place) => place.as_node()?,
+            None => 1,
+        };
+        let in_place = |(i, place): (usize, &Place)| place.as_node() == Some(i * stride);
+        (self.places.iter().enumerate().all(in_place)).then_some(stride)
+    }
+
+    /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
+    pub fn sensed(&self, view: View, i: usize) -> Sensed {
+        let mut sensed = view.oscillator.sense(
+            self.kind,
+            view.device,
+            view.excitation,
+            view.motion,
+            self.places[i],
+            self.around_reading(view.excitation, i),
+        );
+        if let Some(base) = self.base.get(i) {
+            sensed.value += base;
+        }
+        sensed
+    }
+
+    /// Force and base at reading `i`: as given, or else linear over the step.
+    fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
+        match (self.around.get(i), excitation) {
+            (Some(around), _) => *around,
+            (None, Some(excitation)) => excitation.around(self.places[i]),
+            (None, None) => Surroundings::default(),
+        }
+    }
+
+    /// The value alone of [`Channel::sensed`].
+    fn seen(&self, view: View, i: usize) -> f64 {
+        match (self.kind, self.places[i].as_node(), self.base.is_empty()) {
+            (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
+            _ => self.sensed(view, i).value,
+        }
+    }
+
+    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
+    /// with the base.
+    pub fn base_at(&self, i: usize) -> f64 {
+        self.base.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Time since the first reading, s.
+    pub fn age(&self, i: usize) -> f64 {
+        self.times[i] - self.times[0]
+    }
+
+    /// What the model says of the readings.
+    pub fn predict(&self, view: View) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.len());
+        self.predict_into(view, &mut out);
+        out
+    }
+
+    /// [`Channel::predict`] into storage that is used again.
+    pub fn predict_into(&self, view: View, out: &mut Vec<f64>) {
+        out.clear();
+        if self.sensor == Sensor::default() {
+            out.extend((0..self.len()).map(|i| self.seen(view, i)));
+        } else {
+            let [gain, offset, drift] = self.sensor.values(view.scalars);
+            let model = |i: usize| gain * self.seen(view, i) + offset + drift * self.age(i);
+            out.extend((0..self.len()).map(model));
+        }
+        if !self.filter.is_empty() {
+            *out = zero_phase(&self.filter, out);
+        }
+    }
+
+    /// The change of [`Channel::predict`] along a direction.
+    pub fn predict_tangent(&self, view: View, along: ViewTangent) -> Vec<f64> {
+        let [gain, ..] = self.sensor.values(view.scalars);
+        let [by_gain, by_offset, by_drift] = self.sensor.changes(along.scalars);
+        let model = |i: usize| {
+            let sensed = self.sensed(view, i);
+            let Place { step, .. } = self.places[i];
+            let mut change = gain * answer(&sensed, step, along);
+            if by_gain != 0.0 {
+                change += by_gain * sensed.value;
+            }
+            change + by_offset + by_drift * self.age(i)
+        };
+        let out: Vec<f64> = (0..self.len()).map(model).collect();
+        match self.filter.is_empty() {
+            true => out,
+            false => zero_phase(&self.filter, &out),
+        }
+    }
+
+    /// Transpose of [`Channel::predict_tangent`]: takes derivatives of a cost with respect to the
+    /// predictions to `source` (with respect to the states), `direct` (with respect to the functions,
+    /// at fixed states) and `scalars`, adding to each.
+    pub fn add_transpose(
+        &self,
+        view: View,
+        slopes: &[f64],
+        source: &mut Trajectory,
+        direct: &mut Device,
+        scalars: &mut [f64],
+    ) {
+        let filtered;
+        let slopes = match self.filter.is_empty() {
+            true => slopes,
+            false => {
+                filtered = zero_phase_transpose(&self.filter, slopes);
+                &filtered
+            }
+        };
+        let [gain, ..] = self.sensor.values(view.scalars);
+        let indices = self.sensor.indices();
+        let simple = self.kind == ChannelKind::Displacement && indices == [None; 3];
+        for (i, slope) in slopes.iter().enumerate() {
+            let place = self.places[i];
+            if let (true, Some(node)) = (simple, place.as_node()) {
+                source.displacement[node] += gain * slope;
+                continue;
+            }
+            let sensed = self.sensed(view, i);
+            spread(&sensed, place.step, gain * slope, source, direct);
+            let factors = [sensed.value, 1.0, self.age(i)];
+            for (index, factor) in indices.iter().zip(factors) {
+                if let Some(index) = index {
+                    scalars[*index] += slope * factor;
+                }
+            }
+        }
+    }
+
+    /// Whether the predictions depend on the functions also at fixed states.
+    pub fn sees_functions(&self) -> bool {
+        match self.kind {
+            ChannelKind::Displacement => false,
+            ChannelKind::Velocity => self.places.iter().any(|p| p.as_node().is_none()),
+            ChannelKind::Acceleration => true,
+        }
+    }
+
+    /// Residuals `r = model - reading`, one per reading.
+    pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        predicted.iter().zip(&self.observed).map(|(y, o)| y - o)
+    }
+
+    /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or
+    /// `sum rho(r / sigma)`.
+    ///
+    /// The equally spaced integral sums in the paper's order, both ends first: its run depends on
+    /// every bit.
+    pub fn cost(&self, predicted: &[f64]) -> f64 {
+        if let Weighting::Integral { spacing } = self.weighting {
+            let square = |i: usize| {
+                let r = predicted[i] - self.observed[i];
+                r * r
+            };
+            let last = self.len() - 1;
+            let ends = spacing * 0.5 * (square(0) + square(last));
+            return (1..last).fold(ends, |sum, i| sum + spacing * 0.5 * (2.0 * square(i)));
+        }
+        let terms = self.residuals(predicted).enumerate();
+        terms
+            .map(|(i, r)| match self.weighting.sigma(i) {
+                Some(sigma) => self.loss.cost(r / sigma),
+                None => self.weighting.weight(i, self.len()) * r * r,
+            })
+            .sum()
+    }
+
+    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
+    /// the difference of two rounded costs would be lost in their rounding.
+    pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
+        let pairs = from.iter().zip(to).zip(&self.observed).enumerate();
+        let difference = |(i, ((y, moved), observed)): (usize, ((&f64, &f64), &f64))| match (
+            self.loss,
+            self.weighting.sigma(i),
+        ) {
+            (Loss::Squares, _) | (_, None) => {
+                let weight = self.weighting.weight(i, self.len());
+                weight * (moved - y) * ((moved - observed) + (y - observed))
+            }
+            (loss, Some(sigma)) => {
+                loss.cost((moved - observed) / sigma) - loss.cost((y - observed) / sigma)
+            }
+        };
+        pairs.map(difference).sum()
+    }
+
+    /// Weight of the residual `r` of reading `i` in the least-squares problem that has the gradient
+    /// of the cost: `sum w r^2`.
+    pub fn weight(&self, i: usize, r: f64) -> f64 {
+        let weight = self.weighting.weight(i, self.len());
+        match (self.loss, self.weighting.sigma(i)) {
+            (Loss::Squares, _) | (_, None) => weight,
+            (loss, Some(sigma)) => weight * loss.weight(r / sigma),
+        }
+    }
+
+    /// `dJ/d model = 2 w r` of every reading.
+    pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
+        let residuals = self.residuals(predicted).enumerate();
+        residuals
+            .map(|(i, r)| 2.0 * self.weight(i, r) * r)
+            .collect()
+    }
+}
+
+/// Weights of the trapezoid rule over times that need not be equally spaced: the paper's cost for
+/// irregular readings.
+pub fn integral_over(times: &[f64]) -> Weighting {
+    Weighting::Trapezoid(trapezoid_weights_at(times))
+}
+
+/// The change of what is sensed when the motion and the device change.
+fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
+    let (y, v) = (&along.motion.displacement, &along.motion.velocity);
+    let by_states = sensed.states[0] * y[step]
+        + sensed.states[1] * v[step]
+        + sensed.states[2] * y[step + 1]
+        + sensed.states[3] * v[step + 1];
+    let mut change = by_states;
+    for (f, values) in along.device.functions().enumerate() {
+        for side in 0..2 {
+            let slope = sensed.functions[side][f];
+            if slope != 0.0 {
+                change += slope * values[step + side];
+            }
+        }
+    }
+    change
+}
+
+/// Transpose of [`answer`].
+fn spread(sensed: &Sensed, step: usize, slope: f64, source: &mut Trajectory, direct: &mut Device) {
+    for side in 0..2 {
+        source.displacement[step + side] += slope * sensed.states[2 * side];
+        source.velocity[step + side] += slope * sensed.states[2 * side + 1];
+    }
+    for (f, values) in direct.functions_mut().enumerate() {
+        for side in 0..2 {
+            values[step + side] += slope * sensed.functions[side][f];
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! How residuals are weighed.
+
+/// How the residuals of a channel are weighed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Weighting {
+    /// `J = integral r^2 dt` by the trapezoid rule over equally spaced readings (Eq. 1), in m^2 s.
+    Integral {
+        /// Spacing of the readings, s.
+        spacing: f64,
+    },
+    /// The same over readings at any times: the weight of each, s.
+    Trapezoid(
+        /// One weight per reading, s.
+        Vec<f64>,
+    ),
+    /// `J = sum (r / sigma)^2`: chi-square, without a factor 1/2 and without `dt`.
+    Sigma(
+        /// Standard deviation of a reading, in the unit of the channel.
+        f64,
+    ),
+    /// The same with a standard deviation for each reading.
+    Sigmas(
+        /// One per reading.
+        Vec<f64>,
+    ),
+}
+
+impl Weighting {
+    /// Whether readings have a standard deviation, so that J is a chi-square.
+    pub fn is_sigma(&self) -> bool {
+        matches!(self, Self::Sigma(_) | Self::Sigmas(_))
+    }
+
+    /// Standard deviation of reading `i`; `None` for the integral cost.
+    #[inline]
+    pub fn sigma(&self, i: usize) -> Option<f64> {
+        match self {
+            Self::Sigma(sigma) => Some(*sigma),
+            Self::Sigmas(sigmas) => sigmas.get(i).copied(),
+            Self::Integral { .. } | Self::Trapezoid(_) => None,
+        }
+    }
+
+    /// Weight `w_i` of reading `i` of `count`, so that `J = sum w_i r_i^2`.
+    #[inline]
+    pub fn weight(&self, i: usize, count: usize) -> f64 {
+        match self {
+            Self::Integral { spacing } if i == 0 || i + 1 == count => 0.5 * spacing,
+            Self::Integral { spacing } => *spacing,
+            Self::Trapezoid(weights) => weights[i],
+            Self::Sigma(sigma) => 1.0 / (sigma * sigma),
+            Self::Sigmas(sigmas) => 1.0 / (sigmas[i] * sigmas[i]),
+        }
+    }
+
+    /// Keeps the first `count` readings.
+    pub(super) fn truncate(&mut self, count: usize) {
+        match self {
+            Self::Trapezoid(list) | Self::Sigmas(list) => list.truncate(count),
+            Self::Integral { .. } | Self::Sigma(_) => {}
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Displacement, velocity and acceleration from the readings of one experiment, for a start that
+//! needs no model of the device.
+
+mod at_nodes;
+mod stencil;
+mod together;
+
+use crate::dynamics::State;
+use crate::problem::{Experiment, Problem};
+
+/// A smooth motion near the readings, at some nodes of the grid.
+pub(super) struct Kinematics {
+    /// The nodes.
+    pub nodes: Vec<usize>,
+    /// Displacement there, m.
+    pub y: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Acceleration, m/s^2.
+    pub a: Vec<f64>,
+    /// State at the first node, where the readings reach there.
+    pub initial: Option<State>,
+    /// Size of the readings that are weighed, in their unit.
+    pub size: f64,
+    /// Weight of a squared residual of theirs.
+    pub weight: f64,
+}
+
+impl Kinematics {
+    /// From all channels of an experiment, with the sensors at the values `scalars`; `None` for too
+    /// few readings.
+    pub fn of(problem: &Problem, experiment: &Experiment, scalars: &[f64]) -> Option<Self> {
+        match experiment.channels.as_slice() {
+            [] => None,
+            [channel] => match channel.stride() {
+                Some(stride) => {
+                    at_nodes::kinematics(channel, stride, problem.oscillator.grid.step())
+                }
+                None => together::kinematics(problem, experiment, scalars),
+            },
+            _ => together::kinematics(problem, experiment, scalars),
+        }
+    }
+}
+
+/// Standard deviation of the noise from fourth differences, which a smooth motion hardly has: their
+/// variance is 70 times that of white noise.
+fn noise_level(observed: &[f64]) -> f64 {
+    let fourth = observed
+        .windows(5)
+        .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
+    let squares: f64 = fourth.map(|d| d * d).sum();
+    (squares / (70.0 * observed.len().saturating_sub(4).max(1) as f64)).sqrt()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|y| y * y).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
