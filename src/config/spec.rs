@@ -55,6 +55,8 @@ pub struct ExperimentSpec {
     pub sigma: Option<SigmaSpec>,
     /// State at the beginning.
     pub initial: StateSpec,
+    /// Functions that this experiment does not share.
+    pub functions: Option<OwnFunctionsSpec>,
 }
 
 /// Names of the columns of a file of readings.
@@ -116,7 +118,7 @@ choice! {
     }
 }
 
-/// The three coefficient functions.
+/// The coefficient functions of the device.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(
     deny_unknown_fields,
@@ -129,6 +131,37 @@ pub struct FunctionsSpec {
     pub damping: FunctionSpec,
     /// Stiffness k(t), in N/m.
     pub stiffness: FunctionSpec,
+    /// Cubic stiffness, in N/m^3: a force on y^3.
+    pub cubic_stiffness: Option<FunctionSpec>,
+    /// Quadratic damping, in N s^2/m^2: a force on |v| v.
+    pub quadratic_damping: Option<FunctionSpec>,
+    /// Coulomb friction, in N: a force on the sign of v, smoothed over `width`.
+    pub coulomb_friction: Option<FunctionSpec>,
+    /// Constant offset of the force, in N.
+    pub offset: Option<FunctionSpec>,
+}
+
+/// Functions that one experiment has for itself.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {damping: {basis: constant, start: 1.0}}"
+)]
+pub struct OwnFunctionsSpec {
+    /// Mass m(t), in kg.
+    pub mass: Option<FunctionSpec>,
+    /// Damping c(t), in N s/m.
+    pub damping: Option<FunctionSpec>,
+    /// Stiffness k(t), in N/m.
+    pub stiffness: Option<FunctionSpec>,
+    /// Cubic stiffness, in N/m^3.
+    pub cubic_stiffness: Option<FunctionSpec>,
+    /// Quadratic damping, in N s^2/m^2.
+    pub quadratic_damping: Option<FunctionSpec>,
+    /// Coulomb friction, in N.
+    pub coulomb_friction: Option<FunctionSpec>,
+    /// Constant offset of the force, in N.
+    pub offset: Option<FunctionSpec>,
 }
 
 /// One coefficient function.
@@ -156,6 +189,8 @@ pub struct FunctionSpec {
     pub smooth: Option<OneOrMany<SmoothSpec>>,
     /// Penalty on the total variation.
     pub variation: Option<VariationSpec>,
+    /// Speed over which the sign of Coulomb friction is smoothed, in m/s.
+    pub width: Option<Number>,
 }
 
 choice! {
@@ -220,6 +255,14 @@ choice! {
         Damping = "damping",
         /// Stiffness k(t).
         Stiffness = "stiffness",
+        /// Cubic stiffness.
+        CubicStiffness = "cubic_stiffness",
+        /// Quadratic damping.
+        QuadraticDamping = "quadratic_damping",
+        /// Coulomb friction.
+        CoulombFriction = "coulomb_friction",
+        /// Constant offset of the force.
+        Offset = "offset",
     }
 }
 
@@ -398,4 +441,12 @@ pub struct TruthColumnsSpec {
     pub damping: Option<Text>,
     /// Column of the stiffness, in N/m.
     pub stiffness: Option<Text>,
+    /// Column of the cubic stiffness, in N/m^3.
+    pub cubic_stiffness: Option<Text>,
+    /// Column of the quadratic damping, in N s^2/m^2.
+    pub quadratic_damping: Option<Text>,
+    /// Column of the Coulomb friction, in N.
+    pub coulomb_friction: Option<Text>,
+    /// Column of the offset, in N.
+    pub offset: Option<Text>,
 }

@@ -31,6 +31,8 @@ use crate::dynamics::Grid;
 pub struct CoefficientFunction {
     /// Which function this is.
     pub quantity: Quantity,
+    /// The experiment that has it for itself; `None` if it belongs to the main device.
+    pub owner: Option<String>,
     /// The space that the function is sought in; `None` if it is fixed.
     pub basis: Option<Basis>,
     /// How parameters become values at the nodes.
@@ -49,6 +51,7 @@ impl CoefficientFunction {
     pub fn fixed(quantity: Quantity, values: Vec<f64>) -> Self {
         Self {
             quantity,
+            owner: None,
             basis: None,
             design: Design::Empty,
             offset: values,
@@ -92,11 +95,20 @@ impl CoefficientFunction {
     ) -> Self {
         Self {
             quantity,
+            owner: None,
             design,
             offset: vec![0.0; nodes],
             start,
             positive_parameters: basis.positive_parameters(),
             basis: Some(basis),
+        }
+    }
+
+    /// What reports call it: its quantity, and the experiment that has it for itself.
+    pub fn name(&self) -> String {
+        match &self.owner {
+            None => self.quantity.name().to_owned(),
+            Some(owner) => format!("{} of {owner}", self.quantity.name()),
         }
     }
 

@@ -11,6 +11,14 @@ pub enum Quantity {
     Damping,
     /// Stiffness `k(t)`.
     Stiffness,
+    /// Cubic stiffness, of `y^3`.
+    CubicStiffness,
+    /// Quadratic damping, of `|v| v`.
+    QuadraticDamping,
+    /// Coulomb friction, of a smoothed sign of `v`.
+    CoulombFriction,
+    /// Constant offset of the force.
+    Offset,
 }
 
 impl Quantity {
@@ -20,6 +28,10 @@ impl Quantity {
             Quantity::Mass => "mass",
             Quantity::Damping => "damping",
             Quantity::Stiffness => "stiffness",
+            Quantity::CubicStiffness => "cubic_stiffness",
+            Quantity::QuadraticDamping => "quadratic_damping",
+            Quantity::CoulombFriction => "coulomb_friction",
+            Quantity::Offset => "offset",
         }
     }
 
@@ -29,6 +41,10 @@ impl Quantity {
             Quantity::Mass => "m",
             Quantity::Damping => "c",
             Quantity::Stiffness => "k",
+            Quantity::CubicStiffness => "k3",
+            Quantity::QuadraticDamping => "c2",
+            Quantity::CoulombFriction => "F_c",
+            Quantity::Offset => "F_0",
         }
     }
 
@@ -38,6 +54,10 @@ impl Quantity {
             Quantity::Mass => "kg",
             Quantity::Damping => "N s/m",
             Quantity::Stiffness => "N/m",
+            Quantity::CubicStiffness => "N/m^3",
+            Quantity::QuadraticDamping => "N s^2/m^2",
+            Quantity::CoulombFriction => "N",
+            Quantity::Offset => "N",
         }
     }
 
@@ -47,15 +67,37 @@ impl Quantity {
             Quantity::Mass => "mass_kg",
             Quantity::Damping => "damping_N_s_per_m",
             Quantity::Stiffness => "stiffness_N_per_m",
+            Quantity::CubicStiffness => "cubic_stiffness_N_per_m3",
+            Quantity::QuadraticDamping => "quadratic_damping_N_s2_per_m2",
+            Quantity::CoulombFriction => "coulomb_friction_N",
+            Quantity::Offset => "offset_N",
         }
     }
 
-    /// The force term that this function multiplies; `None` for the mass.
-    pub fn term(self) -> Option<Term> {
+    /// All quantities, in the order in which the program holds them.
+    pub const ALL: [Self; 7] = [
+        Self::Mass,
+        Self::Damping,
+        Self::Stiffness,
+        Self::CubicStiffness,
+        Self::QuadraticDamping,
+        Self::CoulombFriction,
+        Self::Offset,
+    ];
+
+    /// The force term that this function multiplies; `None` for the mass. `friction_width` is the
+    /// width of Coulomb friction, m/s.
+    pub fn term(self, friction_width: f64) -> Option<Term> {
         match self {
             Quantity::Mass => None,
             Quantity::Damping => Some(Term::Damping),
             Quantity::Stiffness => Some(Term::Stiffness),
+            Quantity::CubicStiffness => Some(Term::CubicStiffness),
+            Quantity::QuadraticDamping => Some(Term::QuadraticDamping),
+            Quantity::CoulombFriction => Some(Term::CoulombFriction {
+                width: friction_width,
+            }),
+            Quantity::Offset => Some(Term::Offset),
         }
     }
 }

@@ -3,6 +3,7 @@
 
 pub mod closed_form;
 pub mod reference;
+pub mod sensed;
 
 use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};

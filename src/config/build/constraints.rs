@@ -6,8 +6,8 @@ mod statement;
 
 pub(super) use start::move_start;
 
-use super::functions::spec;
-use super::{QUANTITIES, listed};
+use super::functions::slots;
+use super::listed;
 use crate::config::ModelFile;
 use crate::config::spec::ConstraintSpec;
 use crate::constraints::{Constraints, Impossible, Statement};
@@ -28,9 +28,9 @@ pub(super) fn build(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Place>, InputError> {
     let mut places = Vec::new();
-    for quantity in QUANTITIES {
-        let key = format!("functions.{}", quantity.name());
-        let spec = spec(file, quantity);
+    for slot in slots(file) {
+        let (key, quantity, spec) = (&slot.key, slot.quantity, slot.spec);
+        let device = slot.owner.map_or(0, |i| problem.experiments[i].device);
         let given = [
             (format!("{key}.min"), &spec.min, &None),
             (format!("{key}.max"), &None, &spec.max),
@@ -45,7 +45,12 @@ pub(super) fn build(
             let parent = key.rsplit_once('.').map_or("", |(parent, _)| parent);
             let grid = &problem.oscillator.grid;
             let bounds = statement::bounds(file, grid, parent, quantity, (min, max))?;
-            add(file, problem, (key, None), &bounds, &mut places, warnings)?;
+            let at = At {
+                key,
+                soft: None,
+                device,
+            };
+            add(file, problem, &at, &bounds, &mut places, warnings)?;
         }
     }
     let Some(list) = &file.spec.constraints else {
@@ -61,24 +66,29 @@ pub(super) fn build(
         let key = format!("constraints[{i}]");
         let soft = soft(file, &key, spec)?;
         for (key, statement) in statement::read(file, &problem.oscillator.grid, &key, spec)? {
-            add(
-                file,
-                problem,
-                (&key, soft),
-                &statement,
-                &mut places,
-                warnings,
-            )?;
+            let at = At {
+                key: &key,
+                soft,
+                device: 0,
+            };
+            add(file, problem, &at, &statement, &mut places, warnings)?;
         }
     }
     Ok(places)
 }
 
-/// Adds the rows of one statement, which stands at a key, to the problem.
+/// Where a statement stands, what breaking it costs, and which device it is about.
+struct At<'a> {
+    key: &'a str,
+    soft: Option<f64>,
+    device: usize,
+}
+
+/// Adds the rows of one statement to the problem.
 fn add(
     file: &ModelFile,
     problem: &mut Problem,
-    (key, soft): (&str, Option<f64>),
+    &At { key, soft, device }: &At,
     statement: &Statement,
     places: &mut Vec<Place>,
     warnings: &mut Vec<String>,
@@ -86,7 +96,7 @@ fn add(
     if soft.is_none() {
         leaves_a_mass(file, key, statement)?;
     }
-    let built = statement.build(&problem.oscillator.grid, &problem.functions);
+    let built = statement.build_for(&problem.oscillator.grid, &problem.functions, device);
     let mut rows = built.map_err(|why| impossible(file, key, why))?;
     if rows.is_empty() {
         warnings.push(format!("{key} says nothing: it holds for all functions"));

@@ -21,6 +21,12 @@ pub(super) struct Record {
     pub values: Vec<f64>,
 }
 
+/// What reports call experiment `i`.
+pub(super) fn name(file: &ModelFile, i: usize) -> String {
+    let given = file.spec.experiments[i].name.as_ref();
+    given.map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone())
+}
+
 /// Two experiments of one name could not be told apart.
 pub(super) fn distinct_names(file: &ModelFile) -> Result<(), InputError> {
     let mut names: Vec<&str> = Vec::new();
@@ -147,13 +153,11 @@ pub(super) fn build(
                 (Purpose::Simulate { .. }, _) | (_, None) => None,
                 (_, Some(record)) => Some(place(file, purpose, grid, record, weighting)?),
             };
-            let name = (spec.name.as_ref())
-                .map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone());
             let initial = State {
                 displacement: spec.initial.displacement.0,
                 velocity: spec.initial.velocity.0,
             };
-            let mut experiment = Experiment::free(name, initial, grid.nodes());
+            let mut experiment = Experiment::free(name(file, i), initial, grid.nodes());
             experiment.channels.extend(readings);
             Ok(experiment)
         })

@@ -4,25 +4,191 @@ mod basis;
 mod limits;
 mod start;
 
-use super::QUANTITIES;
 use super::on_grid::{Wanted, column_on_grid};
 use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
-use crate::config::spec::{Basis, ColumnSpec, FunctionSpec};
-use crate::dynamics::{Device, Grid};
+use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, OwnFunctionsSpec};
+use crate::dynamics::{Device, Grid, Term};
 use crate::error::InputError;
 use crate::functions::{self, CoefficientFunction, Quantity};
 
-/// All functions on the grid, mass first.
+/// A function as the model gives it, and where.
+pub(super) struct Slot<'a> {
+    /// Its key, such as `functions.mass` or `experiments[1].functions.damping`.
+    pub key: String,
+    /// Which function it is.
+    pub quantity: Quantity,
+    /// What the model says about it.
+    pub spec: &'a FunctionSpec,
+    /// The experiment that has it for itself.
+    pub owner: Option<usize>,
+}
+
+/// All functions of the model in the order of the problem: those of the main device, mass first, then
+/// those of single experiments.
+pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
+    let mut slots: Vec<Slot> = Vec::new();
+    let main = Quantity::ALL.into_iter().filter_map(|quantity| {
+        Some(Slot {
+            key: format!("functions.{}", quantity.name()),
+            quantity,
+            spec: main_spec(file, quantity)?,
+            owner: None,
+        })
+    });
+    slots.extend(main);
+    for (i, experiment) in file.spec.experiments.iter().enumerate() {
+        let Some(own) = &experiment.functions else {
+            continue;
+        };
+        slots.extend(Quantity::ALL.into_iter().filter_map(|quantity| {
+            Some(Slot {
+                key: format!("experiments[{i}].functions.{}", quantity.name()),
+                quantity,
+                spec: own_spec(own, quantity)?,
+                owner: Some(i),
+            })
+        }));
+    }
+    slots
+}
+
+/// The quantities of the device, mass first.
+pub(super) fn quantities(file: &ModelFile) -> Vec<Quantity> {
+    let shared = |slot: &Slot| slot.owner.is_none().then_some(slot.quantity);
+    slots(file).iter().filter_map(shared).collect()
+}
+
+/// The force terms of the device.
+pub(super) fn terms(file: &ModelFile) -> Result<Vec<Term>, InputError> {
+    let mut terms = Vec::new();
+    for slot in slots(file).iter().filter(|slot| slot.owner.is_none()) {
+        let width = width(file, slot)?;
+        terms.extend(slot.quantity.term(width));
+    }
+    Ok(terms)
+}
+
+/// The speed that Coulomb friction is smoothed over; 0 for other functions.
+fn width(file: &ModelFile, slot: &Slot) -> Result<f64, InputError> {
+    let key = format!("{}.width", slot.key);
+    match (slot.quantity, slot.spec.width) {
+        (Quantity::CoulombFriction, Some(width)) if width.0 > 0.0 => Ok(width.0),
+        (Quantity::CoulombFriction, Some(width)) => Err(file
+            .error_at(&key, "the width must be positive")
+            .found(width.0)
+            .expected("a speed in m/s, greater than 0, well below those of the motion")),
+        (Quantity::CoulombFriction, None) => Err(file
+            .error_at(&slot.key, "Coulomb friction needs a width")
+            .expected(
+                "`width`: the speed in m/s over which the sign of v is smoothed, well below those \
+                 of the motion",
+            )),
+        (_, Some(width)) => Err(file
+            .error_at(&key, "only Coulomb friction has a width")
+            .found(width.0)
+            .expected("no `width`")),
+        (_, None) => Ok(0.0),
+    }
+}
+
+/// The functions that make up each device, and the device of each experiment.
+pub(super) struct Assemblies {
+    pub devices: Vec<Vec<usize>>,
+    pub of_experiment: Vec<usize>,
+}
+
+/// Which functions move in which experiment.
+pub(super) fn assemblies(file: &ModelFile) -> Result<Assemblies, InputError> {
+    let slots = slots(file);
+    let shared = quantities(file);
+    let main: Vec<usize> = (0..shared.len()).collect();
+    let mut found = Assemblies {
+        devices: vec![main.clone()],
+        of_experiment: Vec::new(),
+    };
+    for i in 0..file.spec.experiments.len() {
+        let mut device = main.clone();
+        for (f, slot) in slots.iter().enumerate().filter(|(_, s)| s.owner == Some(i)) {
+            let Some(place) = shared.iter().position(|q| *q == slot.quantity) else {
+                let name = slot.quantity.name();
+                return Err(file
+                    .error_at(&slot.key, "the device has no such function")
+                    .found(format!("`{name}` in one experiment only"))
+                    .expected(format!(
+                        "`functions.{name}` as well, which the other experiments share; \
+                         `fixed: 0` where they have none"
+                    )));
+            };
+            if slot.quantity == Quantity::CoulombFriction {
+                return Err(file
+                    .error_at(&slot.key, "Coulomb friction is shared by all experiments")
+                    .expected("it under `functions` alone"));
+            }
+            device[place] = f;
+        }
+        let known = found.devices.iter().position(|d| *d == device);
+        found
+            .of_experiment
+            .push(known.unwrap_or(found.devices.len()));
+        if known.is_none() {
+            found.devices.push(device);
+        }
+    }
+    something_shared(file, &slots, &found)?;
+    Ok(found)
+}
+
+/// Refuses experiments that have nothing to do with each other, and functions that nobody uses.
+fn something_shared(
+    file: &ModelFile,
+    slots: &[Slot],
+    found: &Assemblies,
+) -> Result<(), InputError> {
+    let users = |f: usize| {
+        let uses = |d: &&usize| found.devices[**d].contains(&f);
+        found.of_experiment.iter().filter(uses).count()
+    };
+    let several = found.of_experiment.len() > 1;
+    let sought = |slot: &Slot| slot.spec.fixed.is_none();
+    let own = slots.iter().any(|s| s.owner.is_some() && sought(s));
+    let shared = (slots.iter().enumerate()).any(|(f, slot)| sought(slot) && users(f) > 1);
+    if several && own && !shared {
+        return Err(file
+            .error_at(
+                "experiments",
+                "the experiments share no function that is fitted",
+            )
+            .found("functions of its own in every experiment")
+            .expected(
+                "a function of the device that several experiments show, or a model for each",
+            ));
+    }
+    match slots.iter().enumerate().find(|(f, _)| users(*f) == 0) {
+        Some((_, slot)) => Err(file
+            .error_at(&slot.key, "no experiment uses this function")
+            .found("one of its own in every experiment")
+            .expected("at least one experiment without, or `fixed` here")),
+        None => Ok(()),
+    }
+}
+
+/// All functions on the grid, in the order of [`slots`].
 pub(super) fn build(
     file: &ModelFile,
     grid: &Grid,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<CoefficientFunction>, InputError> {
-    let list: Vec<CoefficientFunction> = QUANTITIES
-        .into_iter()
-        .map(|quantity| function(file, grid, quantity))
+    let list: Vec<CoefficientFunction> = slots(file)
+        .iter()
+        .map(|slot| {
+            let owner = slot.owner.map(|i| super::experiments::name(file, i));
+            Ok(CoefficientFunction {
+                owner,
+                ..function(file, grid, slot)?
+            })
+        })
         .collect::<Result<_, _>>()?;
     if list.iter().all(|f| f.parameters() == 0) {
         warnings.push("every function is fixed, so there is nothing to fit".into());
@@ -30,24 +196,35 @@ pub(super) fn build(
     Ok(list)
 }
 
-/// What the model says about a function.
-pub(super) fn spec(file: &ModelFile, quantity: Quantity) -> &FunctionSpec {
+fn main_spec(file: &ModelFile, quantity: Quantity) -> Option<&FunctionSpec> {
+    let functions = &file.spec.functions;
     match quantity {
-        Quantity::Mass => &file.spec.functions.mass,
-        Quantity::Damping => &file.spec.functions.damping,
-        Quantity::Stiffness => &file.spec.functions.stiffness,
+        Quantity::Mass => Some(&functions.mass),
+        Quantity::Damping => Some(&functions.damping),
+        Quantity::Stiffness => Some(&functions.stiffness),
+        Quantity::CubicStiffness => functions.cubic_stiffness.as_ref(),
+        Quantity::QuadraticDamping => functions.quadratic_damping.as_ref(),
+        Quantity::CoulombFriction => functions.coulomb_friction.as_ref(),
+        Quantity::Offset => functions.offset.as_ref(),
     }
 }
 
-fn function(
-    file: &ModelFile,
-    grid: &Grid,
-    quantity: Quantity,
-) -> Result<CoefficientFunction, InputError> {
-    let key = format!("functions.{}", quantity.name());
-    let spec = spec(file, quantity);
-    basis::keys_fit(file, &key, spec)?;
-    limits::check(file, grid, &key, spec)?;
+fn own_spec(own: &OwnFunctionsSpec, quantity: Quantity) -> Option<&FunctionSpec> {
+    match quantity {
+        Quantity::Mass => own.mass.as_ref(),
+        Quantity::Damping => own.damping.as_ref(),
+        Quantity::Stiffness => own.stiffness.as_ref(),
+        Quantity::CubicStiffness => own.cubic_stiffness.as_ref(),
+        Quantity::QuadraticDamping => own.quadratic_damping.as_ref(),
+        Quantity::CoulombFriction => own.coulomb_friction.as_ref(),
+        Quantity::Offset => own.offset.as_ref(),
+    }
+}
+
+fn function(file: &ModelFile, grid: &Grid, slot: &Slot) -> Result<CoefficientFunction, InputError> {
+    let (key, quantity, spec) = (slot.key.as_str(), slot.quantity, slot.spec);
+    basis::keys_fit(file, key, spec)?;
+    limits::check(file, grid, key, spec)?;
     match (&spec.fixed, &spec.start, spec.basis) {
         (Some(_), Some(_), _) => Err(file
             .error_at(&format!("{key}.start"), "a fixed function has no start")
@@ -58,14 +235,14 @@ fn function(
             Ok(CoefficientFunction::fixed(quantity, values))
         }
         (None, None, _) => Err(file
-            .error_at(&key, "this function has neither a start nor a fixed value")
+            .error_at(key, "this function has neither a start nor a fixed value")
             .expected("`start` for a function to be fitted, `fixed` for a known one")),
         (None, Some(_), None) => Err(file
-            .error_at(&key, "a function to be fitted needs a basis")
+            .error_at(key, "a function to be fitted needs a basis")
             .expected(format!("`basis`, one of {}", basis_names()))),
         (None, Some(given), Some(kind)) => {
-            let basis = basis::build(file, grid, &key, spec, kind)?;
-            free(file, grid, quantity, basis, given)
+            let basis = basis::build(file, grid, key, spec, kind)?;
+            free(file, grid, slot, basis, given)
         }
     }
 }
@@ -73,11 +250,11 @@ fn function(
 fn free(
     file: &ModelFile,
     grid: &Grid,
-    quantity: Quantity,
+    slot: &Slot,
     basis: functions::Basis,
     given: &Start,
 ) -> Result<CoefficientFunction, InputError> {
-    let key = format!("functions.{}.start", quantity.name());
+    let (key, quantity) = (format!("{}.start", slot.key), slot.quantity);
     let start = start::parameters(file, grid, &key, &basis, given)?;
     let function = CoefficientFunction::free(quantity, basis, grid, start);
     let mut values = vec![0.0; grid.nodes()];
@@ -150,6 +327,10 @@ pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, Inp
             Quantity::Mass => c.mass.as_ref(),
             Quantity::Damping => c.damping.as_ref(),
             Quantity::Stiffness => c.stiffness.as_ref(),
+            Quantity::CubicStiffness => c.cubic_stiffness.as_ref(),
+            Quantity::QuadraticDamping => c.quadratic_damping.as_ref(),
+            Quantity::CoulombFriction => c.coulomb_friction.as_ref(),
+            Quantity::Offset => c.offset.as_ref(),
         });
         let name = named.map_or(quantity.column(), |name| name.0.as_str());
         let wanted = Wanted {
@@ -160,8 +341,10 @@ pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, Inp
         };
         column_on_grid(file, &wanted, grid)
     };
+    let mut list = quantities(file).into_iter();
+    let mass = list.next().map(&column).transpose()?.unwrap_or_default();
     Ok(Some(Device {
-        mass: column(Quantity::Mass)?,
-        coefficients: vec![column(Quantity::Damping)?, column(Quantity::Stiffness)?],
+        mass,
+        coefficients: list.map(&column).collect::<Result<_, _>>()?,
     }))
 }

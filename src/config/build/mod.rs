@@ -11,9 +11,9 @@ mod penalties;
 pub use penalties::WeightSearch;
 
 use super::ModelFile;
-use crate::dynamics::{Device, Oscillator, State, Term};
+use crate::dynamics::{Device, Oscillator, State};
 use crate::error::{InputError, Place};
-use crate::functions::{Functions, Quantity};
+use crate::functions::Functions;
 use crate::problem::Problem;
 use crate::solvers::FitSettings;
 
@@ -94,7 +94,10 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let grid = grid::build(file, purpose, &records)?;
     let mut warnings = Vec::new();
     let list = functions::build(file, &grid, &mut warnings)?;
-    let functions = Functions::new(list, grid.nodes(), grid.step()).ok_or_else(|| {
+    let assemblies = functions::assemblies(file)?;
+    let functions =
+        Functions::with_devices(list, assemblies.devices.clone(), grid.nodes(), grid.step());
+    let functions = functions.ok_or_else(|| {
         file.error_at(
             "functions",
             "a basis has functions that the grid cannot tell apart",
@@ -103,7 +106,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let oscillator = Oscillator {
         grid,
         method: grid::method(file),
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: functions::terms(file)?,
     };
     let experiments = experiments::build(file, purpose, &grid, records)?;
     let mut problem = Problem::new(oscillator, functions, experiments);
@@ -133,9 +136,6 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         warnings,
     })
 }
-
-/// The functions of the model, in the order of the problem.
-const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
 
 /// Names in a row: `a`, `a and b`, `a, b and c`.
 fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {

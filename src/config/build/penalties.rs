@@ -1,7 +1,6 @@
 //! Penalties: `smooth` and `variation` of the functions.
 
-use super::QUANTITIES;
-use super::functions::{spec, values};
+use super::functions::{slots, values};
 use crate::config::ModelFile;
 use crate::config::scalar::Weight;
 use crate::config::spec::{SmoothSpec, WeightRule};
@@ -26,11 +25,10 @@ pub(super) fn build(
     warnings: &mut Vec<String>,
 ) -> Result<Option<WeightSearch>, InputError> {
     let mut search: Option<WeightSearch> = None;
-    for (j, quantity) in QUANTITIES.into_iter().enumerate() {
-        let name = quantity.name();
-        let smooth = spec(file, quantity).smooth.iter();
+    for (j, slot) in slots(file).iter().enumerate() {
+        let smooth = slot.spec.smooth.iter();
         for (place, spec) in smooth.flat_map(|list| list.iter()) {
-            let key = format!("functions.{name}.smooth{place}");
+            let key = format!("{}.smooth{place}", slot.key);
             let weight = match spec.weight {
                 Weight::Number(weight) => weight.0,
                 Weight::Rule(rule) => {
@@ -73,11 +71,8 @@ pub(super) fn build(
 pub(super) fn add_variations(file: &ModelFile, problem: &mut Problem) {
     let grid = problem.oscillator.grid;
     let bases: Vec<Option<Basis>> = problem.functions.iter().map(|f| f.basis.clone()).collect();
-    for (j, (quantity, basis)) in QUANTITIES.into_iter().zip(bases).enumerate() {
-        let weight = spec(file, quantity)
-            .variation
-            .as_ref()
-            .map_or(0.0, |v| v.weight.0);
+    for (j, (slot, basis)) in slots(file).iter().zip(bases).enumerate() {
+        let weight = slot.spec.variation.as_ref().map_or(0.0, |v| v.weight.0);
         if let (Some(basis), true) = (basis, weight > 0.0) {
             problem.variations.push(Variation {
                 function: j,

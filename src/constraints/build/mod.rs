@@ -185,7 +185,21 @@ impl Statement {
     /// # Errors
     /// If it is about fixed functions only, or no parameters can fulfil a row of it.
     pub fn build(&self, grid: &Grid, functions: &Functions) -> Result<Constraints, Impossible> {
-        let all = All::new(grid, functions);
+        self.build_for(grid, functions, 0)
+    }
+
+    /// [`Statement::build`] about the functions of device `device` of
+    /// [`Functions::assemblies`].
+    ///
+    /// # Errors
+    /// As [`Statement::build`].
+    pub fn build_for(
+        &self,
+        grid: &Grid,
+        functions: &Functions,
+        device: usize,
+    ) -> Result<Constraints, Impossible> {
+        let all = All::new(grid, functions, device);
         let about = self.functions();
         let indices: Vec<usize> = (about.iter())
             .map(|q| all.index(*q))
@@ -236,24 +250,27 @@ struct All<'a> {
     grid: &'a Grid,
     functions: &'a Functions,
     list: Vec<&'a CoefficientFunction>,
+    assembly: &'a [usize],
 }
 
 impl<'a> All<'a> {
-    fn new(grid: &'a Grid, functions: &'a Functions) -> Self {
+    fn new(grid: &'a Grid, functions: &'a Functions, device: usize) -> Self {
         Self {
             grid,
             functions,
             list: functions.iter().collect(),
+            assembly: functions.assembly(device),
         }
     }
 
     fn index(&self, quantity: Quantity) -> Result<usize, Impossible> {
-        let place = self.list.iter().position(|f| f.quantity == quantity);
-        place.ok_or(Impossible::Absent(quantity))
+        let is_meant = |f: &&usize| self.list[**f].quantity == quantity;
+        let found = self.assembly.iter().find(is_meant);
+        found.copied().ok_or(Impossible::Absent(quantity))
     }
 
-    fn name(&self, j: usize) -> &'static str {
-        self.list[j].quantity.name()
+    fn name(&self, j: usize) -> String {
+        self.list[j].name()
     }
 
     /// Both ends of the record, s.

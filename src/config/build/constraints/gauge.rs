@@ -5,9 +5,9 @@
 //! they can be met by choosing it and say nothing about the device.
 
 use crate::config::ModelFile;
-use crate::config::build::QUANTITIES;
-use crate::config::build::functions::spec;
+use crate::config::build::functions::slots;
 use crate::config::scalar::NumberOrColumn;
+use crate::config::spec::FunctionSpec;
 use crate::constraints::{Shape, Statement};
 use crate::functions::{Basis, CoefficientFunction, Quantity};
 use crate::problem::Problem;
@@ -32,7 +32,7 @@ pub(super) fn says_nothing(
         Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
             Quantity::Mass => "a slope of the mass in one direction",
             Quantity::Stiffness => "a slope of the stiffness in one direction",
-            Quantity::Damping => return None,
+            _ => return None,
         },
         _ => return None,
     };
@@ -76,7 +76,8 @@ fn bounded_on_both_sides(file: &ModelFile) -> bool {
         NumberOrColumn::Number(value) => value.0 > 0.0,
         NumberOrColumn::Column(_) => true,
     };
-    let own = QUANTITIES.map(|q| spec(file, q));
+    let slots = slots(file);
+    let own: Vec<&FunctionSpec> = slots.iter().map(|slot| slot.spec).collect();
     let listed = || file.spec.constraints.iter().flatten();
     let below = own.iter().filter_map(|f| f.min.as_ref());
     let above = own.iter().filter_map(|f| f.max.as_ref());

@@ -403,5 +403,9 @@ fn quantity(name: FunctionName) -> Quantity {
         FunctionName::Mass => Quantity::Mass,
         FunctionName::Damping => Quantity::Damping,
         FunctionName::Stiffness => Quantity::Stiffness,
+        FunctionName::CubicStiffness => Quantity::CubicStiffness,
+        FunctionName::QuadraticDamping => Quantity::QuadraticDamping,
+        FunctionName::CoulombFriction => Quantity::CoulombFriction,
+        FunctionName::Offset => Quantity::Offset,
     }
 }

@@ -1,0 +1,318 @@
+//! The gradient of J with every kind of reading, term, excitation, sensor and loss, against dual
+//! numbers through an independent evaluation.
+
+mod common;
+
+use common::sensed::{Record, Response, cost};
+use kmcfit::dynamics::{
+    ChannelKind, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
+};
+use kmcfit::functions::{CoefficientFunction, Functions, Prior, Quantity, Scalar, Value};
+use kmcfit::objective::{Channel, GradientKind, Loss, Sensor, Weighting};
+use kmcfit::problem::{Experiment, Problem};
+use num_dual::{Dual64, DualNum};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const WIDTH: f64 = 0.3;
+const TERMS: [(Response, Term, Quantity); 6] = [
+    (Response::Damping, Term::Damping, Quantity::Damping),
+    (Response::Stiffness, Term::Stiffness, Quantity::Stiffness),
+    (
+        Response::Cubic,
+        Term::CubicStiffness,
+        Quantity::CubicStiffness,
+    ),
+    (
+        Response::Quadratic,
+        Term::QuadraticDamping,
+        Quantity::QuadraticDamping,
+    ),
+    (
+        Response::Coulomb(WIDTH),
+        Term::CoulombFriction { width: WIDTH },
+        Quantity::CoulombFriction,
+    ),
+    (Response::Offset, Term::Offset, Quantity::Offset),
+];
+const LOSSES: [Loss; 3] = [
+    Loss::Squares,
+    Loss::Huber { threshold: 1.3 },
+    Loss::StudentT { degrees: 4.0 },
+];
+
+/// One channel of a random record.
+#[derive(Debug, Clone)]
+struct Readings {
+    kind: ChannelKind,
+    /// Step and share of it.
+    places: Vec<(usize, f64)>,
+    values: Vec<f64>,
+    sigmas: Vec<f64>,
+    around: Vec<(f64, f64)>,
+    fixed_in_space: Vec<f64>,
+    /// Gain, offset and drift, all sought.
+    sensor: [f64; 3],
+    loss: Loss,
+}
+
+/// A random record with everything in it.
+#[derive(Debug, Clone)]
+struct Case {
+    method: Method,
+    dt: f64,
+    mass: Vec<f64>,
+    coefficients: Vec<Vec<f64>>,
+    force: Vec<[f64; 3]>,
+    base: Vec<[f64; 3]>,
+    initial: [f64; 2],
+    channels: Vec<Readings>,
+}
+
+fn case(method: Method, nodes: usize, seed: u64) -> Case {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut list = |n: usize, low: f64, high: f64| -> Vec<f64> {
+        (0..n).map(|_| random.random_range(low..high)).collect()
+    };
+    let three = |list: Vec<f64>| -> Vec<[f64; 3]> {
+        list.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+    };
+    let steps = nodes - 1;
+    let mass = list(nodes, 0.5, 3.0);
+    let ranges = [
+        (-0.5, 2.0),
+        (-1.0, 5.0),
+        (-0.5, 1.0),
+        (-0.5, 1.0),
+        (-1.0, 1.0),
+        (-1.0, 1.0),
+    ];
+    let coefficients = ranges.iter().map(|(a, b)| list(nodes, *a, *b)).collect();
+    // Left, middle and right of each step apart: a force that jumps at every node.
+    let force = three(list(3 * steps, -2.0, 2.0));
+    let base = three(list(3 * steps, -2.0, 2.0));
+    let initial = list(2, -1.5, 1.5);
+    let channels = ChannelKind::ALL.into_iter().flat_map(|kind| [kind; 2]);
+    let channels: Vec<ChannelKind> = channels.collect();
+    let channels = (channels.into_iter().enumerate())
+        .map(|(n, kind)| {
+            let count = 2 + (seed as usize + n) % 7;
+            let mut times = list(count, 0.0, steps as f64);
+            // Some on nodes, the ends among them.
+            times.extend([0.0, 1.0, steps as f64]);
+            times.sort_by(f64::total_cmp);
+            times.dedup();
+            let place = |x: &f64| {
+                let step = (x.floor() as usize).min(steps - 1);
+                (step, x - step as f64)
+            };
+            let count = times.len();
+            let around = list(2 * count, -2.0, 2.0);
+            let sensor = list(3, 0.5, 1.5);
+            Readings {
+                kind,
+                places: times.iter().map(place).collect(),
+                values: list(count, -2.0, 2.0),
+                sigmas: list(count, 0.3, 2.0),
+                around: around.chunks_exact(2).map(|c| (c[0], c[1])).collect(),
+                fixed_in_space: list(count, -1.0, 1.0),
+                sensor: [sensor[0], sensor[1], sensor[2]],
+                loss: LOSSES[(seed as usize + n) % LOSSES.len()],
+            }
+        })
+        .collect();
+    Case {
+        method,
+        dt: 0.1,
+        mass,
+        coefficients,
+        force,
+        base,
+        initial: [initial[0], initial[1]],
+        channels,
+    }
+}
+
+const PRIOR: Prior = Prior {
+    mean: 0.3,
+    sigma: 0.7,
+};
+
+impl Case {
+    fn nodes(&self) -> usize {
+        self.mass.len()
+    }
+
+    /// All parameters: functions, initial state, sensors.
+    fn theta(&self) -> Vec<f64> {
+        let mut theta = self.mass.clone();
+        theta.extend(self.coefficients.iter().flatten());
+        theta.extend(self.initial);
+        theta.extend(self.channels.iter().flat_map(|c| c.sensor));
+        theta
+    }
+
+    fn problem(&self) -> Problem {
+        let nodes = self.nodes();
+        let grid = Grid::new(0.0, self.dt * (nodes - 1) as f64, nodes).unwrap();
+        let mut list = vec![CoefficientFunction::nodal(
+            Quantity::Mass,
+            self.mass.clone(),
+        )];
+        for ((_, _, quantity), values) in TERMS.iter().zip(&self.coefficients) {
+            list.push(CoefficientFunction::nodal(*quantity, values.clone()));
+        }
+        let theta = self.theta();
+        let scalars: Vec<Scalar> = theta[nodes * (1 + TERMS.len())..]
+            .iter()
+            .enumerate()
+            .map(|(i, start)| Scalar {
+                name: format!("scalar {i}"),
+                unit: String::new(),
+                start: *start,
+                size: 1.0,
+                prior: (i == 1).then_some(PRIOR),
+            })
+            .collect();
+        let functions = Functions::new(list, nodes, grid.step())
+            .unwrap()
+            .with_scalars(scalars);
+        let initial = State {
+            displacement: self.initial[0],
+            velocity: self.initial[1],
+        };
+        let mut experiment = Experiment::free("all", initial, nodes).with_excitation(Excitation {
+            force: Some(Stepwise::new(self.force.clone())),
+            base: Some(Stepwise::new(self.base.clone())),
+        });
+        experiment.sought = [Some(0), Some(1)];
+        for (n, readings) in self.channels.iter().enumerate() {
+            let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();
+            let times = readings.places.iter().map(time).collect();
+            let weighting = Weighting::Sigmas(readings.sigmas.clone());
+            let around = readings.around.iter().map(|(force, base)| Surroundings {
+                force: *force,
+                base: *base,
+            });
+            let first = 2 + 3 * n;
+            let channel = Channel::new(
+                readings.kind,
+                times,
+                readings.values.clone(),
+                weighting,
+                &grid,
+                nodes,
+            );
+            let channel = channel
+                .unwrap()
+                .with_surroundings(around.collect())
+                .with_base(readings.fixed_in_space.clone())
+                .with_loss(readings.loss)
+                .with_sensor(Sensor {
+                    gain: Value::Sought(first),
+                    offset: Value::Sought(first + 1),
+                    drift: Value::Sought(first + 2),
+                });
+            experiment = experiment.with_channel(channel);
+        }
+        let oscillator = Oscillator {
+            grid,
+            method: self.method,
+            terms: TERMS.iter().map(|(_, term, _)| *term).collect(),
+        };
+        Problem::new(oscillator, functions, vec![experiment])
+    }
+
+    /// J and its derivative with respect to parameter `seed`, by the independent evaluation.
+    fn reference(&self, theta: &[f64], seed: usize) -> Dual64 {
+        let dual = |(i, x): (usize, &f64)| Dual64::new(*x, f64::from(i == seed));
+        let theta: Vec<Dual64> = theta.iter().enumerate().map(dual).collect();
+        let nodes = self.nodes();
+        let mut parts = theta.chunks_exact(nodes);
+        let mass = parts.next().unwrap().to_vec();
+        let terms = TERMS
+            .iter()
+            .map(|(response, ..)| (*response, parts.next().unwrap().to_vec()))
+            .collect();
+        let rest = &theta[nodes * (1 + TERMS.len())..];
+        let record = Record {
+            method: self.method,
+            dt: self.dt,
+            mass,
+            terms,
+            force: self.force.clone(),
+            base: self.base.clone(),
+            initial: (rest[0], rest[1]),
+        };
+        let states = record.motion();
+        let mut sum = ((rest[1] - PRIOR.mean) / PRIOR.sigma).powi(2);
+        for (n, readings) in self.channels.iter().enumerate() {
+            let [gain, offset, drift] = [0, 1, 2].map(|k| rest[2 + 3 * n + k]);
+            let time = |(i, x): (usize, f64)| (i as f64 + x) * self.dt;
+            for (i, &place) in readings.places.iter().enumerate() {
+                let seen = record.seen(readings.kind, &states, place, readings.around[i])
+                    + readings.fixed_in_space[i];
+                let age = time(place) - time(readings.places[0]);
+                let model = gain * seen + offset + drift * age;
+                sum += cost(
+                    readings.loss,
+                    (model - readings.values[i]) / readings.sigmas[i],
+                );
+            }
+        }
+        sum
+    }
+}
+
+/// Methods, lengths and seeds.
+fn cases() -> impl Strategy<Value = Case> {
+    let methods = prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)];
+    (methods, 4usize..14, any::<u64>()).prop_map(|(method, nodes, seed)| case(method, nodes, seed))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_gradient_is_the_derivative_by_dual_numbers(case in cases()) {
+        let (problem, theta) = (case.problem(), case.theta());
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let gradient = problem.gradient(&theta, &evaluation, GradientKind::Discrete).euclidean;
+        let cost = case.reference(&theta, usize::MAX).re;
+        prop_assert!((evaluation.cost - cost).abs() <= 1e-12 * cost, "{} {cost}", evaluation.cost);
+        let largest = gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+        for (seed, g) in gradient.iter().enumerate() {
+            let exact = case.reference(&theta, seed).eps;
+            prop_assert!((g - exact).abs() <= 1e-11 * largest, "{seed}: {g} is not {exact}");
+        }
+    }
+
+    #[test]
+    fn the_tangent_of_the_predictions_is_their_derivative(case in cases(), seed in any::<u64>()) {
+        let (problem, theta) = (case.problem(), case.theta());
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let along: Vec<f64> = theta.iter().map(|_| random.random_range(-1.0..1.0)).collect();
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let change = problem.predictions_tangent(&evaluation, &along);
+        // Transposed: the gradient of a weighted sum of predictions, by the adjoint.
+        let gradient = problem.gradient(&theta, &evaluation, GradientKind::Discrete).euclidean;
+        let slope: f64 = gradient.iter().zip(&along).map(|(g, d)| g * d).sum();
+        let experiment = &problem.experiments[0];
+        let mut expected = 2.0 * (theta[index_of_prior(&problem)] - PRIOR.mean) / PRIOR.sigma.powi(2)
+            * along[index_of_prior(&problem)];
+        let mut size = expected.abs();
+        let channels = experiment.channels.iter().zip(&evaluation.predictions[0]);
+        for ((channel, predicted), change) in channels.zip(&change[0]) {
+            for (s, d) in channel.slopes(predicted).iter().zip(change) {
+                expected += s * d;
+                size += (s * d).abs();
+            }
+        }
+        prop_assert!((slope - expected).abs() <= 1e-11 * size, "{slope} is not {expected}");
+    }
+}
+
+fn index_of_prior(problem: &Problem) -> usize {
+    problem.functions.scalar_range().start + 1
+}
