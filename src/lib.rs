@@ -51,8 +51,9 @@
 //!    where one is.
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
 //!    starts and the choice of a weight.
-//! 8. [`report`] writes tables, figures and the result document, and compares runs.
-//! 9. [`cli`] is one file per command.
+//! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.
+//! 9. [`report`] writes tables, figures and the result document, and compares runs.
+//! 10. [`cli`] is one file per command.
 //!
 //! # Example
 //!
@@ -114,6 +115,7 @@
 pub mod cli;
 pub mod config;
 pub mod constraints;
+pub mod diagnostics;
 pub mod dynamics;
 pub mod error;
 pub mod functions;

