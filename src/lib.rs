@@ -128,4 +128,6 @@ pub mod observations;
 pub mod problem;
 pub mod qp;
 pub mod report;
+pub mod signal;
 pub mod solvers;
+pub mod units;
