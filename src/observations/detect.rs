@@ -209,8 +209,13 @@ impl Candidate {
         let mut data = self.records.iter().position(is_data)?;
         // Rows before the first good one that begin as data do are data with a mistake.
         let begins_as_data = |record: &StringRecord| {
-            matches!(self.read(record, lead), Field::Number(_))
-                && (record.len() > 1 || self.width == 1)
+            let nothing = record.len() == self.width
+                && record
+                    .iter()
+                    .all(|t| field::read(t, self.decimal) == Field::Missing);
+            let number = matches!(self.read(record, lead), Field::Number(_))
+                && (record.len() > 1 || self.width == 1);
+            number || nothing
         };
         while data > 0 && begins_as_data(&self.records[data - 1]) {
             data -= 1;
@@ -283,7 +288,8 @@ impl Candidate {
             return false;
         }
         if record.len() > 1 {
-            return true;
+            // Blanks within names make more of them: rather no names than wrong ones.
+            return self.delimiter != ' ';
         }
         // One name over two columns of numbers separated by commas: rather one column with decimal
         // commas, which must not be read as two.

@@ -266,12 +266,15 @@ impl Table {
             let width = layout.width.unwrap_or(fields.len());
             self.columns = vec![Column::default(); width];
         }
-        if fields.len() != self.columns.len() {
+        // Some instruments end every row of data, but not the names, with a delimiter.
+        let width = self.columns.len();
+        let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
+        if fields.len() != width + usize::from(ended) {
             let place = self.place(row, None);
             let named = !self.headers.is_empty();
-            return Err(ragged(place, fields, self.columns.len(), named));
+            return Err(ragged(place, fields, width, named));
         }
-        for (index, text) in fields.iter().enumerate() {
+        for (index, text) in fields.iter().take(width).enumerate() {
             let column = &self.columns[index];
             if column.unreadable.is_some() {
                 continue;

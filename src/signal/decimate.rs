@@ -27,8 +27,8 @@ pub fn decimation_filter(factor: usize) -> Option<Vec<SecondOrder>> {
 /// With F for half the new rate, tones below 0.5 F keep their size within 1e-3, 0.8 F is halved.
 /// What lies above F and is mirrored into the band below is attenuated by 31 dB or more at F,
 /// 56 dB at 1.2 F, 80 dB from 1.45 F on: strong tones between F and 1.2 F are not removed, they
-/// appear between 0.8 F and F. At the ends of the series, where its continuation is a guess, the
-/// filter is less exact.
+/// appear between 0.8 F and F. At the ends of the series, where its continuation is a guess, tones
+/// are off by some 2e-4 of their size at 0.1 F and 5e-3 at 0.4 F.
 ///
 /// The series as it is where `factor < 2`.
 pub fn decimate(values: &[f64], factor: usize) -> Vec<f64> {
@@ -82,11 +82,10 @@ mod tests {
     fn the_ends_of_low_tones_are_nearly_kept() {
         // The reflection keeps value and slope of a tone and turns its curvature round; what is
         // left of that kink grows with the square of the frequency and is largest at the ends.
-        for (relative, allowed) in [(0.1, 5e-4), (0.2, 5e-3), (0.4, 5e-2)] {
+        for (relative, allowed) in [(0.1, 5e-4), (0.2, 2e-3), (0.4, 1e-2)] {
             let (decimated, exact) = tone(relative, 8);
             let errors = decimated.iter().zip(&exact).map(|(x, y)| (x - y).abs());
             let worst = errors.fold(0.0, f64::max);
-            println!("ends {relative} {worst}");
             assert!(worst < allowed, "{relative} {worst}");
         }
     }

@@ -280,3 +280,59 @@ fn what_is_told_is_not_detected() {
     assert_eq!(table.headers(), ["t", "y"]);
     assert_eq!((table.unit(0), table.lines()), (Some("s"), &[4][..]));
 }
+
+#[test]
+fn instruments_have_their_habits() {
+    // Units in brackets, then a blank line.
+    let scope = table("Time,Channel A\n(ms),(mV)\n\n-0.1,1.0\n0.0,1.5\n");
+    assert_eq!(scope.headers(), ["Time", "Channel A"]);
+    assert_eq!((scope.unit(0), scope.unit(1)), (Some("ms"), Some("mV")));
+    assert_eq!(scope.column("Channel A").unwrap(), [1.0, 1.5]);
+    // Keys and values, some of them numbers; names that are units.
+    let scope = table(
+        "Record Length,7000\nInterval,CH1:2e-6\nUnits,CH1:V\nSecond,Volt\n-7e-3,0.04\n-6e-3,0.05\n",
+    );
+    assert_eq!(scope.headers(), ["Second", "Volt"]);
+    assert_eq!(scope.lines(), [5, 6]);
+    // A phone: quoted names with units.
+    let phone = table("\"Time (s)\",\"Acceleration x (m/s^2)\"\n0E0,1.5E-1\n1E-2,2E-1\n");
+    assert_eq!(phone.column("Acceleration x").unwrap(), [0.15, 0.2]);
+    // A spreadsheet.
+    let sheet = table("sep=;\r\nt;y\r\n0;1,5\r\n1;2,5\r\n");
+    assert_eq!(sheet.column("y").unwrap(), [1.5, 2.5]);
+    // A delimiter after the last field, with and without one after the names.
+    for names in ["t\ty\t", "t\ty"] {
+        let table = table(format!("{names}\n0\t1.5\t\n1\t2.5\t\n"));
+        assert_eq!(table.column("y").unwrap(), [1.5, 2.5]);
+    }
+    // Settings beside the readings.
+    let beside = table("Points,2500,,-0.5,1\nInterval,2e-4,,0.0,2\n,,,0.5,3\n,,,1.0,4\n");
+    assert_eq!(beside.values(3).unwrap(), [-0.5, 0.0, 0.5, 1.0]);
+    assert!(beside.headers().is_empty());
+    // Names with blanks in columns made by blanks: no names rather than wrong ones.
+    let aligned = table("Time (s)   Acc (g)\n   0.0       1.0\n   0.1       2.0\n");
+    assert_eq!(aligned.values(1).unwrap(), [1.0, 2.0]);
+    assert!(aligned.headers().is_empty());
+}
+
+#[test]
+fn rows_without_readings_are_no_names() {
+    for text in ["t,y\nNaN,NaN\n0,1\n1,2\n", "t,y\n,\n0,1\n1,2\n"] {
+        let table = table(text);
+        assert_eq!(table.headers(), ["t", "y"]);
+        assert_eq!(table.lines(), [2, 3, 4]);
+        assert!(table.readings(1).unwrap()[0].is_nan());
+    }
+}
+
+#[test]
+fn long_files_are_read_beyond_what_is_looked_at() {
+    let mut text = "Rig 7\nt;y\n".to_owned();
+    for i in 0..20_000 {
+        text.push_str(&format!("{},{:03};{}\n", i / 1000, i % 1000, i % 7));
+    }
+    let table = table(&text);
+    assert_eq!(table.rows(), 20_000);
+    assert_eq!(table.values(0).unwrap()[19_999], 19.999);
+    assert_eq!(table.lines()[19_999], 20_002);
+}
