@@ -54,6 +54,9 @@
 //! 8. [`report`] writes tables, figures and the result document, and compares runs.
 //! 9. [`cli`] is one file per command.
 //!
+//! Beside these, [`units`] knows units and their factors to SI, and [`signal`] what lies between
+//! samples, shapes of excitation, filters and spectra.
+//!
 //! # Example
 //!
 //! A device whose mass falls along a line is simulated, and found again from its motion:

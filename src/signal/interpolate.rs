@@ -39,7 +39,7 @@ impl Signal {
     /// is a constant at one time.
     ///
     /// `None` where there is no sample, the numbers of times and values differ, a time or value is
-    /// not finite, or the times do not increase.
+    /// not finite, the times do not increase, or they are so close that a spline overflows.
     pub fn new(times: Vec<f64>, values: Vec<f64>, interpolation: Interpolation) -> Option<Self> {
         let increasing = times.windows(2).all(|pair| pair[0] < pair[1]);
         let finite = times.iter().chain(&values).all(|x| x.is_finite());
@@ -50,7 +50,8 @@ impl Signal {
             Interpolation::Cubic => spline::curvatures(&times, &values),
             _ => Vec::new(),
         };
-        Some(Self {
+        let bent = curvatures.iter().all(|bend| bend.is_finite());
+        bent.then_some(Self {
             times,
             values,
             interpolation,
@@ -354,6 +355,12 @@ mod tests {
         ] {
             assert_eq!(Signal::new(times, values, Interpolation::Cubic), None);
         }
+        let close = Signal::new(
+            vec![0.0, 1e-310, 1.0, 2.0],
+            vec![0.0, 1.0, 0.0, 1.0],
+            Interpolation::Cubic,
+        );
+        assert_eq!(close, None);
         let still = Signal::equally_spaced(0.0, 0.1, vec![1.0], Interpolation::Hold).unwrap();
         assert!(still.value(f64::NAN) == 1.0);
     }

@@ -43,7 +43,8 @@ impl Spectrum {
         let n = values.len();
         let varies = values.iter().any(|x| *x != values[0]);
         let finite = values.iter().all(|x| x.is_finite());
-        if n < FEWEST || !varies || !finite || !(spacing > 0.0 && spacing.is_finite()) {
+        let spaced = spacing > 0.0 && spacing.is_finite();
+        if n < FEWEST || !varies || !finite || !spaced {
             return None;
         }
         let mean = values.iter().sum::<f64>() / n as f64;
