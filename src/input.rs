@@ -23,19 +23,29 @@ const MOST_NAMES: usize = 30;
 /// When there is no such file, it is a folder, it cannot be read, it is longer than `limit`, or it
 /// is not UTF-8 text.
 pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputError> {
+    let bytes = read_bytes(path, what, limit)?;
+    utf8(path, bytes).map_err(|error| error.expected_if_none(what))
+}
+
+/// Reads a file of at most `limit` bytes; `what` says what it should be.
+///
+/// # Errors
+///
+/// When there is no such file, it is a folder, it cannot be read, or it is longer than `limit`.
+pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
     if path.is_dir() {
         return Err(InputError::file(path, "this is a folder, not a file").expected(what));
     }
     let file = File::open(path).map_err(|error| unreadable(path, what, &error))?;
-    read_text_from(path, file, limit).map_err(|error| error.expected_if_none(what))
+    read_bytes_from(path, file, limit).map_err(|error| error.expected_if_none(what))
 }
 
-/// Reads text of at most `limit` bytes from a reader; `path` is what messages call it.
+/// Reads at most `limit` bytes from a reader; `path` is what messages call it.
 ///
 /// # Errors
 ///
-/// When reading fails, there is more than `limit`, or it is not UTF-8 text.
-pub fn read_text_from(path: &Path, reader: impl Read, limit: u64) -> Result<String, InputError> {
+/// When reading fails, or there is more than `limit`.
+pub fn read_bytes_from(path: &Path, reader: impl Read, limit: u64) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::new();
     reader
         .take(limit.saturating_add(1))
@@ -47,7 +57,7 @@ pub fn read_text_from(path: &Path, reader: impl Read, limit: u64) -> Result<Stri
             format!("the file is longer than {limit} bytes"),
         ));
     }
-    utf8(path, bytes)
+    Ok(bytes)
 }
 
 /// A short quotation of somebody's text for a message: one line, cut where it is long.

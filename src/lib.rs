@@ -55,6 +55,9 @@
 //! 9. [`report`] writes tables, figures and the result document, and compares runs.
 //! 10. [`cli`] is one file per command.
 //!
+//! Beside these, [`units`] knows units and their factors to SI, and [`signal`] what lies between
+//! samples, shapes of excitation, filters and spectra.
+//!
 //! # Example
 //!
 //! A device whose mass falls along a line is simulated, and found again from its motion:
@@ -128,3 +131,4 @@ pub mod qp;
 pub mod report;
 pub mod signal;
 pub mod solvers;
+pub mod units;

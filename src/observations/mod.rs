@@ -1,9 +1,19 @@
-//! Tables of readings: CSV files, what their times must be like, and reading between them.
+//! Tables of readings: text files as instruments write them, what their times must be like, and
+//! reading between them.
 
+mod columns;
+mod detect;
+mod encoding;
+mod field;
+mod format;
 mod resample;
+mod rows;
 mod table;
 pub mod times;
 
+pub use columns::ColumnName;
+pub use encoding::Encoding;
+pub use format::{Detected, TableFormat};
 pub use resample::resample;
 pub use table::Table;
-pub use times::{equally_spaced, increasing};
+pub use times::{equally_spaced, equally_spaced_at, increasing, increasing_at};

@@ -1,13 +1,17 @@
-//! A CSV file: one row of column names, then rows of numbers.
+//! A table in a text file, as people and instruments write it.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use csv::{ReaderBuilder, StringRecord, Trim};
+use csv::StringRecord;
 
+use super::detect::{Layout, detect};
+use super::encoding::decode;
+use super::field::{self, Field};
+use super::format::{Detected, TableFormat};
+use super::rows::{Source, with_newlines};
 use crate::error::{InputError, Place};
-use crate::input::{listed, one_of, quote, read_text, read_text_from};
-use crate::near::did_you_mean;
+use crate::input::{listed, quote, read_bytes, read_bytes_from};
 
 /// Longest table that is read, in bytes: some ten million rows, which fit into memory.
 const LONGEST_TABLE: u64 = 1 << 30;
@@ -15,28 +19,53 @@ const LONGEST_TABLE: u64 = 1 << 30;
 /// What a table should be, in messages.
 const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
-/// A CSV file of named columns of equal length.
+/// A file of columns of equal length.
 ///
-/// Comma-separated, one row of column names first. Lines that begin with `#` and blank lines do not
-/// count; spaces around a field, a byte order mark and Windows line ends do no harm. A column that
-/// is never asked for may hold text.
+/// The plain form is comma-separated, one row of column names first. What instruments write is
+/// detected, or told by a [`TableFormat`]: other delimiters, decimal commas, lines of text before
+/// the names, a row of units after them, no names at all, encodings other than UTF-8.
+///
+/// Lines that begin with `#` and blank lines do not count; spaces around a field, a byte order mark
+/// and the line ends of any system do no harm. A column that is never asked for may hold text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     path: PathBuf,
+    format: Detected,
     headers: Vec<String>,
-    columns: Vec<Result<Vec<f64>, InputError>>,
+    units: Vec<String>,
+    columns: Vec<Column>,
     lines: Vec<usize>,
 }
 
+/// The readings of a column, NaN where one is missing, up to the first field that is none.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Column {
+    readings: Vec<f64>,
+    /// The first field that is not a finite number.
+    unnumbered: Option<InputError>,
+    /// The first field that is neither that nor missing.
+    unreadable: Option<InputError>,
+}
+
 impl Table {
-    /// Reads a table from a file.
+    /// Reads a table from a file; how it is written is detected.
     ///
     /// # Errors
     ///
     /// When there is no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        Self::read_with(path, &TableFormat::default())
+    }
+
+    /// Reads a table from a file that is written in this way.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) finds a
+    /// mistake.
+    pub fn read_with(path: impl AsRef<Path>, format: &TableFormat) -> Result<Self, InputError> {
         let path = path.as_ref();
-        Self::from_text(path, &read_text(path, TABLE, LONGEST_TABLE)?)
+        Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
     }
 
     /// Reads a table from a reader; `path` is what messages call it.
@@ -51,10 +80,23 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When it is not UTF-8 text, has no rows, rows of different length, or two columns of one name.
+    /// When it is not text, has no rows, rows of different length, or two columns of one name.
     pub fn parse(path: impl AsRef<Path>, reader: impl Read) -> Result<Self, InputError> {
+        Self::parse_with(path, reader, &TableFormat::default())
+    }
+
+    /// Reads a table that is written in this way from a reader; `path` is what messages call it.
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`](Self::parse), and when the format asks for signs that cannot be.
+    pub fn parse_with(
+        path: impl AsRef<Path>,
+        reader: impl Read,
+        format: &TableFormat,
+    ) -> Result<Self, InputError> {
         let path = path.as_ref();
-        Self::from_text(path, &read_text_from(path, reader, LONGEST_TABLE)?)
+        Self::from_bytes(path, read_bytes_from(path, reader, LONGEST_TABLE)?, format)
     }
 
     /// The file, as it was given.
@@ -62,9 +104,19 @@ impl Table {
         &self.path
     }
 
-    /// Names of the columns, in order.
+    /// How the file was found to be written.
+    pub fn format(&self) -> &Detected {
+        &self.format
+    }
+
+    /// Names of the columns, in order; empty where the file has none.
     pub fn headers(&self) -> &[String] {
         &self.headers
+    }
+
+    /// The texts of the row of units, in order; empty where the file has none.
+    pub fn units_row(&self) -> &[String] {
+        &self.units
     }
 
     /// Line in the file of each data row, from 1.
@@ -77,27 +129,54 @@ impl Table {
         self.lines.len()
     }
 
-    /// The values of a column.
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The values of a column, as [`find`](Self::find) finds it by its name.
     ///
     /// # Errors
     ///
     /// When there is no such column, or one of its fields is not a finite number.
     pub fn column(&self, name: &str) -> Result<&[f64], InputError> {
-        let names = || self.headers.iter().map(String::as_str);
-        match names().position(|header| header == name) {
-            Some(index) => match &self.columns[index] {
-                Ok(values) => Ok(values),
-                Err(error) => Err(error.clone()),
-            },
-            None => {
-                let error = InputError::file(&self.path, "there is no such column")
-                    .found(quote(name))
-                    .expected(one_of(names()));
-                Err(match did_you_mean(name, names()) {
-                    Some(hint) => error.hint(hint),
-                    None => error,
-                })
-            }
+        self.values(self.find(&name.into())?)
+    }
+
+    /// The values of a column, by its index from 0: a finite number in every row.
+    ///
+    /// # Errors
+    ///
+    /// When one of its fields is not a finite number, or there is no such column.
+    pub fn values(&self, index: usize) -> Result<&[f64], InputError> {
+        let column = self.at(index)?;
+        match &column.unnumbered {
+            None => Ok(&column.readings),
+            Some(error) => Err(error.clone()),
+        }
+    }
+
+    /// The readings of a column, by its index from 0: NaN where one is missing, that is where the
+    /// field is empty, `NaN`, `NA`, `N/A`, `#N/A`, `null`, `-` or `--`.
+    ///
+    /// ```
+    /// use kmcfit::observations::Table;
+    /// let table = Table::parse("gaps.csv", "t,y\n0,3.3\n1,\n2,3.1\n".as_bytes())?;
+    /// let readings = table.readings(1)?;
+    /// assert_eq!((readings[0], readings[2]), (3.3, 3.1));
+    /// assert!(readings[1].is_nan());
+    /// # Ok::<(), kmcfit::error::InputError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// When one of its fields is anything else than that or a finite number, or there is no such
+    /// column.
+    pub fn readings(&self, index: usize) -> Result<&[f64], InputError> {
+        let column = self.at(index)?;
+        match &column.unreadable {
+            None => Ok(&column.readings),
+            Some(error) => Err(error.clone()),
         }
     }
 
@@ -111,140 +190,132 @@ impl Table {
         }
     }
 
-    fn from_text(path: &Path, text: &str) -> Result<Self, InputError> {
-        // To the csv crate a comment ends at `\n` only: one would swallow the rest of such a file.
-        let only_returns = text.contains('\r') && !text.contains('\n');
-        let text = match only_returns {
-            true => &text.replace('\r', "\n"),
-            false => text,
-        };
-        let mut rows = Rows::new(path, text);
-        let Some((header_line, headers)) = rows.next().transpose()? else {
-            return Err(InputError::file(path, "the file is empty").expected(TABLE));
-        };
-        check_headers(path, header_line, &headers)?;
+    fn at(&self, index: usize) -> Result<&Column, InputError> {
+        let index = self.find(&super::ColumnName::Number(index.saturating_add(1)))?;
+        Ok(&self.columns[index])
+    }
+
+    fn from_bytes(path: &Path, bytes: Vec<u8>, format: &TableFormat) -> Result<Self, InputError> {
+        format.check()?;
+        let (text, encoding) = decode(path, bytes)?;
+        let text = with_newlines(text);
+        let layout = detect(path, &text, format);
+        let skipped = format.skip.unwrap_or(0);
         let mut table = Self {
             path: path.to_path_buf(),
-            columns: vec![Ok(Vec::new()); headers.len()],
-            headers: headers.iter().map(str::to_owned).collect(),
+            format: Detected {
+                encoding,
+                delimiter: layout.delimiter,
+                decimal: layout.decimal,
+                skipped,
+                header: None,
+                units_row: None,
+            },
+            headers: Vec::new(),
+            units: Vec::new(),
+            columns: Vec::new(),
             lines: Vec::new(),
         };
-        for row in rows {
-            let (line, fields) = row?;
-            table.push(line, &fields)?;
-        }
-        if table.lines.is_empty() {
-            return Err(InputError::file(path, "the file has no data")
-                .found("a row of column names only")
-                .expected(TABLE));
-        }
+        table.fill(&Source::new(&text, skipped, layout.delimiter), &layout)?;
         Ok(table)
     }
 
+    fn fill(&mut self, source: &Source, layout: &Layout) -> Result<(), InputError> {
+        let path = self.path.clone();
+        let mut rows = source.rows(&path);
+        let mut fields = StringRecord::new();
+        let mut count = 0;
+        while let Some(line) = rows.read(&mut fields)? {
+            let row = Some(count);
+            if row == layout.header {
+                check_headers(&path, line, &fields, layout.decimal)?;
+                self.headers = fields.iter().map(str::to_owned).collect();
+                self.columns = vec![Column::default(); fields.len()];
+                self.format.header = Some(line);
+            } else if row == layout.units {
+                self.units = fields.iter().map(str::to_owned).collect();
+                self.format.units_row = Some(line);
+            } else if count >= layout.data {
+                self.push(line, &fields, layout)?;
+            }
+            count += 1;
+        }
+        let first = self.lines.first().copied();
+        match (self.format.header.or(first), first) {
+            (None, _) => Err(empty(&path, self.format.skipped)),
+            (_, None) => Err(InputError::file(&path, "the file has no data")
+                .found("a row of column names only")
+                .expected(TABLE)),
+            (Some(head), _) => {
+                self.format.skipped = head - 1;
+                Ok(())
+            }
+        }
+    }
+
     /// Adds a data row; a field that is no number spoils its column, for whoever asks for it.
-    fn push(&mut self, line: usize, fields: &StringRecord) -> Result<(), InputError> {
+    fn push(
+        &mut self,
+        line: usize,
+        fields: &StringRecord,
+        layout: &Layout,
+    ) -> Result<(), InputError> {
         let row = self.lines.len();
         self.lines.push(line);
-        if fields.len() != self.headers.len() {
-            return Err(ragged(self.place(row, None), fields, self.headers.len()));
+        if self.columns.is_empty() {
+            let width = layout.width.unwrap_or(fields.len());
+            self.columns = vec![Column::default(); width];
         }
-        for (index, field) in fields.iter().enumerate() {
-            let value = match &self.columns[index] {
-                Ok(_) => number(field),
-                Err(_) => continue,
-            };
-            match (value, &mut self.columns[index]) {
-                (Ok(value), Ok(values)) => values.push(value),
-                (Ok(_), Err(_)) => {}
-                (Err(problem), column) => {
-                    let place = Place::Row {
-                        file: self.path.clone(),
-                        row: row + 1,
-                        line,
-                        column: Some(self.headers[index].clone()),
-                    };
-                    *column = Err(not_a_number(place, problem, field));
-                }
+        // Some instruments end every row of data, but not the names, with a delimiter.
+        let width = self.columns.len();
+        let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
+        if fields.len() != width + usize::from(ended) {
+            let place = self.place(row, None);
+            let named = !self.headers.is_empty();
+            return Err(ragged(place, fields, width, named));
+        }
+        for (index, text) in fields.iter().take(width).enumerate() {
+            let column = &self.columns[index];
+            if column.unreadable.is_some() {
+                continue;
             }
+            let read = field::read(text, layout.decimal);
+            if let Field::Number(value) = read {
+                self.columns[index].readings.push(value);
+                continue;
+            }
+            let place = || self.place(row, Some(&self.label(index)));
+            let unnumbered = column
+                .unnumbered
+                .is_none()
+                .then(|| field::not_a_number(place(), text, layout.decimal));
+            let unreadable = (read != Field::Missing)
+                .then(|| field::not_a_reading(place(), text, layout.decimal));
+            let column = &mut self.columns[index];
+            column.readings.push(f64::NAN);
+            column.unnumbered = column.unnumbered.take().or(unnumbered);
+            column.unreadable = unreadable;
         }
         Ok(())
     }
 }
 
-/// The rows of a text with their lines, the row of names first.
-struct Rows<'a> {
-    path: &'a Path,
-    text: &'a str,
-    records: csv::StringRecordsIntoIter<&'a [u8]>,
-    counted: usize,
+/// The error for a file without rows after the lines that are skipped.
+fn empty(path: &Path, skipped: usize) -> InputError {
+    let error = InputError::file(path, "the file is empty").expected(TABLE);
+    match skipped {
+        0 => error,
+        lines => error.found(format!("nothing after the {lines} lines that are skipped")),
+    }
+}
+
+/// Column names: each once, and not all numbers.
+fn check_headers(
+    path: &Path,
     line: usize,
-}
-
-impl<'a> Rows<'a> {
-    fn new(path: &'a Path, text: &'a str) -> Self {
-        let records = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(Trim::All)
-            .from_reader(text.as_bytes())
-            .into_records();
-        Self {
-            path,
-            text,
-            records,
-            counted: 0,
-            line: 1,
-        }
-    }
-
-    /// The line of the first field at or after a byte: the csv crate's position of a record is
-    /// before the blank lines and comments that it skips.
-    fn line_from(&mut self, byte: usize) -> usize {
-        let bytes = self.text.as_bytes();
-        let mut comment = false;
-        while let Some(&here) = bytes.get(self.counted) {
-            let at_line_end = matches!(here, b'\n' | b'\r');
-            if self.counted >= byte && !at_line_end && !comment {
-                if here != b'#' {
-                    break;
-                }
-                comment = true;
-            }
-            comment &= !at_line_end;
-            let windows = here == b'\r' && bytes.get(self.counted + 1) == Some(&b'\n');
-            self.line += usize::from(at_line_end && !windows);
-            self.counted += 1;
-        }
-        self.line
-    }
-}
-
-impl Iterator for Rows<'_> {
-    type Item = Result<(usize, StringRecord), InputError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            let record = match self.records.next()? {
-                Ok(record) => record,
-                Err(error) => {
-                    let problem = format!("the file cannot be read: {error}");
-                    return Some(Err(InputError::file(self.path, problem)));
-                }
-            };
-            let byte = record.position().map_or(0, csv::Position::byte);
-            let line = self.line_from(usize::try_from(byte).unwrap_or(usize::MAX));
-            let first = record.get(0).unwrap_or_default();
-            let blank = record.len() == 1 && first.is_empty();
-            if !blank && !first.starts_with('#') {
-                return Some(Ok((line, record)));
-            }
-        }
-    }
-}
-
-/// Column names: each once, no numbers, separated by commas.
-fn check_headers(path: &Path, line: usize, headers: &StringRecord) -> Result<(), InputError> {
+    headers: &StringRecord,
+    decimal: char,
+) -> Result<(), InputError> {
     let error = |problem: String| {
         let place = Place::Line {
             file: path.to_path_buf(),
@@ -253,19 +324,8 @@ fn check_headers(path: &Path, line: usize, headers: &StringRecord) -> Result<(),
         };
         InputError::new(place, problem)
     };
-    if let (1, Some(only)) = (headers.len(), headers.get(0))
-        && let Some(separator) = [';', '\t'].into_iter().find(|&c| only.contains(c))
-    {
-        let name = if separator == ';' {
-            "semicolons"
-        } else {
-            "tabs"
-        };
-        return Err(error(format!("the fields are separated by {name}"))
-            .found(quote(only))
-            .expected("fields separated by commas, and decimal points"));
-    }
-    if headers.iter().all(|name| name.parse::<f64>().is_ok()) {
+    let is_number = |name| matches!(field::read(name, decimal), Field::Number(_));
+    if headers.iter().all(is_number) {
         return Err(error("the column names are missing".to_owned())
             .found(format!("the numbers {}", quote(&listed(headers))))
             .expected("one row of column names before the data")
@@ -283,12 +343,16 @@ fn check_headers(path: &Path, line: usize, headers: &StringRecord) -> Result<(),
 }
 
 /// A row with more or fewer fields than there are columns.
-fn ragged(place: Place, fields: &StringRecord, expected: usize) -> InputError {
+fn ragged(place: Place, fields: &StringRecord, expected: usize, named: bool) -> InputError {
     let plural = |n: usize| match n {
         1 => "1 field".to_owned(),
         n => format!("{n} fields"),
     };
-    let error = InputError::new(place, "the row does not fit the column names")
+    let problem = match named {
+        true => "the row does not fit the column names",
+        false => "the row does not fit the other rows",
+    };
+    let error = InputError::new(place, problem)
         .found(plural(fields.len()))
         .expected(format!("{}, one per column", plural(expected)));
     if fields.iter().any(|field| field.contains('\n')) {
@@ -298,33 +362,4 @@ fn ragged(place: Place, fields: &StringRecord, expected: usize) -> InputError {
         return error.hint("write numbers with a decimal point, not a comma");
     }
     error
-}
-
-/// A finite number, or what is wrong with the field.
-fn number(field: &str) -> Result<f64, &'static str> {
-    match field.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err("not a finite number"),
-        Err(_) if field.is_empty() => Err("a number is missing"),
-        Err(_) => Err("not a number"),
-    }
-}
-
-/// The error for a field that is not a finite number.
-fn not_a_number(place: Place, problem: &str, field: &str) -> InputError {
-    let error = InputError::new(place, problem)
-        .found(match field {
-            "" => "nothing".to_owned(),
-            field => quote(field),
-        })
-        .expected("a finite number");
-    if field.contains('\n') {
-        return error.hint("a quote that is opened in this row is not closed in it");
-    }
-    match field.replace(',', ".").parse::<f64>() {
-        Ok(_) if field.contains(',') => {
-            error.hint("write numbers with a decimal point, not a comma")
-        }
-        _ => error,
-    }
 }

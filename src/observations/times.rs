@@ -19,10 +19,19 @@ const ROUNDED: f64 = 0.05;
 ///
 /// When the column cannot be read, or a time is not after the one before.
 pub fn increasing<'a>(table: &'a Table, column: &str) -> Result<&'a [f64], InputError> {
-    let times = table.column(column)?;
+    increasing_at(table, table.find(&column.into())?)
+}
+
+/// The times in a column, by its index from 0, strictly increasing.
+///
+/// # Errors
+///
+/// When the column cannot be read, or a time is not after the one before.
+pub fn increasing_at(table: &Table, index: usize) -> Result<&[f64], InputError> {
+    let times = table.values(index)?;
     match times.windows(2).position(|pair| pair[1] <= pair[0]) {
         None => Ok(times),
-        Some(row) => Err(not_increasing(table, column, times, row + 1)),
+        Some(row) => Err(not_increasing(table, &table.label(index), times, row + 1)),
     }
 }
 
@@ -36,7 +45,17 @@ pub fn increasing<'a>(table: &'a Table, column: &str) -> Result<&'a [f64], Input
 /// When the times are not [`increasing`], there is only one, a spacing differs from the median by
 /// more than [`SPACING_TOLERANCE`], or a time is further than that from `t_0 + i dt`.
 pub fn equally_spaced(table: &Table, column: &str) -> Result<f64, InputError> {
-    let times = increasing(table, column)?;
+    equally_spaced_at(table, table.find(&column.into())?)
+}
+
+/// As [`equally_spaced`], of a column by its index from 0.
+///
+/// # Errors
+///
+/// As [`equally_spaced`].
+pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError> {
+    let times = increasing_at(table, index)?;
+    let column = &*table.label(index);
     let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
         return Err(
             InputError::new(table.place(0, Some(column)), "there is only one time")

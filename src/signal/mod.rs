@@ -1,24 +1,27 @@
-//! stub
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SecondOrder {
-    pub b: [f64; 3],
-    pub a: [f64; 2],
-}
-pub fn zero_phase(_s: &[SecondOrder], x: &[f64]) -> Vec<f64> {
-    x.to_vec()
-}
-pub fn zero_phase_transpose(_s: &[SecondOrder], x: &[f64]) -> Vec<f64> {
-    x.to_vec()
-}
+//! Signals over time, without knowledge of the device: values between samples, shapes of
+//! excitation, filters, spectra.
+//!
+//! ```
+//! use kmcfit::signal::{Interpolation, Signal};
+//! let times: Vec<f64> = (0..11).map(|i| 0.1 * f64::from(i)).collect();
+//! let values = times.iter().map(|t| t * t * t).collect();
+//! let signal = Signal::new(times, values, Interpolation::Cubic).expect("increasing times");
+//! assert!((signal.value(0.25) - 0.25_f64.powi(3)).abs() < 1e-15);
+//! assert!((signal.second_derivative(0.25) - 6.0 * 0.25).abs() < 1e-12);
+//! ```
 
-pub struct Spectrum {
-    f: f64,
-}
-impl Spectrum {
-    pub fn of(_v: &[f64], _h: f64) -> Option<Self> {
-        Some(Self { f: 1.0 })
-    }
-    pub fn dominant(&self) -> f64 {
-        self.f
-    }
-}
+mod decimate;
+mod filter;
+mod interpolate;
+mod shape;
+mod spectrum;
+mod spline;
+
+pub use decimate::{decimate, decimation_filter};
+pub use filter::{
+    SecondOrder, apply, band_pass, high_pass, low_pass, zero_phase, zero_phase_padded,
+    zero_phase_transpose,
+};
+pub use interpolate::{Interpolation, Signal};
+pub use shape::{Shape, SweepLaw};
+pub use spectrum::Spectrum;

@@ -2,13 +2,15 @@
 
 use kmcfit::config::ModelFile;
 use kmcfit::config::locate::{key_path, locate};
-use kmcfit::observations::{Table, times};
+use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::model::FULL;
 
 const CSV: &str = "# made by hand\nt,\"y\",note\r\n0,1,a\n\n0.1, 2 ,\"b, c\"\n0.2,3,\n";
+
+const INSTRUMENT: &str = "Rig 7\nRate;1000\n\nt [s];a\ns;m/s²\n0,0;1,5\n0,1;\n# x\n0,2;NaN\n";
 
 /// A piece of syntax, put in to break a text.
 const PIECES: &[&str] = &[
@@ -96,7 +98,45 @@ fn read_model(text: &str) {
 }
 
 fn read_table(bytes: &[u8]) {
-    if let Ok(table) = Table::parse("t.csv", bytes) {
+    let any = TableFormat::default();
+    for format in [
+        any,
+        TableFormat {
+            delimiter: Some(' '),
+            units_row: Some(true),
+            ..any
+        },
+        TableFormat {
+            decimal: Some(','),
+            skip: Some(2),
+            ..any
+        },
+        TableFormat {
+            header: Some(false),
+            units_row: Some(true),
+            ..any
+        },
+        TableFormat {
+            header: Some(true),
+            ..any
+        },
+    ] {
+        read_table_with(bytes, &format);
+    }
+}
+
+fn read_table_with(bytes: &[u8], format: &TableFormat) {
+    if let Ok(table) = Table::parse_with("t.csv", bytes, format) {
+        assert!(!table.format().to_string().is_empty());
+        assert!(table.rows() > 0);
+        for index in 0..table.width() {
+            assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
+            table.unit(index);
+            if let Ok(readings) = table.readings(index) {
+                assert_eq!(readings.len(), table.rows());
+            }
+        }
+        assert!(table.values(table.width()).is_err());
         assert_eq!(table.rows(), table.lines().len());
         assert!(table.lines().is_sorted());
         for name in table.headers() {
@@ -132,6 +172,7 @@ proptest! {
     #[test]
     fn tables_with_mistakes(changes in changes()) {
         read_table(mutate(CSV, &changes).as_bytes());
+        read_table(mutate(INSTRUMENT, &changes).as_bytes());
     }
 
     #[test]

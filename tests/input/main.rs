@@ -2,6 +2,8 @@
 #![allow(clippy::result_large_err, reason = "as in the library")]
 
 mod arbitrary;
+mod instruments;
+mod instruments_errors;
 mod model;
 mod model_errors;
 mod table;

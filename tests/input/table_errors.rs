@@ -60,40 +60,29 @@ fn empty_and_foreign() {
       found: a row of column names only
       expected: a CSV file with one row of column names and rows of numbers
     ");
-    assert_snapshot!(message(b"t,y\n0,1\n1,\xb0\n"), @"
-    t.csv:3:3: the file is not UTF-8 text
-      found: the byte 0xb0
-      hint: save it as UTF-8, or write only plain letters there
+    assert_snapshot!(message(b"t,y\n0,1\n1,\0\n"), @"
+    t.csv:3:3: the file is not text
+      found: the byte 0x00
+      hint: is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8
     ");
-    assert_snapshot!(message(b"\xfe\xff\0t\0,"), @"
-    t.csv:1:1: the file is not UTF-8 text
-      found: the byte 0xfe
-      hint: it looks like UTF-16: save it as UTF-8
+    assert_snapshot!(message(b"\xfe\xff\xd8\0\0,"), @"
+    t.csv: the file is not text
+      found: a byte order mark of UTF-16, and then no UTF-16
+      hint: save it as UTF-8
     ");
-    assert_snapshot!(message("t;y\n0,5;1,5\n"), @"
-    t.csv:1:1: the fields are separated by semicolons
-      found: `t;y`
-      expected: fields separated by commas, and decimal points
-    ");
-    assert_snapshot!(message("t\ty\n0\t1\n"), @r"
-    t.csv:1:1: the fields are separated by tabs
-      found: `t\ty`
-      expected: fields separated by commas, and decimal points
-    ");
-    assert_snapshot!(message("# t,y\n0.0,3.3\n0.1,3.2\n"), @"
-    t.csv:2:1: the column names are missing
-      found: the numbers `0.0, 3.3`
-      expected: one row of column names before the data
-      hint: a line that begins with `#` is a comment: remove the `#` before the names
+    assert_snapshot!(message("t;y\n"), @"
+    t.csv: the file has no data
+      found: a row of column names only
+      expected: a CSV file with one row of column names and rows of numbers
     ");
 }
 
 #[test]
 fn headers() {
-    assert_snapshot!(message("note\nt,y,t\n0,1,2\n").replace("note", ""), @"
-    t.csv:2: row 1: the row does not fit the column names
-      found: 3 fields
-      expected: 1 field, one per column
+    assert_snapshot!(message("note\nt,y,t\n0,1,2\n"), @"
+    t.csv:2:1: two columns have the name `t`
+      found: columns 1 and 3
+      expected: every column name once
     ");
     assert_snapshot!(message("t,y,t\n0,1,2\n"), @"
     t.csv:1:1: two columns have the name `t`
