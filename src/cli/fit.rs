@@ -6,7 +6,7 @@ use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{OutputFolder, Run, json, predict, summary};
-use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit, without_motion};
+use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit_with_noise, without_motion};
 use std::path::{Path, PathBuf};
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -92,7 +92,13 @@ fn search(
     let mut observe = |row: &Row| progress.show(row);
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {
-        None => fit(problem, &start, settings, &mut observe).map(|fit| (None, None, fit)),
+        None => fit_with_noise(problem, &start, settings, &mut observe).map(|(problem, fit)| {
+            let with_sigmas = Model {
+                problem,
+                ..model.clone()
+            };
+            (Some(with_sigmas), None, fit)
+        }),
         Some(WeightSearch { rule, penalties }) => {
             choose_weight(problem, &start, settings, *rule, penalties, &mut observe).map(
                 |(path, problem, fit)| {

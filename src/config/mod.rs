@@ -15,6 +15,6 @@ pub mod scalar;
 pub mod spec;
 mod syntax;
 
-pub use build::{Model, Purpose, WeightSearch, build};
+pub use build::{ChannelNote, HoldOut, Model, Purpose, WeightSearch, build};
 pub use model_file::ModelFile;
 pub use scalar::{Number, NumberOrColumn, Text};

@@ -3,6 +3,7 @@
 mod channel;
 mod gradient;
 mod loss;
+mod refine;
 mod sensor;
 mod sizes;
 mod verify;
@@ -11,6 +12,7 @@ mod weighting;
 pub use channel::{Channel, View, ViewTangent, integral_over};
 pub use gradient::{Gradient, GradientKind};
 pub use loss::Loss;
+pub use refine::Refined;
 pub use sensor::Sensor;
 pub use verify::GradientError;
 pub use weighting::Weighting;

@@ -1,6 +1,9 @@
 //! `result.json`: the document that a run leaves behind. Its keys are stable.
 
 use super::cost::CostKind;
+use super::measured::{
+    ChannelSummary, HoldOutSummary, RefinedSummary, ScalarSummary, StatisticsSummary,
+};
 use crate::dynamics::Grid;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -10,7 +13,7 @@ pub const FORMAT: u32 = 1;
 
 /// A number that left the range of floating-point numbers stands as `null` in JSON, which has no word
 /// for it: it is read back as not a number.
-fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+pub(super) fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
@@ -48,9 +51,24 @@ pub struct ResultDocument {
     pub rungs: Vec<RungSummary>,
     /// How well each experiment is matched.
     pub experiments: Vec<ExperimentSummary>,
+    /// Experiments that took no part in the fit.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_out: Vec<HoldOutSummary>,
+    /// Numbers that were fitted beside the functions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scalars: Vec<ScalarSummary>,
+    /// All readings together.
+    #[serde(default)]
+    pub statistics: StatisticsSummary,
+    /// The optimum on a grid of half the step; `null` where it has no motion there.
+    #[serde(default)]
+    pub half_step: Option<RefinedSummary>,
     /// The motion of the found device from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
+    /// What was chosen for the user, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// What the user should know.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -75,6 +93,12 @@ pub struct ModelSummary {
     pub gradient: String,
     /// Number of free parameters.
     pub parameters: usize,
+    /// The force terms, by the names of their functions.
+    #[serde(default = "linear_terms")]
+    pub terms: Vec<String>,
+    /// Width of Coulomb friction, m/s, where there is any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_width: Option<f64>,
     /// How the misfit in J is measured: `integral`, `chi-square` or `mixed`.
     pub cost_kind: CostKind,
     /// The whole of J in one sentence, with all its factors.
@@ -144,6 +168,11 @@ pub struct CountsSummary {
     pub qp: u64,
 }
 
+/// The terms of results from before there were others.
+fn linear_terms() -> Vec<String> {
+    vec!["damping".into(), "stiffness".into()]
+}
+
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
@@ -157,6 +186,10 @@ pub struct FunctionSummary {
     /// in the unit of the function per s^i.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub powers: Option<Vec<f64>>,
+    /// For a constant its standard error from the linearised fit, without constraints, penalties and
+    /// priors, where the readings determine all parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
     /// Largest distance from the truth at a node, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_max_error: Option<f64>,
@@ -170,11 +203,14 @@ pub struct FunctionSummary {
 pub struct ExperimentSummary {
     /// Name.
     pub name: String,
-    /// Number of readings.
+    /// Number of readings of all channels.
     pub readings: usize,
-    /// Root-mean-square residual, m.
+    /// Root-mean-square residual of the first channel, in its SI unit.
     #[serde(deserialize_with = "number_or_null")]
     pub rms_residual: f64,
+    /// How well each channel is matched.
+    #[serde(default)]
+    pub channels: Vec<ChannelSummary>,
 }
 
 /// The motion of the found device from one initial state, against the true device's.

@@ -3,6 +3,7 @@
 use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
 use super::predict::PredictedMotion;
+use crate::diagnostics::ResidualDiagnostics;
 use crate::dynamics::Trajectory;
 use crate::solvers::{PathPoint, WeightPath, WeightRule};
 
@@ -28,6 +29,65 @@ pub fn observation(channels: &[Channel]) -> Figure {
         let mark = Mark::points("", t, y, Style::new(Colour::Blue).width(width));
         figure.panel(Panel::new(time(), Axis::linear(*label, *unit)).mark(mark))
     })
+}
+
+/// A channel's readings and what the model says of them, in the unit of the channel.
+pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
+    let width = if t.len() > MANY { 2.0 } else { 3.5 };
+    let dots = Style::new(Colour::Grey).width(width);
+    let line = Style::new(Colour::Blue).width(1.4);
+    Figure::new(
+        "channel",
+        "Readings and model",
+        "The readings of the channel and what the fitted model says of them, against time.",
+    )
+    .panel(
+        Panel::new(time(), Axis::linear(label, unit))
+            .mark(Mark::points("readings", t, observed, dots))
+            .mark(Mark::line("model", t, model, line)),
+    )
+}
+
+/// The residuals of a channel against time, and their autocorrelation beside the band in which that of
+/// white noise lies in 95 of 100 lags.
+pub fn residuals(
+    (label, unit): (&str, &str),
+    t: &[f64],
+    residuals: &[f64],
+    diagnostics: &ResidualDiagnostics,
+) -> Figure {
+    let width = if t.len() > MANY { 2.0 } else { 3.5 };
+    let lags: Vec<f64> = (0..diagnostics.autocorrelation.len())
+        .map(|lag| lag as f64 * diagnostics.step)
+        .collect();
+    let band = Style::new(Colour::Grey).dash(Dash::Dashed);
+    Figure::new("residuals", "Residuals", diagnostics.whiteness.to_string())
+        .panel(
+            Panel::new(time(), Axis::linear(format!("model - {label}"), unit)).mark(Mark::points(
+                "",
+                t,
+                residuals,
+                Style::new(Colour::Blue).width(width),
+            )),
+        )
+        .panel(
+            Panel::new(
+                Axis::linear("lag", "s"),
+                Axis::linear("autocorrelation", ""),
+            )
+            .mark(Mark::horizontal(
+                "95 % of white noise",
+                diagnostics.band,
+                band,
+            ))
+            .mark(Mark::horizontal("", -diagnostics.band, band))
+            .mark(Mark::line(
+                "residuals",
+                &lags,
+                &diagnostics.autocorrelation,
+                Style::new(Colour::Blue),
+            )),
+        )
 }
 
 /// Cost J/J₀ and squared gradient norm G²/G₀² against the iteration, both relative to the start;

@@ -48,6 +48,15 @@ impl FinishedRun {
             .into_iter()
             .find(|m| m.name() == document.model.stepper))
         .ok_or_else(|| unusable(format!("stepper `{}`", document.model.stepper)))?;
+        let width = document.model.friction_width.unwrap_or(f64::NAN);
+        let known = |name: &String| Quantity::ALL.into_iter().find(|q| q.name() == name);
+        let quantities: Option<Vec<Quantity>> = document.model.terms.iter().map(known).collect();
+        let quantities =
+            quantities.ok_or_else(|| unusable(format!("terms {:?}", document.model.terms)))?;
+        let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
+        if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
+            return Err(unusable(format!("terms {:?}", document.model.terms)));
+        }
         let table = Table::read(folder.join("functions.csv"))?;
         if table.rows() != grid.nodes() {
             return Err(
@@ -62,10 +71,12 @@ impl FinishedRun {
             oscillator: Oscillator {
                 grid,
                 method,
-                terms: vec![Term::Damping, Term::Stiffness],
+                terms,
             },
-            device: device(&table, "")?,
-            truth: has_truth.then(|| device(&table, "true_")).transpose()?,
+            device: device(&table, "", &quantities)?,
+            truth: has_truth
+                .then(|| device(&table, "true_", &quantities))
+                .transpose()?,
         })
     }
 }
@@ -104,13 +115,17 @@ fn document(folder: &Path) -> Result<ResultDocument, InputError> {
     })
 }
 
-fn device(table: &Table, prefix: &str) -> Result<Device, InputError> {
+/// The mass and the functions of the terms `quantities`.
+fn device(table: &Table, prefix: &str, quantities: &[Quantity]) -> Result<Device, InputError> {
     let column = |quantity: Quantity| {
         let name = format!("{prefix}{}", quantity.column());
         table.column(&name).map(<[f64]>::to_vec)
     };
     Ok(Device {
         mass: column(Quantity::Mass)?,
-        coefficients: vec![column(Quantity::Damping)?, column(Quantity::Stiffness)?],
+        coefficients: quantities
+            .iter()
+            .map(|q| column(*q))
+            .collect::<Result<_, _>>()?,
     })
 }

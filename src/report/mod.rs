@@ -30,6 +30,7 @@ mod html;
 mod layout;
 mod legend;
 pub mod mark;
+mod measured;
 mod panel;
 mod predict;
 mod run;

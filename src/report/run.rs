@@ -10,11 +10,14 @@ use super::document::{
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::OutputFolder;
+use super::measured::{self, ChannelSummary};
 use super::render;
-use crate::config::Model;
-use crate::dynamics::Device;
+use crate::config::{ChannelNote, Model};
+use crate::diagnostics::rms;
+use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
-use crate::functions::{Basis, Quantity, Ratios};
+use crate::functions::{Basis, CoefficientFunction, Ratios};
+use crate::objective::Channel;
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Status, WeightPath, WeightRule, active_constraints,
 };
@@ -49,6 +52,9 @@ impl Run<'_> {
         folder.write("history.csv", &self.history().to_csv())?;
         folder.write("functions.csv", &self.functions_table().to_csv())?;
         folder.write("trajectory.csv", &self.trajectories().to_csv())?;
+        for (name, table) in self.readings() {
+            folder.write(&name, &table.to_csv())?;
+        }
         let figures = if with_figures {
             self.figures()
         } else {
@@ -96,6 +102,11 @@ impl Run<'_> {
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
+            held_out: measured::held_out(model, fit),
+            scalars: measured::scalars(&model.problem, &fit.best.evaluation),
+            statistics: measured::statistics(&model.problem, &fit.best.evaluation),
+            half_step: measured::refined(&model.problem, &fit.best.evaluation),
+            remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
         }
@@ -112,7 +123,14 @@ impl Run<'_> {
             stepper: problem.oscillator.method.name().into(),
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
-            parameters: problem.functions.parameters(),
+            parameters: problem.parameters(),
+            terms: (problem.functions.assembly(0).iter().skip(1))
+                .map(|f| problem.functions.get(*f).quantity.name().into())
+                .collect(),
+            friction_width: problem.oscillator.terms.iter().find_map(|t| match t {
+                Term::CoulombFriction { width } => Some(*width),
+                _ => None,
+            }),
             cost_kind: CostKind::of(problem),
             cost_definition: cost_definition(problem),
         }
@@ -176,9 +194,11 @@ impl Run<'_> {
         })
     }
 
-    fn named_functions(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
-        let quantities = self.model.problem.functions.iter().map(|f| f.quantity);
-        quantities.zip(self.fit.best.evaluation.device.functions())
+    /// All functions with what they are and what they are called, those of single experiments last.
+    fn named_functions(&self) -> Vec<(&CoefficientFunction, Vec<f64>)> {
+        let functions = &self.model.problem.functions;
+        let values = functions.values(&self.fit.best.parameters);
+        functions.iter().zip(values).collect()
     }
 
     fn true_function(&self, index: usize) -> Option<&[f64]> {
@@ -186,14 +206,19 @@ impl Run<'_> {
     }
 
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
-        let summary = |(i, (quantity, values)): (usize, (Quantity, &[f64]))| {
+        let problem = &self.model.problem;
+        let covariance = problem.covariance(&self.fit.best.evaluation);
+        let list = self.named_functions().into_iter().enumerate();
+        list.map(|(i, (function, values))| {
+            let index = problem.functions.ranges()[i].start;
             let summary = FunctionSummary {
                 powers: self.powers(i),
-                ..summarise(values, self.true_function(i))
+                standard_error: measured::standard_error(function, index, covariance.as_ref()),
+                ..summarise(&values, self.true_function(i))
             };
-            (quantity.name().to_string(), summary)
-        };
-        self.named_functions().enumerate().map(summary).collect()
+            (function.name(), summary)
+        })
+        .collect()
     }
 
     /// The factors of the powers of t, if function `index` is a free polynomial.
@@ -212,16 +237,27 @@ impl Run<'_> {
         let predictions = &self.fit.best.evaluation.predictions;
         let pairs = self.model.problem.experiments.iter().zip(predictions);
         pairs
-            .filter_map(|(experiment, predictions)| {
-                let (channel, predicted) = experiment.channels.iter().zip(predictions).next()?;
-                let squares = channel.residuals(predicted).map(|r| r * r);
-                Some(ExperimentSummary {
+            .enumerate()
+            .map(|(e, (experiment, predictions))| {
+                let channels = experiment.channels.iter().zip(predictions).enumerate();
+                let channels: Vec<ChannelSummary> = channels
+                    .map(|(i, (c, predicted))| measured::channel(c, self.note(e, i), predicted))
+                    .collect();
+                let first = experiment.channels.iter().zip(predictions).next();
+                ExperimentSummary {
                     name: experiment.name.clone(),
-                    readings: channel.len(),
-                    rms_residual: (squares.sum::<f64>() / channel.len() as f64).sqrt(),
-                })
+                    readings: experiment.reading_count(),
+                    rms_residual: first.map_or(f64::NAN, |(c, predicted)| {
+                        rms(&c.residuals(predicted).collect::<Vec<f64>>())
+                    }),
+                    channels,
+                }
             })
             .collect()
+    }
+
+    fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
+        self.model.notes.get(experiment)?.get(channel)
     }
 
     fn history(&self) -> CsvTable {
@@ -242,8 +278,14 @@ impl Run<'_> {
         let device = &self.fit.best.evaluation.device;
         let times = self.model.problem.oscillator.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
-        for (quantity, values) in self.named_functions() {
-            table = table.column(quantity.column(), values.to_vec());
+        for (function, values) in self.named_functions() {
+            let column = function.quantity.column();
+            let name = match &function.owner {
+                None => column.to_owned(),
+                // A comma would end the header.
+                Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
+            };
+            table = table.column(name, values);
         }
         let ratios = Ratios::of(device);
         table = table
@@ -252,8 +294,10 @@ impl Run<'_> {
             .column("natural_frequency_Hz", ratios.frequency)
             .column("damping_ratio", ratios.damping_ratio);
         if let Some(truth) = &self.model.truth {
-            for ((quantity, _), values) in self.named_functions().zip(truth.functions()) {
-                table = table.column(format!("true_{}", quantity.column()), values.to_vec());
+            let functions = self.model.problem.functions.iter();
+            for (function, values) in functions.zip(truth.functions()) {
+                let name = format!("true_{}", function.quantity.column());
+                table = table.column(name, values.to_vec());
             }
         }
         table
@@ -272,13 +316,19 @@ impl Run<'_> {
                 true => format!("{column}_{}", i + 1),
                 false => column.to_string(),
             };
+            // A record may end before the grid does.
+            let full = |values: &[f64]| {
+                let mut values = values.to_vec();
+                values.resize(problem.oscillator.grid.nodes(), f64::NAN);
+                values
+            };
             table = table
-                .column(name("y_m"), motion.displacement.clone())
-                .column(name("v_m_per_s"), motion.velocity.clone());
+                .column(name("y_m"), full(&motion.displacement))
+                .column(name("v_m_per_s"), full(&motion.velocity));
             if let [channel] = experiment.channels.as_slice()
                 && let Some(stride) = channel.stride()
             {
-                let mut observed = vec![f64::NAN; motion.displacement.len()];
+                let mut observed = vec![f64::NAN; problem.oscillator.grid.nodes()];
                 for (i, value) in channel.observed().iter().enumerate() {
                     observed[i * stride] = *value;
                 }
@@ -286,6 +336,31 @@ impl Run<'_> {
             }
         }
         table
+    }
+
+    /// The readings of each channel beside what the model says of them, in the unit of the file, and
+    /// the names of the tables.
+    fn readings(&self) -> Vec<(String, CsvTable)> {
+        let mut tables = Vec::new();
+        let predictions = &self.fit.best.evaluation.predictions;
+        let experiments = self.model.problem.experiments.iter().zip(predictions);
+        for (e, (experiment, predictions)) in experiments.enumerate() {
+            for (c, (channel, predicted)) in experiment.channels.iter().zip(predictions).enumerate()
+            {
+                let factor = self.note(e, c).map_or(1.0, |n| n.unit.factor());
+                let scaled = |values: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
+                    values.map(|v| v / factor).collect()
+                };
+                let table = CsvTable::new()
+                    .column("t_s", channel.times().to_vec())
+                    .column("reading", scaled(&mut channel.observed().iter().copied()))
+                    .column("model", scaled(&mut predicted.iter().copied()))
+                    .column("residual", scaled(&mut channel.residuals(predicted)));
+                let name = format!("readings/{}-{}.csv", e + 1, channel.kind().name());
+                tables.push((name, table));
+            }
+        }
+        tables
     }
 
     /// The figures of a fit.
@@ -299,21 +374,52 @@ impl Run<'_> {
         let problem = &self.model.problem;
         let several = problem.experiments.len() > 1;
         for (i, experiment) in problem.experiments.iter().enumerate() {
-            let Some(channel) = experiment.channels.first() else {
-                continue;
-            };
-            let times = channel.times();
-            for mut figure in [
-                figures::observation(&[("displacement y", "m", times, channel.observed())]),
-                self.motion(i, times, channel.observed()),
-            ] {
+            let predictions = &self.fit.best.evaluation.predictions[i];
+            for (c, (channel, predicted)) in experiment.channels.iter().zip(predictions).enumerate()
+            {
+                let mut list = self.channel_figures(i, c, channel, predicted);
+                let mut suffix = String::new();
                 if several {
-                    figure.name = format!("{}-{}", figure.name, i + 1);
+                    suffix = format!("-{}", i + 1);
                 }
-                figures.push(figure);
+                if c > 0 {
+                    suffix = format!("{suffix}-{}", channel.kind().name());
+                }
+                list.iter_mut().for_each(|figure| figure.name += &suffix);
+                figures.extend(list);
             }
         }
         figures
+    }
+
+    /// The figures of one channel: readings, readings beside the motion, residuals.
+    fn channel_figures(
+        &self,
+        experiment: usize,
+        index: usize,
+        channel: &Channel,
+        predicted: &[f64],
+    ) -> Vec<Figure> {
+        let note = self.note(experiment, index);
+        let (unit, factor) = (
+            measured::unit(channel, note),
+            note.map_or(1.0, |n| n.unit.factor()),
+        );
+        let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / factor).collect() };
+        let label = format!("{} {}", channel.kind().name(), channel.kind().symbol());
+        let times = channel.times();
+        let (observed, model) = (scaled(channel.observed()), scaled(predicted));
+        let beside = match channel.stride() {
+            Some(_) if factor == 1.0 => self.motion(experiment, times, channel.observed()),
+            _ => figures::channel((&label, unit), times, &observed, &model),
+        };
+        let residuals = scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
+        let diagnostics = measured::diagnostics(channel, predicted);
+        vec![
+            figures::observation(&[(&label, unit, times, &observed)]),
+            beside,
+            figures::residuals((&label, unit), times, &residuals, &diagnostics),
+        ]
     }
 
     fn convergence(&self) -> Figure {
@@ -327,12 +433,14 @@ impl Run<'_> {
 
     fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
         let grid_times = self.model.problem.oscillator.grid.times();
+        let nodes = self.model.problem.experiments[experiment].nodes;
+        let grid_times = &grid_times[..nodes];
         let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
             .map(|s| {
                 let motion = &s.trajectories[experiment];
                 (
                     s.iteration as usize,
-                    grid_times.as_slice(),
+                    grid_times,
                     motion.displacement.as_slice(),
                 )
             })
@@ -340,24 +448,22 @@ impl Run<'_> {
         let last = self.fit.history.len();
         if snapshots.last().is_none_or(|s| s.0 != last) {
             let motion = &self.fit.best.evaluation.trajectories[experiment];
-            snapshots.push((last, &grid_times, &motion.displacement));
+            snapshots.push((last, grid_times, &motion.displacement));
         }
         figures::motion(times, observed, &snapshots)
     }
 
     fn functions_figure(&self) -> Figure {
         let problem = &self.model.problem;
-        let start: Device = problem.functions.device(&problem.functions.start());
-        let names: Vec<String> = self
-            .named_functions()
-            .map(|(q, _)| format!("{} {}", q.name(), q.symbol()))
-            .collect();
-        let starts: Vec<&[f64]> = start.functions().collect();
-        let curves: Vec<FunctionCurve> = (self.named_functions().enumerate())
-            .map(|(i, (quantity, found))| FunctionCurve {
-                start: Some(starts[i]),
+        let starts = problem.functions.values(&problem.start());
+        let list = self.named_functions();
+        let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
+        let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
+        let curves: Vec<FunctionCurve> = (list.iter().enumerate())
+            .map(|(i, (function, found))| FunctionCurve {
+                start: Some(&starts[i]),
                 truth: self.true_function(i),
-                ..FunctionCurve::new(&names[i], quantity.unit(), found)
+                ..FunctionCurve::new(&names[i], function.quantity.unit(), found)
             })
             .collect();
         figures::functions(&problem.oscillator.grid.times(), &curves)
@@ -420,6 +526,7 @@ fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
             .as_ref()
             .map(|e| e.iter().copied().fold(0.0, f64::max)),
         powers: None,
+        standard_error: None,
         truth_rms_error: errors
             .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
     }

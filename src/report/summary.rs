@@ -1,6 +1,7 @@
 //! What a person reads in ten seconds.
 
 use super::document::{Prediction, ResultDocument};
+use super::measured::ChannelSummary;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.
@@ -31,20 +32,87 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         document.seconds
     )?;
     for experiment in &document.experiments {
-        writeln!(
-            text,
-            "{}: rms residual {:.4e} m over {}",
-            experiment.name,
-            experiment.rms_residual,
-            count(experiment.readings, "reading")
-        )?;
+        for channel in &experiment.channels {
+            write_channel(text, &experiment.name, channel)?;
+        }
     }
+    for experiment in &document.held_out {
+        for channel in &experiment.channels {
+            write_channel(text, &format!("{} (held out)", experiment.name), channel)?;
+        }
+        if let Some(failure) = &experiment.failure {
+            writeln!(text, "{} (held out): no motion: {failure}", experiment.name)?;
+        }
+    }
+    write_statistics(text, document)?;
     writeln!(text)?;
     write_functions(text, document)?;
+    write_scalars(text, document)?;
     write_constraints(text, document)?;
     write_rungs(text, document)?;
     if !document.predictions.is_empty() {
         write!(text, "\n{}", prediction_table(&document.predictions))?;
+    }
+    Ok(())
+}
+
+/// How well one channel is matched.
+fn write_channel(text: &mut String, name: &str, channel: &ChannelSummary) -> std::fmt::Result {
+    write!(
+        text,
+        "{name}: {} within {:.4e} {} rms, fit {:.2} %, {}",
+        channel.kind,
+        channel.rms_residual,
+        channel.unit,
+        channel.fit_percent,
+        count(channel.readings, "reading")
+    )?;
+    for ignored in &channel.ignored {
+        write!(text, "; {} not used: {}", ignored.readings, ignored.reason)?;
+    }
+    writeln!(text)?;
+    if let (Some(sigma), true) = (channel.sigma, channel.sigma_estimated) {
+        writeln!(text, "  sigma estimated: {sigma:.4e} {}", channel.unit)?;
+    }
+    // Where there is no noise the question makes no sense.
+    if channel.sigma.is_some() {
+        writeln!(text, "  {}", channel.whiteness)?;
+    }
+    Ok(())
+}
+
+/// All readings together, and what half the step changes.
+fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let statistics = &document.statistics;
+    if let Some(reduced) = statistics.reduced_chi_square {
+        write!(
+            text,
+            "chi-square per degree of freedom {reduced:.4} ({} readings, {} parameters)",
+            statistics.readings, statistics.parameters
+        )?;
+        match (statistics.aic, statistics.bic) {
+            (Some(aic), Some(bic)) => writeln!(text, ", AIC {aic:.2}, BIC {bic:.2}")?,
+            _ => writeln!(text)?,
+        }
+    }
+    match &document.half_step {
+        Some(half) => writeln!(
+            text,
+            "on half the step the model's readings change by at most {:.1e} of the largest one",
+            half.change_per_reading
+        ),
+        None => writeln!(text, "on half the step there is no motion"),
+    }
+}
+
+/// The numbers that were fitted beside the functions.
+fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    for scalar in &document.scalars {
+        write!(text, "{} {:.6} {}", scalar.name, scalar.value, scalar.unit)?;
+        match scalar.standard_error {
+            Some(error) => writeln!(text, " +- {error:.2e}")?,
+            None => writeln!(text)?,
+        }
     }
     Ok(())
 }
@@ -84,23 +152,33 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         .functions
         .values()
         .any(|f| f.truth_max_error.is_some());
-    write!(text, "{:<10} {:>12} {:>12}", "function", "min", "max")?;
+    let longest = document.functions.keys().map(String::len).max();
+    let width = longest.unwrap_or(0).max(10);
+    write!(text, "{:<width$} {:>12} {:>12}", "function", "min", "max")?;
     if has_truth {
         write!(text, " {:>14} {:>14}", "largest error", "rms error")?;
     }
     writeln!(text)?;
-    for name in ["mass", "damping", "stiffness"] {
+    // In the order of the equation of motion, then those of single experiments.
+    let main = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
+    let main: Vec<&str> = main.collect();
+    let own = document.functions.keys().map(String::as_str);
+    let own = own.filter(|name| !main.contains(name));
+    for name in main.iter().copied().chain(own) {
         let Some(function) = document.functions.get(name) else {
             continue;
         };
         write!(
             text,
-            "{name:<10} {:>12} {:>12}",
+            "{name:<width$} {:>12} {:>12}",
             decimals(function.min),
             decimals(function.max)
         )?;
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
+        }
+        if let Some(error) = function.standard_error {
+            write!(text, "  +- {error:.2e}")?;
         }
         writeln!(text)?;
     }

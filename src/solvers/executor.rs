@@ -147,7 +147,7 @@ impl Run<'_> {
                     .recorder
                     .record(work.problem(), before, &point, length);
                 let previous_cost = before.evaluation.cost;
-                progress.point = point;
+                progress.point = *point;
                 if let Some(row) = progress.recorder.rows.last() {
                     (self.observe)(row);
                     let stopping = &self.settings.stopping;

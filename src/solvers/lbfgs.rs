@@ -76,7 +76,7 @@ impl Lbfgs {
         let (length, next) = trials.accepted?;
         self.remember(at, point, &next, &gradient);
         Some(Step::Moved {
-            point: next,
+            point: Box::new(next),
             length,
             hindered: false,
         })

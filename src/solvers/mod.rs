@@ -3,14 +3,17 @@
 
 mod activity;
 mod conflict;
+mod covariance;
 mod equation_error;
 mod executor;
 mod gauss_newton;
+mod hold_out;
 mod infeasible;
 mod kinematics;
 mod ladder;
 mod lbfgs;
 mod line_search;
+mod noise;
 mod outcome;
 mod point;
 mod projected_gradient;
@@ -23,9 +26,11 @@ mod weight_path;
 pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::equation_error;
 pub use executor::Fit;
+pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
 pub use kinematics::states_from_readings;
 pub use ladder::{Initial, Rung, fit};
+pub use noise::fit_with_noise;
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};
 pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
@@ -86,7 +91,7 @@ pub(crate) enum Step {
     /// To a point with lower cost; `length` is the step along the direction. A `hindered` step is
     /// short because longer ones could not be computed: that it is short says nothing of a minimum.
     Moved {
-        point: Point,
+        point: Box<Point>,
         length: f64,
         hindered: bool,
     },

@@ -54,7 +54,7 @@ impl Descend for ProjectedGradient {
                 let next = work.complete(trial, evaluation);
                 self.learn(point, &next);
                 return Step::Moved {
-                    point: next,
+                    point: Box::new(next),
                     length: share,
                     hindered: false,
                 };

@@ -47,7 +47,7 @@ impl Descend for SteepestDescent {
         self.spare.push(evaluation);
         match best {
             Some((length, parameters, evaluation)) => Step::Moved {
-                point: work.complete(parameters, evaluation),
+                point: Box::new(work.complete(parameters, evaluation)),
                 length,
                 hindered: false,
             },

@@ -32,7 +32,10 @@ pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
 
 /// `sqrt(w) dz/dtheta` (readings x parameters) and `sqrt(w) r`, for the predictions `z` of all
 /// channels.
-fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> (DMatrix<f64>, DVector<f64>) {
+pub fn weighted_jacobian(
+    problem: &Problem,
+    evaluation: &Evaluation,
+) -> (DMatrix<f64>, DVector<f64>) {
     let n = problem.parameters();
     let mut roots = Vec::with_capacity(problem.reading_count());
     let mut residuals = Vec::with_capacity(problem.reading_count());

@@ -9,6 +9,8 @@
 mod dense;
 mod structured;
 
+pub(super) use dense::weighted_jacobian;
+
 use super::infeasible::no_step;
 use super::point::Work;
 use super::{Descend, Point, Step};
@@ -111,7 +113,7 @@ impl Descend for GaussNewton {
                     self.damping = before;
                 }
                 return Step::Moved {
-                    point: work.complete(proposal.parameters, evaluation),
+                    point: Box::new(work.complete(proposal.parameters, evaluation)),
                     length: 1.0,
                     hindered: trouble.is_some(),
                 };

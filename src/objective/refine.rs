@@ -1,0 +1,81 @@
+//! The optimum on a grid of half the step: how much of it is the stepper's.
+
+use super::{Evaluation, View};
+use crate::dynamics::{Breakdown, Device, Oscillator, Trajectory};
+use crate::problem::Problem;
+
+/// What half the step changes, with the functions and scalars as they are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refined {
+    /// Half the step, s.
+    pub step: f64,
+    /// Misfit there.
+    pub misfit: f64,
+    /// Largest change of a prediction, for each experiment and each of its channels, in the SI unit
+    /// of the channel.
+    pub changes: Vec<Vec<f64>>,
+}
+
+impl Problem {
+    /// The same devices and scalars on a grid of half the step: functions stay linear between the
+    /// old nodes, forces are sampled anew. `None` where readings do not lie on the finer grid.
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if there is no motion on the finer grid.
+    pub fn on_half_step(&self, evaluation: &Evaluation) -> Result<Option<Refined>, Breakdown> {
+        let Some(grid) = (self.oscillator.grid).with_nodes(2 * self.oscillator.grid.nodes() - 1)
+        else {
+            return Ok(None);
+        };
+        let oscillator = Oscillator {
+            grid,
+            ..self.oscillator.clone()
+        };
+        let mut refined = Refined {
+            step: grid.step(),
+            misfit: 0.0,
+            changes: Vec::new(),
+        };
+        for (e, experiment) in self.experiments.iter().enumerate() {
+            let Some(experiment) = experiment.halved(&grid) else {
+                return Ok(None);
+            };
+            let device = halved(evaluation.device_of(experiment.device));
+            let mut motion = Trajectory::zeros(experiment.nodes);
+            oscillator.forward_into(
+                &device,
+                experiment.initial_state(&evaluation.scalars),
+                experiment.excitation.as_ref(),
+                &mut motion,
+            )?;
+            let view = View {
+                oscillator: &oscillator,
+                device: &device,
+                excitation: experiment.excitation.as_ref(),
+                motion: &motion,
+                scalars: &evaluation.scalars,
+            };
+            let mut changes = Vec::new();
+            for (channel, before) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
+                let after = channel.predict(view);
+                refined.misfit += channel.cost(&after);
+                let change = |most: f64, (a, b): (&f64, &f64)| most.max((a - b).abs());
+                changes.push(after.iter().zip(before).fold(0.0, change));
+            }
+            refined.changes.push(changes);
+        }
+        Ok(Some(refined))
+    }
+}
+
+/// Functions that are linear between the old nodes, on the old nodes and half-way between them.
+fn halved(device: &Device) -> Device {
+    let finer = |f: &[f64]| -> Vec<f64> {
+        let pairs = f.windows(2).flat_map(|w| [w[0], 0.5 * (w[0] + w[1])]);
+        pairs.chain(f.last().copied()).collect()
+    };
+    Device {
+        mass: finer(&device.mass),
+        coefficients: device.coefficients.iter().map(|f| finer(f)).collect(),
+    }
+}

@@ -1,0 +1,313 @@
+//! How well the readings are matched: each channel, all together, held-out records, half the step.
+
+use super::document::number_or_null;
+use crate::config::{ChannelNote, HoldOut, Model};
+use crate::diagnostics::{
+    InformationCriteria, ResidualDiagnostics, ResidualRecord, with_estimated_sigma,
+    with_known_sigma,
+};
+use crate::functions::CoefficientFunction;
+use crate::objective::{Channel, Evaluation, Refined, Weighting};
+use crate::problem::Problem;
+use crate::solvers::{Fit, predict_held_out};
+use serde::{Deserialize, Serialize};
+
+/// One channel of an experiment at the best point, in its own unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelSummary {
+    /// `displacement`, `velocity` or `acceleration`.
+    pub kind: String,
+    /// Unit of the numbers here: that of the file.
+    pub unit: String,
+    /// Number of readings that are used.
+    pub readings: usize,
+    /// Readings that are not used.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignored: Vec<IgnoredSummary>,
+    /// Root-mean-square residual.
+    #[serde(deserialize_with = "number_or_null")]
+    pub rms_residual: f64,
+    /// `100 (1 - |residual| / |reading - mean|)`.
+    #[serde(deserialize_with = "number_or_null")]
+    pub fit_percent: f64,
+    /// Standard deviation of a reading, where there is one for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+    /// Whether that was estimated.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub sigma_estimated: bool,
+    /// What the channel adds to J.
+    #[serde(deserialize_with = "number_or_null")]
+    pub cost: f64,
+    /// Whether the residuals look white, in words.
+    pub whiteness: String,
+    /// p-value of the Ljung-Box test of whiteness; `null` where it could not be made.
+    pub whiteness_p_value: Option<f64>,
+    /// Autocorrelation of the residuals at lags 0, 1, ...
+    pub autocorrelation: Vec<f64>,
+    /// That of white noise lies below this in 95 of 100 lags.
+    #[serde(deserialize_with = "number_or_null")]
+    pub autocorrelation_band: f64,
+}
+
+/// Readings that are not used, and why.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IgnoredSummary {
+    /// How many.
+    pub readings: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// All readings together.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StatisticsSummary {
+    /// Number of readings.
+    pub readings: usize,
+    /// Number of parameters of functions and scalars.
+    pub parameters: usize,
+    /// `J / (n - p)` for a chi-square of readings with known sigma; `null` where that means nothing.
+    pub reduced_chi_square: Option<f64>,
+    /// Akaike's criterion.
+    pub aic: Option<f64>,
+    /// The same corrected for small records.
+    pub aicc: Option<f64>,
+    /// Schwarz's criterion.
+    pub bic: Option<f64>,
+}
+
+/// A number that was fitted beside the functions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScalarSummary {
+    /// Name.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Value found.
+    #[serde(deserialize_with = "number_or_null")]
+    pub value: f64,
+    /// Standard error from the linearised fit, without constraints, penalties and priors; `null`
+    /// where the readings do not determine all parameters.
+    pub standard_error: Option<f64>,
+}
+
+/// The optimum on a grid of half the step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RefinedSummary {
+    /// Half the step, s.
+    pub step: f64,
+    /// Misfit there; that of the fit's own grid is `cost.misfit`.
+    #[serde(deserialize_with = "number_or_null")]
+    pub misfit: f64,
+    /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
+    #[serde(deserialize_with = "number_or_null")]
+    pub change_per_residual: f64,
+    /// Largest change of a prediction as a share of the largest reading, over the channels.
+    #[serde(deserialize_with = "number_or_null")]
+    pub change_per_reading: f64,
+}
+
+/// An experiment that took no part in the fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HoldOutSummary {
+    /// Name.
+    pub name: String,
+    /// How well each channel is predicted.
+    pub channels: Vec<ChannelSummary>,
+    /// What was found from its own readings: its initial state, its sensors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scalars: Vec<ScalarSummary>,
+    /// Why there is no prediction, if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
+
+/// One channel with its note and predictions.
+pub fn channel(channel: &Channel, note: Option<&ChannelNote>, predicted: &[f64]) -> ChannelSummary {
+    let factor = note.map_or(1.0, |n| n.unit.factor());
+    let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / factor).collect() };
+    let diagnostics = diagnostics(channel, predicted);
+    let sigma = match channel.weighting() {
+        Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / factor),
+        Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
+    };
+    let residuals = scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
+    ChannelSummary {
+        kind: channel.kind().name().into(),
+        unit: unit(channel, note).into(),
+        readings: channel.len(),
+        ignored: note.map_or(Vec::new(), |n| {
+            let ignored = n.ignored.iter().map(|(readings, reason)| IgnoredSummary {
+                readings: *readings,
+                reason: reason.clone(),
+            });
+            ignored.collect()
+        }),
+        rms_residual: crate::diagnostics::rms(&residuals),
+        fit_percent: diagnostics.fit_percent,
+        sigma,
+        sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
+        cost: channel.cost(predicted),
+        whiteness: diagnostics.whiteness.to_string(),
+        whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
+            .then_some(diagnostics.whiteness.p_value),
+        autocorrelation_band: diagnostics.band,
+        autocorrelation: diagnostics.autocorrelation,
+    }
+}
+
+/// Unit in which reports speak of a channel.
+pub fn unit<'a>(channel: &Channel, note: Option<&'a ChannelNote>) -> &'a str {
+    note.map_or(channel.kind().unit(), |n| n.unit.symbol())
+}
+
+/// The residuals of a channel, examined.
+pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics {
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    ResidualDiagnostics::new(&ResidualRecord {
+        times: channel.times(),
+        residuals: &residuals,
+        observed: channel.observed(),
+        model: predicted,
+    })
+}
+
+/// All readings together.
+pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> StatisticsSummary {
+    let readings = problem.reading_count();
+    let parameters = problem.parameters();
+    let mut summary = StatisticsSummary {
+        readings,
+        parameters,
+        ..StatisticsSummary::default()
+    };
+    // Penalties take away degrees of freedom that nobody has counted here.
+    let plain = problem.penalties.is_empty() && problem.variations.is_empty();
+    let squares = problem
+        .channels()
+        .all(|c| c.loss() == crate::objective::Loss::Squares);
+    if !(plain && squares) || readings <= parameters {
+        return summary;
+    }
+    let p = parameters as f64;
+    let sigma = |known: bool| {
+        problem
+            .channels()
+            .all(|c| matches!(c.weighting(), Weighting::Sigma(_) | Weighting::Sigmas(_)) == known)
+    };
+    let criteria: Option<InformationCriteria> = if sigma(true) {
+        summary.reduced_chi_square = Some(evaluation.misfit / (readings as f64 - p));
+        with_known_sigma(evaluation.misfit, readings, p)
+    } else if sigma(false) && problem.channels().count() == 1 {
+        let squares = problem
+            .channels()
+            .zip(evaluation.predictions.iter().flatten());
+        let sum: f64 = squares
+            .flat_map(|(c, predicted)| c.residuals(predicted).map(|r| r * r).collect::<Vec<f64>>())
+            .sum();
+        with_estimated_sigma(sum, readings, p)
+    } else {
+        None
+    };
+    summary.aic = criteria.map(|c| c.aic);
+    summary.aicc = criteria.and_then(|c| c.aicc);
+    summary.bic = criteria.map(|c| c.bic);
+    summary
+}
+
+/// The scalars of a problem at a point.
+pub fn scalars(problem: &Problem, evaluation: &Evaluation) -> Vec<ScalarSummary> {
+    if problem.functions.scalars().is_empty() {
+        return Vec::new();
+    }
+    let covariance = problem.covariance(evaluation);
+    let range = problem.functions.scalar_range();
+    let list = problem.functions.scalars().iter().zip(range);
+    list.zip(&evaluation.scalars)
+        .map(|((scalar, index), value)| ScalarSummary {
+            name: scalar.name.clone(),
+            unit: scalar.unit.clone(),
+            value: *value,
+            standard_error: covariance.as_ref().map(|c| c[(index, index)].sqrt()),
+        })
+        .collect()
+}
+
+/// The optimum on half the step.
+pub fn refined(problem: &Problem, evaluation: &Evaluation) -> Option<RefinedSummary> {
+    let Ok(Some(Refined {
+        step,
+        misfit,
+        changes,
+    })) = problem.on_half_step(evaluation)
+    else {
+        return None;
+    };
+    let mut summary = RefinedSummary {
+        step,
+        misfit,
+        change_per_residual: 0.0,
+        change_per_reading: 0.0,
+    };
+    let channels = problem
+        .channels()
+        .zip(evaluation.predictions.iter().flatten());
+    for ((channel, predicted), change) in channels.zip(changes.into_iter().flatten()) {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        let rms = crate::diagnostics::rms(&residuals);
+        let largest = channel
+            .observed()
+            .iter()
+            .fold(0.0f64, |m, y| m.max(y.abs()));
+        let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
+        summary.change_per_residual = summary.change_per_residual.max(share(rms));
+        summary.change_per_reading = summary.change_per_reading.max(share(largest));
+    }
+    Some(summary)
+}
+
+/// The experiments of a model that took no part in the fit.
+pub fn held_out(model: &Model, fit: &Fit) -> Vec<HoldOutSummary> {
+    let each = model.held_out.iter().map(|out: &HoldOut| {
+        let name = out.experiment.name.clone();
+        let result = predict_held_out(
+            &model.problem,
+            &fit.best.evaluation,
+            &out.experiment,
+            &out.scalars,
+            &model.settings,
+        );
+        match result {
+            Ok((problem, evaluation)) => {
+                let predictions = evaluation.predictions.iter().flatten();
+                let channels = problem.channels().zip(predictions).enumerate();
+                HoldOutSummary {
+                    name,
+                    channels: channels
+                        .map(|(i, (c, predicted))| channel(c, out.notes.get(i), predicted))
+                        .collect(),
+                    scalars: scalars(&problem, &evaluation),
+                    failure: None,
+                }
+            }
+            Err(breakdown) => HoldOutSummary {
+                name,
+                channels: Vec::new(),
+                scalars: Vec::new(),
+                failure: Some(breakdown.to_string()),
+            },
+        }
+    });
+    each.collect()
+}
+
+/// Standard error of a function that is one number.
+pub fn standard_error(
+    function: &CoefficientFunction,
+    index: usize,
+    covariance: Option<&nalgebra::DMatrix<f64>>,
+) -> Option<f64> {
+    let constant = matches!(function.basis, Some(crate::functions::Basis::Constant));
+    let covariance = covariance.filter(|_| constant)?;
+    Some(covariance[(index, index)].sqrt())
+}

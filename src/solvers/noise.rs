@@ -1,0 +1,109 @@
+//! Sigmas that are estimated from the residuals.
+
+use super::executor::search;
+use super::{Fit, FitSettings, Row, Status, fit};
+use crate::dynamics::Breakdown;
+use crate::objective::{Channel, Loss, Weighting};
+use crate::problem::Problem;
+
+/// Most rounds of fit and estimate.
+const ROUNDS: usize = 20;
+/// Sigmas that change by less than this share are found: chi-square then changes by twice that.
+const SETTLED: f64 = 1e-6;
+/// From the median of the absolute residuals to the standard deviation of Gaussian noise.
+const MEDIAN_TO_SIGMA: f64 = 1.4826;
+
+/// [`fit`], with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
+/// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
+/// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
+/// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
+///
+/// With a robust loss sigma is that of the bulk of the readings, from the median of the absolute
+/// residuals.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_with_noise(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<(Problem, Fit), Breakdown> {
+    let mut problem = problem.clone();
+    let mut found = fit(&problem, start, settings, observe)?;
+    let estimates = problem
+        .channels()
+        .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
+    if !estimates {
+        return Ok((problem, found));
+    }
+    for _ in 0..ROUNDS {
+        let change = update(&mut problem, &found);
+        let ended = matches!(
+            found.outcome.status,
+            Status::Interrupted | Status::TimeLimit
+        );
+        let next = search(&problem, &found.best.parameters, settings, None, observe)?;
+        found = Fit {
+            counts: found.counts + next.counts,
+            elapsed: found.elapsed + next.elapsed,
+            rungs: found.rungs,
+            history: match next.history.is_empty() {
+                true => found.history,
+                false => next.history,
+            },
+            snapshots: found.snapshots,
+            initial_cost: next.initial_cost,
+            ..next
+        };
+        if ended || change < SETTLED {
+            break;
+        }
+    }
+    // All costs are told with the sigmas that were found.
+    if let Ok(evaluation) = problem.evaluate(start) {
+        found.initial_cost = evaluation.cost;
+    }
+    Ok((problem, found))
+}
+
+/// Puts the sigmas of the residuals into the problem; the largest relative change.
+fn update(problem: &mut Problem, found: &Fit) -> f64 {
+    let readings = problem.reading_count() as f64;
+    let share = (problem.parameters() as f64 / readings).min(0.5);
+    let mut largest = 0.0f64;
+    let experiments = problem.experiments.iter_mut();
+    for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
+            let Weighting::Estimated { sigma: before } = *channel.weighting() else {
+                continue;
+            };
+            let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
+            // Readings that are fitted exactly still need a scale.
+            let sigma = sigma.max(f64::EPSILON * size(channel.observed()));
+            if sigma > 0.0 {
+                largest = largest.max((sigma / before).ln().abs());
+                *channel = channel
+                    .clone()
+                    .with_weighting(Weighting::Estimated { sigma });
+            }
+        }
+    }
+    largest
+}
+
+fn size(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
+    let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
+    match channel.loss() {
+        Loss::Squares => size(&residuals),
+        Loss::Huber { .. } | Loss::StudentT { .. } => {
+            residuals.iter_mut().for_each(|r| *r = r.abs());
+            residuals.sort_by(f64::total_cmp);
+            MEDIAN_TO_SIGMA * residuals[residuals.len() / 2]
+        }
+    }
+}
