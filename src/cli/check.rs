@@ -142,7 +142,21 @@ fn node_counts(arguments: &Arguments) -> Vec<Option<usize>> {
 
 fn describe(model: &Model) -> String {
     let grid = &model.problem.oscillator.grid;
-    format!(
+    let mut text = String::new();
+    for (experiment, notes) in model.problem.experiments.iter().zip(&model.notes) {
+        for (channel, note) in experiment.channels.iter().zip(notes) {
+            let (name, kind, unit) = (&experiment.name, note.kind.name(), note.unit.symbol());
+            text += &format!(
+                "{name}: {} readings of the {kind} in {unit} ({})\n",
+                channel.len(),
+                note.format
+            );
+            for (count, reason) in &note.ignored {
+                text += &format!("{name}: {count} readings of the {kind} not used: {reason}\n");
+            }
+        }
+    }
+    text + &format!(
         "{}: {} nodes over {} s ({}), {} parameters, {}\n",
         model.title,
         grid.nodes(),

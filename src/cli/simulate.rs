@@ -45,7 +45,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let noise = noise(arguments)?;
     keeps_readings(arguments, &file)?;
     let experiment = chosen(arguments, &problem.experiments)?;
-    let device = problem.functions.device(&problem.functions.start());
+    if experiment.sought != [None; 2] {
+        return Err(file
+            .error_at(
+                "experiments",
+                "the initial state is to be estimated, so it is not known",
+            )
+            .found(format!("`estimate` in `{}`", experiment.name))
+            .expected("an experiment with an initial state in numbers")
+            .into());
+    }
+    let mut device = problem.functions.empty_device();
+    let start = problem.start();
+    problem
+        .functions
+        .device_into(&start, experiment.device, &mut device);
     let motion = problem
         .oscillator
         .forward(&device, experiment.initial, experiment.excitation.as_ref())

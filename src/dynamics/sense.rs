@@ -43,7 +43,17 @@ impl ChannelKind {
         }
     }
 
-    /// SI unit.
+    /// SI unit of motion along a line, or of turning.
+    pub fn unit_of(self, angular: bool) -> &'static str {
+        match (self, angular) {
+            (_, false) => self.unit(),
+            (Self::Displacement, true) => "rad",
+            (Self::Velocity, true) => "rad/s",
+            (Self::Acceleration, true) => "rad/s^2",
+        }
+    }
+
+    /// SI unit of motion along a line.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",

@@ -61,7 +61,19 @@ impl Quantity {
         }
     }
 
-    /// Column header with unit.
+    /// SI unit where the motion is a rotation: displacement in rad, force a moment.
+    pub fn angular_unit(self) -> &'static str {
+        match self {
+            Quantity::Mass => "kg m^2",
+            Quantity::Damping => "N m s/rad",
+            Quantity::Stiffness => "N m/rad",
+            Quantity::CubicStiffness => "N m/rad^3",
+            Quantity::QuadraticDamping => "N m s^2/rad^2",
+            Quantity::CoulombFriction | Quantity::Offset => "N m",
+        }
+    }
+
+    /// Column header with the unit of motion along a line.
     pub fn column(self) -> &'static str {
         match self {
             Quantity::Mass => "mass_kg",

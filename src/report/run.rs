@@ -256,6 +256,15 @@ impl Run<'_> {
             .collect()
     }
 
+    /// SI unit of a function: of a rotation if the channels are.
+    fn unit(&self, function: &CoefficientFunction) -> &'static str {
+        let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
+        match units.any(|unit| unit.is_angular()) {
+            true => function.quantity.angular_unit(),
+            false => function.quantity.unit(),
+        }
+    }
+
     fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
         self.model.notes.get(experiment)?.get(channel)
     }
@@ -463,7 +472,7 @@ impl Run<'_> {
             .map(|(i, (function, found))| FunctionCurve {
                 start: Some(&starts[i]),
                 truth: self.true_function(i),
-                ..FunctionCurve::new(&names[i], function.quantity.unit(), found)
+                ..FunctionCurve::new(&names[i], self.unit(function), found)
             })
             .collect();
         figures::functions(&problem.oscillator.grid.times(), &curves)

@@ -32,7 +32,8 @@ fn without_gradient_it_only_reads() {
     let stdout = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
     assert_eq!(
         stdout,
-        "Small: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n"
+        "free decay: 21 readings of the displacement in m (UTF-8; separated by commas; decimal point; \
+         column names in line 1)\nSmall: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n"
     );
     assert_eq!(bench.contents(), before);
 }

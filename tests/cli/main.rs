@@ -5,6 +5,7 @@ mod check;
 mod compare;
 mod data_files;
 mod ending;
+mod measured_input;
 mod models;
 mod predict;
 mod regressions;

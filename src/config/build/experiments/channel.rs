@@ -46,8 +46,9 @@ pub struct RawChannel {
     /// Sections of the band's filter.
     pub filter: Vec<SecondOrder>,
     loss: Loss,
-    unit: Unit,
+    pub unit: Unit,
     ignored: Vec<(usize, String)>,
+    format: String,
 }
 
 impl RawChannel {
@@ -57,6 +58,7 @@ impl RawChannel {
             kind: self.kind,
             unit: self.unit,
             ignored: self.ignored.clone(),
+            format: self.format.clone(),
         }
     }
 }
@@ -260,6 +262,7 @@ fn read_one(
         loss,
         unit: source.unit,
         ignored,
+        format: source.format,
     })
 }
 
@@ -484,7 +487,13 @@ pub fn place(
         },
         (None, None) => integral_over(&raw.times),
     };
-    let sensor = sensor(file, i, &of_kind, &raw.values, scalars)?;
+    let sensor = sensor(
+        file,
+        (i, raw.unit.is_angular()),
+        &of_kind,
+        &raw.values,
+        scalars,
+    )?;
     let times = raw.times.clone();
     let channel = Channel::new(
         raw.kind,
@@ -546,7 +555,7 @@ pub fn place(
 
 fn sensor(
     file: &ModelFile,
-    i: usize,
+    (i, angular): (usize, bool),
     of_kind: &Spec,
     values: &[f64],
     scalars: &mut Vec<Scalar>,
@@ -558,10 +567,11 @@ fn sensor(
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let size =
         (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / values.len() as f64).sqrt();
-    let per_second = format!("{}/s", kind.unit());
+    let unit = kind.unit_of(angular);
+    let per_second = format!("{unit}/s");
     let parts = [
         ("gain", &spec.gain, "", 1.0, 1.0),
-        ("offset", &spec.offset, kind.unit(), mean, size),
+        ("offset", &spec.offset, unit, mean, size),
         ("drift", &spec.drift, per_second.as_str(), 0.0, size),
     ];
     let mut found = [Value::Known(1.0), Value::Known(0.0), Value::Known(0.0)];

@@ -31,13 +31,14 @@ pub fn build(
     });
     let starts = [first.map_or(0.0, |c| c.values[0]), 0.0];
     let names = ["displacement", "velocity"];
+    let angular = record.is_some_and(|r| r.channels.iter().any(|c| c.unit.is_angular()));
     let mut state = [0.0; 2];
     let mut sought = [None; 2];
     for q in 0..2 {
         let named = Named {
             key: format!("experiments[{i}].initial.{}", names[q]),
             name: format!("initial {} of {}", names[q], name(file, i)),
-            unit: ["m", "m/s"][q],
+            unit: [ChannelKind::Displacement, ChannelKind::Velocity][q].unit_of(angular),
             start: starts[q],
             size: sizes[q],
         };

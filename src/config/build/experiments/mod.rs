@@ -63,6 +63,8 @@ pub struct ChannelNote {
     pub unit: Unit,
     /// Readings that are not used: how many, and why.
     pub ignored: Vec<(usize, String)>,
+    /// How the file was found to be written, in words.
+    pub format: String,
 }
 
 /// What was made of the experiments of a model.

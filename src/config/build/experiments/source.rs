@@ -25,6 +25,8 @@ pub struct Source {
     pub outside: usize,
     /// Name of the column in the file.
     pub label: String,
+    /// How the file was found to be written, in words.
+    pub format: String,
 }
 
 /// Which column is wanted, and where the model says so.
@@ -134,6 +136,7 @@ pub fn read(
         outside: times.values.len() - inside.len(),
         unit,
         label,
+        format: table.format().to_string(),
     })
 }
 
