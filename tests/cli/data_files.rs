@@ -7,6 +7,18 @@ use std::fs;
 #[path = "../../examples/make_data.rs"]
 mod make_data;
 
+#[allow(dead_code, reason = "the example's main is not needed here")]
+#[path = "../../examples/make_records.rs"]
+mod make_records;
+
+/// Numbers in the text are rounded to fewer digits than two libraries of sines differ in.
+#[test]
+fn records() {
+    for (name, text) in make_records::all() {
+        assert!(text == shipped(name), "{name}");
+    }
+}
+
 fn shipped(name: &str) -> String {
     fs::read_to_string(repository("data").join(name)).expect("a file of data/")
 }

@@ -39,6 +39,14 @@ fn every_shipped_model_is_run_here() {
         "knots.yaml",
         "spline.yaml",
         "noisy.yaml",
+        "accelerometer.yaml",
+        "hammer-and-shaker.yaml",
+        "duffing.yaml",
+        "friction.yaml",
+        "roll-decay.yaml",
+        "moving-support.yaml",
+        "shaking-table.yaml",
+        "camera.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
 }
@@ -257,4 +265,126 @@ fn nothing_but_results_when_piped() {
     let (_, _, stderr) = bench.run(&["fit", "model.yaml"]);
     assert_eq!(stderr, "");
     assert!(bench.path("runs/model/result.json").exists());
+}
+
+/// The models of records like measurements: every constant is found within this many of its own
+/// standard errors, none of which is large.
+const STANDARD_ERRORS: f64 = 3.5;
+
+#[test]
+fn models_of_measurements() {
+    let expected: [(&str, &[(&str, f64)]); 6] = [
+        ("accelerometer", &[("damping", 1.2)]),
+        (
+            "hammer-and-shaker",
+            &[("mass", 1.2), ("damping", 0.9), ("stiffness", 480.0)],
+        ),
+        (
+            "duffing",
+            &[
+                ("mass", 1.0),
+                ("damping", 0.4),
+                ("stiffness", 10.0),
+                ("cubic_stiffness", 30.0),
+            ],
+        ),
+        (
+            "friction",
+            &[
+                ("mass", 1.0),
+                ("damping", 0.3),
+                ("stiffness", 40.0),
+                ("coulomb_friction", 2.0),
+            ],
+        ),
+        (
+            "roll-decay",
+            &[
+                ("mass", 20.0),
+                ("damping", 0.4),
+                ("quadratic_damping", 3.0),
+                ("cubic_stiffness", 60.0),
+            ],
+        ),
+        ("shaking-table", &[("damping", 0.8), ("stiffness", 300.0)]),
+    ];
+    for (name, constants) in expected {
+        let (bench, result) = fitted(name, 0);
+        assert_eq!(result["outcome"]["status"], "converged", "{name}");
+        for (function, truth) in constants {
+            let found = &result["functions"][function];
+            let number = |key: &str| found[key].as_f64().expect("a number");
+            let (value, error) = (number("min"), number("standard_error"));
+            assert!(error < 0.05 * truth, "{name} {function}: +- {error}");
+            let off = (value - truth).abs() / error;
+            assert!(
+                off < STANDARD_ERRORS,
+                "{name} {function}: {value} +- {error}"
+            );
+        }
+        for experiment in result["experiments"].as_array().expect("experiments") {
+            for channel in experiment["channels"].as_array().expect("channels") {
+                let p = channel["whiteness_p_value"].as_f64().expect("a number");
+                assert!(p > 0.01, "{name}: {channel}");
+            }
+        }
+        left_behind(&bench, &format!("runs/{name}"));
+    }
+}
+
+/// A softening spring, an offset and the noise from an instrument's file.
+#[test]
+fn accelerometer() {
+    let (_, result) = fitted("accelerometer", 0);
+    let stiffness = &result["functions"]["stiffness"];
+    let ends = [("min", 2700.0), ("max", 3000.0)];
+    for (key, truth) in ends {
+        let found = stiffness[key].as_f64().expect("a number");
+        assert!((found - truth).abs() < 1e-3 * truth, "{found}");
+    }
+    let channel = &result["experiments"][0]["channels"][0];
+    assert_eq!(channel["unit"], "g");
+    assert_eq!(channel["ignored"][0]["readings"], 3);
+    // 1198 readings know their standard deviation to 2 %; three of that.
+    let sigma = channel["sigma"].as_f64().expect("a number");
+    assert!((sigma - 0.01).abs() < 6e-4, "{sigma}");
+    let offset = scalar(&result, "offset of the acceleration of ring-down");
+    assert!((offset - 0.05 * 9.80665).abs() < 0.01, "{offset}");
+}
+
+fn scalar(result: &Value, name: &str) -> f64 {
+    let mut scalars = result["scalars"].as_array().expect("scalars").iter();
+    let found = scalars.find(|s| s["name"] == name).expect(name);
+    found["value"].as_f64().expect("a number")
+}
+
+#[test]
+fn a_held_out_record_is_predicted_within_its_noise() {
+    let (_, result) = fitted("hammer-and-shaker", 0);
+    let held = &result["held_out"][0];
+    assert_eq!(held["name"], "hammer 3");
+    let rms = held["channels"][0]["rms_residual"]
+        .as_f64()
+        .expect("a number");
+    // The noise is 0.02 mm; 301 readings know it to 4 %.
+    assert!((rms - 0.02).abs() < 0.0025, "{rms}");
+    let experiments = result["experiments"].as_array().expect("experiments");
+    assert_eq!(experiments.len(), 3);
+}
+
+/// Readings far off hardly pull, and sigma is that of the others.
+#[test]
+fn camera() {
+    let (_, result) = fitted("camera", 0);
+    let constants = [("damping", 0.2, 0.01), ("stiffness", 25.0, 0.001)];
+    for (function, truth, share) in constants {
+        let found = result["functions"][function]["min"]
+            .as_f64()
+            .expect("a number");
+        assert!((found - truth).abs() < share * truth, "{function}: {found}");
+    }
+    let sigma = result["experiments"][0]["channels"][0]["sigma"].as_f64();
+    assert!((sigma.expect("a number") - 0.002).abs() < 3e-4, "{sigma:?}");
+    let drift = scalar(&result, "drift of the displacement of photographs");
+    assert!((drift - 0.002).abs() < 2e-4, "{drift}");
 }

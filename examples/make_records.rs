@@ -1,0 +1,406 @@
+//! Makes the records of `data/` that stand for measurements: devices of known values, simulated on a
+//! fine grid, read by sensors with noise, and written as instruments write.
+//!
+//! `cargo run --example make_records -- data`
+
+use kmcfit::dynamics::{
+    ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
+    Surroundings, Term, Trajectory,
+};
+use kmcfit::report::write_whole;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const GRAVITY: f64 = 9.80665;
+/// Steps of the simulation between two readings.
+const FINE: usize = 16;
+
+/// A function of time.
+type Function<'a> = &'a dyn Fn(f64) -> f64;
+
+/// A device, what drives it, and how long it is watched.
+struct Run<'a> {
+    mass: f64,
+    terms: Vec<(Term, Function<'a>)>,
+    force: Option<Function<'a>>,
+    /// Acceleration of the base, m/s^2.
+    base: Option<Function<'a>>,
+    initial: State,
+    /// Readings per s, and their number.
+    rate: f64,
+    count: usize,
+}
+
+impl Run<'_> {
+    fn time(&self, i: usize) -> f64 {
+        i as f64 / self.rate
+    }
+
+    /// Displacement and acceleration at the times of the readings.
+    fn motion(&self) -> (Vec<f64>, Vec<f64>) {
+        let nodes = FINE * (self.count - 1) + 1;
+        let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
+        let at_nodes = |f: Function| grid.times().iter().map(|t| f(*t)).collect();
+        let device = Device {
+            mass: vec![self.mass; nodes],
+            coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
+        };
+        let oscillator = Oscillator {
+            grid,
+            method: Method::Rk4,
+            terms: self.terms.iter().map(|(term, _)| *term).collect(),
+        };
+        let steps = |f: Function| {
+            let step = |i: usize| {
+                let (a, b) = (grid.time(i), grid.time(i + 1));
+                [f(a), f(0.5 * (a + b)), f(b)]
+            };
+            Stepwise::new((0..nodes - 1).map(step).collect())
+        };
+        let excitation = Excitation {
+            force: self.force.map(steps),
+            base: self.base.map(steps),
+        };
+        let motion: Trajectory = oscillator
+            .forward(&device, self.initial, Some(&excitation))
+            .expect("a motion");
+        let readings = 0..self.count;
+        let acceleration = readings.clone().map(|i| {
+            let around = Surroundings {
+                force: self.force.map_or(0.0, |f| f(self.time(i))),
+                base: self.base.map_or(0.0, |b| b(self.time(i))),
+            };
+            let place = Place::node(FINE * i, nodes);
+            let kind = ChannelKind::Acceleration;
+            oscillator
+                .sense(kind, &device, Some(&excitation), &motion, place, around)
+                .value
+        });
+        let acceleration = acceleration.collect();
+        (
+            readings.map(|i| motion.displacement[FINE * i]).collect(),
+            acceleration,
+        )
+    }
+}
+
+/// Noise with a seed.
+struct Noise(ChaCha8Rng);
+
+impl Noise {
+    fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    fn next(&mut self, sigma: f64) -> f64 {
+        let z: f64 = StandardNormal.sample(&mut self.0);
+        sigma * z
+    }
+}
+
+fn state(displacement: f64, velocity: f64) -> State {
+    State {
+        displacement,
+        velocity,
+    }
+}
+
+fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Term, Function<'a>)> {
+    vec![(Term::Damping, c), (Term::Stiffness, k)]
+}
+
+/// A ring-down of 2 kg on a spring that softens from 3000 to 2700 N/m, c = 1.2 N s/m, read in g at
+/// 400 Hz by an accelerometer with an offset of 0.05 g and noise of 0.01 g, as a data logger writes
+/// it: preamble, semicolons, decimal commas, a row of units, Windows line ends, lost readings.
+pub fn accelerometer() -> String {
+    let run = Run {
+        mass: 2.0,
+        terms: linear(&|_| 1.2, &|t| 3000.0 - 100.0 * t),
+        force: None,
+        base: None,
+        initial: state(0.004, 0.1),
+        rate: 400.0,
+        count: 1201,
+    };
+    let (_, acceleration) = run.motion();
+    let mut noise = Noise::new(11);
+    let mut text = String::from(
+        "Data logger DL-4\r\nChannel 1: accelerometer\r\nSample rate: 400 Hz\r\n\r\nTime;Acc 1\r\ns;g\r\n",
+    );
+    for (i, a) in acceleration.iter().enumerate() {
+        let reading = a / GRAVITY + 0.05 + noise.next(0.01);
+        let lost = i % 397 == 300;
+        let field = if lost {
+            String::new()
+        } else {
+            format!("{reading:.4}")
+        };
+        let line = format!("{:.4};{field}\r\n", run.time(i));
+        text += &line.replace('.', ",");
+    }
+    text
+}
+
+/// The device of the hammer tests and the shaker run: 1.2 kg, 0.9 N s/m, 480 N/m.
+const TESTED: [f64; 3] = [1.2, 0.9, 480.0];
+
+/// A hammer test: displacement in mm after a blow, noise of 0.02 mm.
+pub fn hammer(number: u64) -> String {
+    let blows = [state(0.0, 0.25), state(0.006, -0.1), state(-0.004, 0.2)];
+    let run = Run {
+        mass: TESTED[0],
+        terms: linear(&|_| TESTED[1], &|_| TESTED[2]),
+        force: None,
+        base: None,
+        initial: blows[number as usize - 1],
+        rate: 100.0,
+        count: 301,
+    };
+    let (y, _) = run.motion();
+    let mut noise = Noise::new(20 + number);
+    let mut text = String::from("t_s,y [mm]\n");
+    for (i, y) in y.iter().enumerate() {
+        let reading = 1e3 * y + noise.next(0.02);
+        let _ = writeln!(text, "{:.2},{reading:.4}", run.time(i));
+    }
+    text
+}
+
+/// The shaker run of the same device: force in N (a sweep from 1 to 6 Hz) and acceleration in m/s^2 with
+/// noise of 0.02.
+pub fn shaker() -> String {
+    let sweep = |t: f64| 1.5 * libm::sin(TAU * (t + 5.0 / 16.0 * t * t));
+    let run = Run {
+        mass: TESTED[0],
+        terms: linear(&|_| TESTED[1], &|_| TESTED[2]),
+        force: Some(&sweep),
+        base: None,
+        initial: state(0.0, 0.0),
+        rate: 200.0,
+        count: 1601,
+    };
+    let (_, acceleration) = run.motion();
+    let mut noise = Noise::new(30);
+    let mut text = String::from("t_s,f_N,a_m_per_s2\n");
+    for (i, a) in acceleration.iter().enumerate() {
+        let t = run.time(i);
+        let reading = a + noise.next(0.02);
+        let _ = writeln!(text, "{t:.3},{:.6},{reading:.5}", sweep(t));
+    }
+    text
+}
+
+/// A Duffing oscillator (1 kg, 0.4 N s/m, 10 N/m, 30 N/m^3) under three sines, displacement in m with
+/// noise of 1 %.
+pub fn duffing() -> String {
+    let force = |t: f64| {
+        4.0 * libm::sin(TAU * 0.35 * t)
+            + 3.0 * libm::sin(TAU * 0.8 * t + 1.0)
+            + 2.0 * libm::sin(TAU * 1.3 * t + 2.0)
+    };
+    let mut terms = linear(&|_| 0.4, &|_| 10.0);
+    terms.push((Term::CubicStiffness, &|_| 30.0));
+    let run = Run {
+        mass: 1.0,
+        terms,
+        force: Some(&force),
+        base: None,
+        initial: state(0.2, 0.0),
+        rate: 40.0,
+        count: 1201,
+    };
+    with_force(&run, &force, 0.007, 40)
+}
+
+/// A mass with Coulomb friction (1 kg, 0.3 N s/m, 40 N/m, friction 2 N smoothed over 0.01 m/s) under a
+/// sine of 6 N at 0.5 Hz, which sticks in part of each cycle; displacement in m with noise of 1 %.
+pub fn friction() -> String {
+    let force = |t: f64| 6.0 * libm::sin(TAU * 0.5 * t);
+    let mut terms = linear(&|_| 0.3, &|_| 40.0);
+    terms.push((Term::CoulombFriction { width: 0.01 }, &|_| 2.0));
+    let run = Run {
+        mass: 1.0,
+        terms,
+        force: Some(&force),
+        base: None,
+        initial: state(0.0, 0.0),
+        rate: 100.0,
+        count: 1201,
+    };
+    with_force(&run, &force, 0.001, 50)
+}
+
+fn with_force(run: &Run, force: Function, sigma: f64, seed: u64) -> String {
+    let (y, _) = run.motion();
+    let mut noise = Noise::new(seed);
+    let mut text = String::from("t_s,f_N,y_m\n");
+    for (i, y) in y.iter().enumerate() {
+        let t = run.time(i);
+        let reading = y + noise.next(sigma);
+        let _ = writeln!(text, "{t:.3},{:.6},{reading:.6}", force(t));
+    }
+    text
+}
+
+/// The roll of a ship model after release (inertia 20 kg m^2, stiffness 130 N m/rad, damping 0.4, quadratic
+/// damping 3, cubic stiffness 60), in degrees with noise of 0.02 degrees.
+pub fn roll() -> String {
+    let mut terms = linear(&|_| 0.4, &|_| 130.0);
+    terms.push((Term::CubicStiffness, &|_| 60.0));
+    terms.push((Term::QuadraticDamping, &|_| 3.0));
+    let run = Run {
+        mass: 20.0,
+        terms,
+        force: None,
+        base: None,
+        initial: state(0.2, 0.0),
+        rate: 20.0,
+        count: 1001,
+    };
+    let (y, _) = run.motion();
+    let mut noise = Noise::new(60);
+    let mut text = String::from("t_s\troll [deg]\n");
+    for (i, y) in y.iter().enumerate() {
+        let reading = y.to_degrees() + noise.next(0.02);
+        let _ = writeln!(text, "{:.2}\t{reading:.3}", run.time(i));
+    }
+    text
+}
+
+/// A mass of 1 kg on a spring whose stiffness wanders between about 16,000 and 36,000 N/m, shaken by a force
+/// that nobody measured; acceleration in m/s^2 with noise, and the true natural frequency beside it.
+pub fn moving_support() -> String {
+    let stiffness = |t: f64| {
+        let f = 24.0 + 4.0 * libm::sin(TAU * 0.35 * t) + 2.0 * libm::sin(TAU * 0.9 * t + 1.0);
+        (TAU * f).powi(2)
+    };
+    let mut random = Noise::new(70);
+    let lines: Vec<[f64; 3]> = (0..60)
+        .map(|i| {
+            let f = 10.0 + 0.6 * f64::from(i);
+            [f + random.next(0.1), random.next(3.0), random.next(3.0)]
+        })
+        .collect();
+    let force = |t: f64| {
+        let line = |[f, a, b]: &[f64; 3]| {
+            let x = TAU * f * t;
+            a * libm::sin(x) + b * libm::cos(x)
+        };
+        lines.iter().map(line).sum()
+    };
+    let run = Run {
+        mass: 1.0,
+        terms: linear(&|_| 3.0, &stiffness),
+        force: Some(&force),
+        base: None,
+        initial: state(0.0, 0.0),
+        rate: 400.0,
+        count: 2401,
+    };
+    let (_, acceleration) = run.motion();
+    let mut text = String::from("t_s,a_m_per_s2,true_f_Hz\n");
+    for (i, a) in acceleration.iter().enumerate() {
+        let t = run.time(i);
+        let frequency = stiffness(t).sqrt() / TAU;
+        let reading = a + random.next(0.2);
+        let _ = writeln!(text, "{t:.4},{reading:.4},{frequency:.5}");
+    }
+    text
+}
+
+/// A mass on a shaking table (0.5 kg, 0.8 N s/m, 300 N/m): acceleration of the table and of the mass,
+/// both in g, noise of 0.002 g.
+pub fn table() -> String {
+    let base = |t: f64| {
+        3.0 * libm::sin(TAU * 1.7 * t)
+            + 2.0 * libm::sin(TAU * 3.1 * t + 0.5)
+            + 1.5 * libm::sin(TAU * 5.3 * t + 2.0)
+    };
+    let run = Run {
+        mass: 0.5,
+        terms: linear(&|_| 0.8, &|_| 300.0),
+        force: None,
+        base: Some(&base),
+        initial: state(0.0, 0.0),
+        rate: 200.0,
+        count: 1001,
+    };
+    let (_, acceleration) = run.motion();
+    let mut noise = Noise::new(80);
+    let mut text = String::from("t_s,table (g),mass (g)\n");
+    for (i, a) in acceleration.iter().enumerate() {
+        let t = run.time(i);
+        let absolute = (a + base(t)) / GRAVITY + noise.next(0.002);
+        let _ = writeln!(text, "{t:.3},{:.7},{absolute:.5}", base(t) / GRAVITY);
+    }
+    text
+}
+
+/// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing readings, one
+/// reading in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
+pub fn camera() -> String {
+    let run = Run {
+        mass: 1.0,
+        terms: linear(&|_| 0.2, &|_| 25.0),
+        force: None,
+        base: None,
+        initial: state(0.3, 0.0),
+        rate: 1000.0,
+        count: 15001,
+    };
+    let (y, _) = run.motion();
+    let mut random = Noise::new(90);
+    let mut text = String::from("t_s,y_m\n");
+    let mut i = 0usize;
+    while i < y.len() {
+        let t = run.time(i);
+        let good = y[i] + 0.002 * t + random.next(0.002);
+        let far = random.next(1.0);
+        let blind = random.next(1.0);
+        let reading = if far.abs() > 1.96 {
+            good + 0.1 * far
+        } else {
+            good
+        };
+        if !(6.0..7.5).contains(&t) {
+            match blind.abs() > 2.0 {
+                true => _ = writeln!(text, "{t:.3},"),
+                false => _ = writeln!(text, "{t:.3},{reading:.5}"),
+            }
+        }
+        // From 15 to some 50 ms to the next picture.
+        i += 15 + (random.next(10.0).abs() as usize);
+    }
+    text
+}
+
+/// All files with their names.
+pub fn all() -> Vec<(&'static str, String)> {
+    vec![
+        ("accelerometer.txt", accelerometer()),
+        ("hammer_1.csv", hammer(1)),
+        ("hammer_2.csv", hammer(2)),
+        ("hammer_3.csv", hammer(3)),
+        ("shaker.csv", shaker()),
+        ("duffing.csv", duffing()),
+        ("friction.csv", friction()),
+        ("roll.tsv", roll()),
+        ("moving_support.csv", moving_support()),
+        ("table.csv", table()),
+        ("camera.csv", camera()),
+    ]
+}
+
+fn main() -> std::io::Result<()> {
+    let folder = std::env::args_os()
+        .nth(1)
+        .map_or_else(|| PathBuf::from("data"), PathBuf::from);
+    for (name, text) in all() {
+        write_whole(&Path::new(&folder).join(name), &text)?;
+    }
+    Ok(())
+}
