@@ -75,7 +75,8 @@ pub struct ModelSummary {
     pub gradient: String,
     /// Number of free parameters.
     pub parameters: usize,
-    /// How the misfit in J is measured: `integral`, `chi-square` or `mixed`.
+    /// How the misfit in J is measured: `integral`, `chi-square`, `mixed` or
+    /// `equation-error`.
     pub cost_kind: CostKind,
     /// The whole of J in one sentence, with all its factors.
     pub cost_definition: String,

@@ -113,8 +113,8 @@ impl Run<'_> {
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.functions.parameters(),
-            cost_kind: CostKind::of(problem),
-            cost_definition: cost_definition(problem),
+            cost_kind: CostKind::of(problem, self.model.settings.solver),
+            cost_definition: cost_definition(problem, self.model.settings.solver),
         }
     }
 
