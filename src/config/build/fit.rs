@@ -1,7 +1,7 @@
 //! How to fit.
 
-use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use super::Purpose;
+use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use crate::objective::GradientKind;

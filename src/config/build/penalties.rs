@@ -136,7 +136,9 @@ fn has_period(file: &ModelFile, key: &str, spec: &SmoothSpec) -> Result<(), Inpu
                 "the rule `period` is a rule of the method `equation-error` alone",
             )
             .found("another method")
-            .expected("`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`"));
+            .expected(
+                "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
+            ));
     }
     if spec.order.0 == 0 {
         return Err(file
@@ -160,7 +162,10 @@ fn can_choose(
     let key = format!("{key}.weight");
     if is_equation_error(file) {
         return Err(file
-            .error_at(&key, "the method `equation-error` knows no search for the weight")
+            .error_at(
+                &key,
+                "the method `equation-error` knows no search for the weight",
+            )
             .found(format!("`{rule}`"))
             .expected("`period`, which follows from the motion, or a number"));
     }

@@ -8,9 +8,18 @@ use crate::signal::zero_phase;
 use crate::solvers::kinematics::{Band, Kinematics, rms, unsensed};
 use std::fmt;
 
+/// Dominant periods at either end that are left out where a force or the base is known to drive the
+/// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
+/// a period, are the largest errors there are. Without a known drive the unknown one is larger.
+const SETTLING: f64 = 2.0;
+/// Most of a record that may be left out at either end.
+const MOST_LEFT_OUT: usize = 4;
+
 /// The state of an experiment at some times, and what drives it there.
 pub(super) struct Measured {
     pub places: Vec<Place>,
+    /// Index of the first time among the readings of the channel, where it is one channel's.
+    first: usize,
     /// Displacement, m.
     pub y: Vec<f64>,
     /// Velocity, m/s.
@@ -35,7 +44,11 @@ impl Measured {
     /// # Errors
     /// What is missing.
     fn of(problem: &Problem, experiment: &Experiment, scalars: &[f64]) -> Result<Self, String> {
-        if experiment.channels.iter().any(|c| c.loss() != Loss::Squares) {
+        if experiment
+            .channels
+            .iter()
+            .any(|c| c.loss() != Loss::Squares)
+        {
             return Err("the equation error knows no robust loss".into());
         }
         let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
@@ -48,6 +61,14 @@ impl Measured {
         {
             return Self::in_band(experiment, channel, spacing, scalars)
                 .ok_or_else(|| "the acceleration is too short or does not oscillate".into());
+        }
+        let anchored = |c: &Channel| c.kind() == ChannelKind::Displacement && c.filter().is_empty();
+        if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
+            return Err(
+                "what drives the motion is known, but cannot be filtered as the motion is, which is \
+                 integrated from other channels than one of equally spaced accelerations"
+                    .into(),
+            );
         }
         let motion = Kinematics::of(problem, experiment, scalars);
         let motion = motion.ok_or("there are too few readings")?;
@@ -77,13 +98,23 @@ impl Measured {
             .motions(&[&values, &force, &base])?
             .try_into()
             .expect("one for each");
+        let skipped = match experiment.is_free() {
+            true => 1,
+            false => {
+                let periods = SETTLING * std::f64::consts::TAU / band.frequency;
+                let readings = (periods / spacing).ceil() as usize;
+                readings.clamp(1, channel.len() / MOST_LEFT_OUT)
+            }
+        };
+        let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
-            places: channel.places()[1..channel.len() - 1].to_vec(),
-            y: motion.y,
-            v: motion.v,
-            a: motion.a,
-            force: force.a,
-            base: base.a,
+            places: channel.places()[skipped..channel.len() - skipped].to_vec(),
+            first: skipped,
+            y: kept(motion.y),
+            v: kept(motion.v),
+            a: kept(motion.a),
+            force: kept(force.a),
+            base: kept(base.a),
             weight: spacing,
             frequency: band.frequency,
             corner: Some(band.corner()),
@@ -106,6 +137,7 @@ impl Measured {
         let place = |node: &usize| Place::node(*node, experiment.nodes);
         Self {
             places: motion.nodes.iter().map(place).collect(),
+            first: 0,
             y: motion.y.clone(),
             v: motion.v.clone(),
             a: motion.a.clone(),
@@ -188,8 +220,7 @@ impl Measured {
     ///
     /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
     /// the filter took from the reading, so that model less reading is minus the equation's error
-    /// over the mass; the first and the last reading, which the band does not have, stand for
-    /// themselves.
+    /// over the mass; the readings at the ends, which are left out, stand for themselves.
     pub fn predict(&self, problem: &Problem, channel: &Channel, view: View) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
@@ -197,7 +228,7 @@ impl Measured {
         let [gain, ..] = channel.sensor().values(view.scalars);
         let mut predicted = channel.observed().to_vec();
         for (i, error) in self.errors(problem, view.device).iter().enumerate() {
-            predicted[i + 1] -= gain * error / blend(&view.device.mass, self.places[i]);
+            predicted[self.first + i] -= gain * error / blend(&view.device.mass, self.places[i]);
         }
         predicted
     }

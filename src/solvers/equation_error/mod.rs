@@ -198,7 +198,9 @@ fn equation_fixes_scale(problem: &Problem) -> bool {
         .experiments
         .iter()
         .filter(|e| !e.channels.is_empty());
-    fixed || measured.any(|e| !e.is_free())
+    // The base pushes with `-m b''`, which grows with the mass.
+    let force = |e: &Experiment| e.excitation.as_ref().and_then(|e| e.force.clone());
+    fixed || measured.any(|e| force(e).is_some_and(|f| !f.is_zero()))
 }
 
 /// Whether some equality tells `theta` from `s theta`: `a theta = b` does unless `b` is zero. An

@@ -102,9 +102,7 @@ impl Band {
     fn derivatives(&self, y: &[f64]) -> InBand {
         let h = self.spacing;
         let a = numerov(y, h);
-        let slope = |(y, a): (&[f64], &[f64])| {
-            (y[2] - y[0]) / (2.0 * h) - h / 12.0 * (a[2] - a[0])
-        };
+        let slope = |(y, a): (&[f64], &[f64])| (y[2] - y[0]) / (2.0 * h) - h / 12.0 * (a[2] - a[0]);
         InBand {
             v: y.windows(3).zip(a.windows(3)).map(slope).collect(),
             y: y[1..y.len() - 1].to_vec(),
@@ -150,7 +148,11 @@ mod tests {
         let acceleration: Vec<f64> = (0..4000).map(|i| (w * h * f64::from(i)).sin()).collect();
         let band = Band::of(&acceleration, h).expect("it oscillates");
         // The spurious ends and order 4 at 33 readings per period leave some 1e-4.
-        assert!((band.frequency / w - 1.0).abs() < 2e-3, "{}", band.frequency);
+        assert!(
+            (band.frequency / w - 1.0).abs() < 2e-3,
+            "{}",
+            band.frequency
+        );
         let motion = band.motions(&[&acceleration]).unwrap().pop().unwrap();
         let response = 1.0 / (1.0 + (band.corner() / w).powi(4));
         for i in 1900..2100 {
