@@ -43,8 +43,13 @@ pub(super) fn build(
 
 /// Whether the method is the equation error.
 pub(super) fn is_equation_error(file: &ModelFile) -> bool {
+    method(file) == FitMethod::EquationError
+}
+
+/// The method asked for, or the default.
+pub(super) fn method(file: &ModelFile) -> FitMethod {
     let method = file.spec.fit.as_ref().and_then(|f| f.method);
-    method == Some(FitMethod::EquationError)
+    method.unwrap_or(FitMethod::GaussNewton)
 }
 
 /// The motions as the readings tell them, where the method is to use them.
@@ -92,8 +97,7 @@ fn takes_steps(file: &ModelFile, solver: Solver) -> Result<(), InputError> {
 
 fn solver(file: &ModelFile) -> Result<Solver, InputError> {
     let memory = memory(file)?;
-    let method = file.spec.fit.as_ref().and_then(|f| f.method);
-    let solver = match method.unwrap_or(FitMethod::GaussNewton) {
+    let solver = match method(file) {
         FitMethod::SteepestDescent => Solver::SteepestDescent,
         FitMethod::Lbfgs => {
             return Ok(Solver::Lbfgs {

@@ -1,6 +1,6 @@
 //! Penalties: `smooth` and `variation` of the functions.
 
-use super::fit::is_equation_error;
+use super::fit::{is_equation_error, method};
 use super::functions::{slots, values};
 use crate::config::ModelFile;
 use crate::config::scalar::Weight;
@@ -135,7 +135,7 @@ fn has_period(file: &ModelFile, key: &str, spec: &SmoothSpec) -> Result<(), Inpu
                 &format!("{key}.weight"),
                 "the rule `period` is a rule of the method `equation-error` alone",
             )
-            .found("another method")
+            .found(format!("`{}`", method(file)))
             .expected(
                 "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
             ));

@@ -65,8 +65,8 @@ impl Measured {
         let anchored = |c: &Channel| c.kind() == ChannelKind::Displacement && c.filter().is_empty();
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
             return Err(
-                "what drives the motion is known, but cannot be filtered as the motion is, which is \
-                 integrated from other channels than one of equally spaced accelerations"
+                "its force or base cannot be filtered as its motion is, which is integrated from other \
+                 channels than one of equally spaced accelerations"
                     .into(),
             );
         }
