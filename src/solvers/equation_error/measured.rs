@@ -161,10 +161,11 @@ impl Measured {
     pub fn errors(&self, problem: &Problem, device: &Device) -> Vec<f64> {
         let error = |(i, place): (usize, &Place)| {
             let forces = device.functions().enumerate();
-            let sum: f64 = forces
-                .map(|(f, values)| blend(values, *place) * self.response(problem, f, i))
-                .sum();
-            sum - self.force[i]
+            let force =
+                |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
+            forces
+                .map(force)
+                .fold(-self.force[i], |sum, force| sum + force)
         };
         self.places.iter().enumerate().map(error).collect()
     }
@@ -349,11 +350,18 @@ impl Measurements {
         squares * period.powi(2 * order as i32)
     }
 
+    /// The largest value at `start` of each function of the list.
+    pub(super) fn own_sizes(problem: &Problem, start: &[f64]) -> Vec<f64> {
+        let values = problem.functions.values(start);
+        let largest = |f: &Vec<f64>| f.iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        values.iter().map(largest).collect()
+    }
+
     /// The larger of a function's own largest value at `start` and of the value at which its force
     /// would be as large as the mass's, for each function of the list.
     pub(super) fn sizes(&self, problem: &Problem, start: &[f64]) -> Vec<f64> {
-        let values = problem.functions.values(start);
-        let own = |index: usize| values[index].iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        let sizes = Self::own_sizes(problem, start);
+        let own = |index: usize| sizes[index];
         let natural = |index: usize| {
             let [mut inertia, mut response] = [0.0, 0.0];
             for (f, measured) in self.with_function(problem, index) {
@@ -366,7 +374,7 @@ impl Measurements {
                 false => 0.0,
             }
         };
-        (0..values.len())
+        (0..sizes.len())
             .map(|index| own(index).max(natural(index)))
             .collect()
     }

@@ -50,7 +50,11 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     }
     add_penalties(problem, start, &mut sub);
     add_variations(problem, start, &mut sub);
-    let sizes = Measurements { experiments }.sizes(problem, start);
+    // The size of a function is that of its start, or where that is zero the one that it would need.
+    let own = Measurements::own_sizes(problem, start);
+    let natural = Measurements { experiments }.sizes(problem, start);
+    let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
+    let sizes: Vec<f64> = own.into_iter().zip(natural).map(either).collect();
     let minimum = minimise(problem, sub, start, &sizes, KEPT, &|_| Vec::new())?;
     Ok(minimum.parameters)
 }
@@ -153,11 +157,11 @@ fn add_rows(
         let mut entries = Vec::new();
         for (which, &f) in assembly.iter().enumerate() {
             let first = functions.ranges()[f].start;
-            let factor = root * measured.response(problem, which, i);
+            let response = measured.response(problem, which, i);
             for (side, share) in [1.0 - fraction, fraction].into_iter().enumerate() {
                 if share != 0.0 {
                     let row = functions.get(f).design.row(step + side);
-                    entries.extend(row.map(|(j, b)| (first + j, factor * share * b)));
+                    entries.extend(row.map(|(j, b)| (first + j, root * b * response * share)));
                 }
             }
         }
