@@ -1,9 +1,93 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
 use crate::constraints::{Constraints, RowGroup};
-use crate::dynamics::{Excitation, Oscillator, State};
+use crate::dynamics::{ChannelKind, Excitation, Grid, Oscillator, State, Stepwise};
 use crate::functions::{Functions, Penalty, Variation};
 use crate::objective::{Channel, Weighting};
+use crate::signal::{Shape, Signal};
+
+/// A force over time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Waveform {
+    /// Measured, N.
+    Samples(Signal),
+    /// A formula, N.
+    Shape(Shape),
+}
+
+/// A measured motion of the base.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BaseMotion {
+    /// Its acceleration, m/s^2.
+    Acceleration(Signal),
+    /// Its displacement, m, as a smooth function: it is differentiated twice.
+    Displacement(Signal),
+}
+
+/// What drives a motion, at any time: from it the excitation on any grid is made.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Drive {
+    /// The force.
+    pub force: Option<Waveform>,
+    /// The motion of the base.
+    pub base: Option<BaseMotion>,
+}
+
+impl Drive {
+    /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
+    pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
+        let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
+            let step = |i: usize| {
+                let (left, right) = (grid.time(i), grid.time(i + 1));
+                [at(left), at(0.5 * (left + right)), before(right)]
+            };
+            Stepwise::new((0..nodes - 1).map(step).collect())
+        };
+        Excitation {
+            force: self.force.as_ref().map(|force| match force {
+                Waveform::Samples(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+            }),
+            base: self.base.as_ref().map(|base| match base {
+                BaseMotion::Acceleration(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                BaseMotion::Displacement(s) => {
+                    sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
+                }
+            }),
+        }
+    }
+
+    /// The force at time `t` (s), N.
+    pub fn force_at(&self, t: f64) -> f64 {
+        match &self.force {
+            None => 0.0,
+            Some(Waveform::Samples(signal)) => signal.value(t),
+            Some(Waveform::Shape(shape)) => shape.value(t),
+        }
+    }
+
+    /// The acceleration of the base at time `t` (s), m/s^2.
+    pub fn base_acceleration_at(&self, t: f64) -> f64 {
+        self.base_motion_at(ChannelKind::Acceleration, t)
+            .unwrap_or(0.0)
+    }
+
+    /// The motion of the base at time `t` (s) in the SI unit of `kind`; `None` where it is not known.
+    pub fn base_motion_at(&self, kind: ChannelKind, t: f64) -> Option<f64> {
+        match (&self.base, kind) {
+            (None, _) => Some(0.0),
+            (Some(BaseMotion::Acceleration(signal)), ChannelKind::Acceleration) => {
+                Some(signal.value(t))
+            }
+            (Some(BaseMotion::Acceleration(_)), _) => None,
+            (Some(BaseMotion::Displacement(signal)), kind) => Some(match kind {
+                ChannelKind::Displacement => signal.value(t),
+                ChannelKind::Velocity => signal.derivative(t),
+                ChannelKind::Acceleration => signal.second_derivative(t),
+            }),
+        }
+    }
+}
 
 /// One record of a device's motion.
 #[derive(Debug, Clone)]
@@ -14,8 +98,10 @@ pub struct Experiment {
     pub initial: State,
     /// The scalars that displacement and velocity at the first node are, where they are sought.
     pub sought: [Option<usize>; 2],
-    /// What drives the motion; `None` is free motion.
+    /// What drives the motion, on the grid; `None` is free motion.
     pub excitation: Option<Excitation>,
+    /// What it was made from; empty where it was given on the grid.
+    pub drive: Drive,
     /// Number of nodes of its motion: a record may end before the grid does.
     pub nodes: usize,
     /// Which device of [`Functions::assemblies`] moves.
@@ -32,6 +118,7 @@ impl Experiment {
             initial,
             sought: [None; 2],
             excitation: None,
+            drive: Drive::default(),
             nodes,
             device: 0,
             channels: Vec::new(),
@@ -59,6 +146,27 @@ impl Experiment {
             displacement: value(self.sought[0], self.initial.displacement),
             velocity: value(self.sought[1], self.initial.velocity),
         }
+    }
+
+    /// The same experiment on a grid of half the step; `None` if its readings are not on it. An
+    /// excitation that was given on the old grid is linear between its stages.
+    pub fn halved(&self, grid: &Grid) -> Option<Self> {
+        let nodes = 2 * self.nodes - 1;
+        let channels: Option<Vec<Channel>> =
+            self.channels.iter().map(|c| c.on(grid, nodes)).collect();
+        let excitation = self
+            .excitation
+            .as_ref()
+            .map(|old| match self.drive == Drive::default() {
+                false => self.drive.on(grid, nodes),
+                true => old.halved(),
+            });
+        Some(Self {
+            channels: channels?,
+            excitation,
+            nodes,
+            ..self.clone()
+        })
     }
 
     /// Whether nothing drives the motion.

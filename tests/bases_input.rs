@@ -297,7 +297,7 @@ fn keys_that_a_basis_does_not_use() {
     assert_snapshot!(with("basis: b-spline, knot: 5"), @"
     m.yaml:5:37: functions.mass: unknown key
       found: `knot`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation
+      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
       hint: did you mean `knots`?
     ");
 }

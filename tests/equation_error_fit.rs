@@ -263,21 +263,31 @@ fn dropbear() {
     let Some(folder) = common::shared("data") else {
         return;
     };
-    let rows = common::csv(&folder.join("dropbear8_random_0_mode1_500Hz.csv"));
+    let path = folder.join("dropbear8_random_0_mode1_500Hz.csv");
+    let rows = common::csv(&path);
     let column = |j: usize| rows.iter().map(|row| row[j]).collect::<Vec<f64>>();
     let (times, acceleration, reference) = (column(0), column(1), column(3));
     let nodes = times.len();
+    let text = format!(
+        "
+format: 1
+experiments:
+  - data: {}
+    columns: {{time: t_s, acceleration: acc_mode1_V}}
+    initial: {{displacement: 0, velocity: 0}}
+functions:
+  mass: {{fixed: 1}}
+  damping: {{basis: nodal, start: 0, smooth: {{order: 1, weight: period}}}}
+  stiffness: {{basis: nodal, start: 1, smooth: {{order: 1, weight: period}}}}
+fit: {{method: equation-error}}
+",
+        path.canonicalize().unwrap().display()
+    );
+    let file = ModelFile::parse("dropbear.yaml", text).unwrap();
     let clock = std::time::Instant::now();
-    let grid = Grid::new(times[0], times[nodes - 1] - times[0], nodes).unwrap();
-    let oscillator = Oscillator {
-        grid,
-        ..oscillator()
-    };
-    let readings = channel(ChannelKind::Acceleration, &grid, acceleration.clone());
-    let list = free_at_nodes(nodes);
-    let experiment = Experiment::free("tip", REST, nodes).with_channel(readings);
-    let problem = problem_of(oscillator, list, experiment);
-    let found = run(&problem);
+    let model = build(&file, Purpose::Fit).unwrap();
+    assert_eq!(model.warnings, [""; 0]);
+    let found = run(&model.problem);
     let seconds = clock.elapsed().as_secs_f64();
     assert_eq!(
         found.outcome.status,

@@ -80,6 +80,9 @@ impl Curve {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = ModelFile::read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
+    for remark in &model.remarks {
+        eprintln!("note: {remark}");
+    }
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }

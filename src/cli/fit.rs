@@ -30,6 +30,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let mut model = build(&file, Purpose::Fit)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(&output_path(arguments))?;
+    for remark in &model.remarks {
+        eprintln!("note: {remark}");
+    }
     for warning in &model.warnings {
         eprintln!("warning: {warning}");
     }

@@ -78,6 +78,25 @@ impl Excitation {
         zero(&self.force) && zero(&self.base)
     }
 
+    /// On steps of half the length, each stage of the old step being the end of a new one; linear in
+    /// between.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let halves = |part: &Stepwise| {
+            let halves = part.0.iter().flat_map(|&[left, middle, right]| {
+                [
+                    [left, 0.5 * (left + middle), middle],
+                    [middle, 0.5 * (middle + right), right],
+                ]
+            });
+            Stepwise(halves.collect())
+        };
+        Self {
+            force: self.force.as_ref().map(halves),
+            base: self.base.as_ref().map(halves),
+        }
+    }
+
     /// Both at any place, linear between the ends of its step.
     pub fn around(&self, place: Place) -> Surroundings {
         let at = |part: &Option<Stepwise>| {

@@ -18,6 +18,11 @@ pub enum Weighting {
         /// Standard deviation of a reading, in the unit of the channel.
         f64,
     ),
+    /// The same with a standard deviation that is estimated: its present value.
+    Estimated {
+        /// In the unit of the channel.
+        sigma: f64,
+    },
     /// The same with a standard deviation for each reading.
     Sigmas(
         /// One per reading.
@@ -28,14 +33,14 @@ pub enum Weighting {
 impl Weighting {
     /// Whether readings have a standard deviation, so that J is a chi-square.
     pub fn is_sigma(&self) -> bool {
-        matches!(self, Self::Sigma(_) | Self::Sigmas(_))
+        !matches!(self, Self::Integral { .. } | Self::Trapezoid(_))
     }
 
     /// Standard deviation of reading `i`; `None` for the integral cost.
     #[inline]
     pub fn sigma(&self, i: usize) -> Option<f64> {
         match self {
-            Self::Sigma(sigma) => Some(*sigma),
+            Self::Sigma(sigma) | Self::Estimated { sigma } => Some(*sigma),
             Self::Sigmas(sigmas) => sigmas.get(i).copied(),
             Self::Integral { .. } | Self::Trapezoid(_) => None,
         }
@@ -48,7 +53,7 @@ impl Weighting {
             Self::Integral { spacing } if i == 0 || i + 1 == count => 0.5 * spacing,
             Self::Integral { spacing } => *spacing,
             Self::Trapezoid(weights) => weights[i],
-            Self::Sigma(sigma) => 1.0 / (sigma * sigma),
+            Self::Sigma(sigma) | Self::Estimated { sigma } => 1.0 / (sigma * sigma),
             Self::Sigmas(sigmas) => 1.0 / (sigmas[i] * sigmas[i]),
         }
     }
@@ -57,7 +62,7 @@ impl Weighting {
     pub(super) fn truncate(&mut self, count: usize) {
         match self {
             Self::Trapezoid(list) | Self::Sigmas(list) => list.truncate(count),
-            Self::Integral { .. } | Self::Sigma(_) => {}
+            Self::Integral { .. } | Self::Sigma(_) | Self::Estimated { .. } => {}
         }
     }
 }

@@ -24,6 +24,7 @@ pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::{Measurements, Unsuited, equation_error};
 pub use executor::Fit;
 pub use infeasible::without_motion;
+pub use kinematics::states_from_readings;
 pub use ladder::{Initial, Rung, fit};
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};

@@ -57,7 +57,7 @@ fn keys() {
     assert_snapshot!(changed("start: 2.0", "strat: 2.0"), @"
     error: model.yaml:10:29: functions.mass: unknown key
       found: `strat`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation
+      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
       hint: did you mean `start`?
     ");
     assert_snapshot!(changed("method: midpoint", "method: midpoint, dt: 0.1"), @"
@@ -69,7 +69,7 @@ fn keys() {
     assert_snapshot!(changed("  - name:", "  - colour: red\n    name:"), @"
     error: model.yaml:4:5: experiments[0]: unknown key
       found: `colour`
-      expected: one of: name, data, columns, sigma, initial
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, hold_out
     ");
     assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
     error: model.yaml:4:5: experiments[0]: the key `initial` is missing
@@ -110,13 +110,13 @@ fn kinds_of_value() {
     assert_snapshot!(changed("nodes: 21", "nodes: 2e3"), @"
     error: model.yaml:8:15: grid.nodes: not an integer
       found: the floating-point number 2000
-      expected: an integer
+      expected: an integer, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: -21"), @"
     error: model.yaml:8:15: grid.nodes: a count cannot be negative
       found: the integer -21
-      expected: an integer, 0 or more
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("start: 2.0", "start: .nan"), @"
     error: model.yaml:10:36: functions.mass.start: not a finite number
@@ -126,7 +126,7 @@ fn kinds_of_value() {
     assert_snapshot!(changed("velocity: 0.0", "velocity: .inf"), @"
     error: model.yaml:7:44: experiments[0].initial.velocity: not a finite number
       found: an infinite number
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("method: lbfgs", "method: l-bgfs"), @"
     error: model.yaml:14:11: fit.method: unknown choice
@@ -203,12 +203,12 @@ fn sigma() {
     assert_snapshot!(changed("    initial", &sigma("0")), @"
     error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
       found: 0
-      expected: a number greater than 0, in m
+      expected: a number greater than 0, in SI units
     ");
     assert_snapshot!(changed("    initial", &sigma("-0.1")), @"
     error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
       found: -0.1
-      expected: a number greater than 0, in m
+      expected: a number greater than 0, in SI units
     ");
     let bench = Workbench::with_small_model();
     let model = MODEL.replace("    initial", &sigma("0.1"));
@@ -236,11 +236,6 @@ fn grid() {
     error: model.yaml:8:15: grid.nodes: this number of nodes cannot be used
       found: 2
       expected: 3 to 10000000
-    ");
-    assert_snapshot!(changed("nodes: 21", "nodes: 30"), @"
-    error: model.yaml:8:15: grid.nodes: the readings do not fall on nodes
-      found: 30 nodes, 21 readings
-      expected: 21 nodes or 1 + a multiple of 20
     ");
 }
 
@@ -270,13 +265,13 @@ fn readings_files() {
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(with_readings(&readings(2)), @"
-    error: model.yaml:5:11: experiments[0].data: readings.csv: there are too few readings
-      found: 2 rows
+    error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+      found: 2 readings
       expected: at least 3
     ");
     assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
-    error: model.yaml:5:11: experiments[0].data: readings.csv: there are too few readings
-      found: 1 row
+    error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+      found: 1 reading
       expected: at least 3
     ");
     assert_snapshot!(changed("displacement: y_m", "displacement: y_mm"), @"
@@ -297,22 +292,12 @@ fn rows() {
     assert_snapshot!(with_row(17, "1.6,off"), @"
     error: readings.csv:18: row 17, column `y_m`: not a number
       found: `off`
-      expected: a finite number
-    ");
-    assert_snapshot!(with_row(17, "1.6,"), @"
-    error: readings.csv:18: row 17, column `y_m`: a number is missing
-      found: nothing
-      expected: a finite number
+      expected: a finite number, or an empty field where a reading is missing
     ");
     assert_snapshot!(with_row(17, "1.6"), @"
     error: readings.csv:18: row 17: the row does not fit the column names
       found: 1 field
       expected: 2 fields, one per column
-    ");
-    assert_snapshot!(with_row(17, "1.6,NaN"), @"
-    error: readings.csv:18: row 17, column `y_m`: not a finite number
-      found: `NaN`
-      expected: a finite number
     ");
     assert_snapshot!(with_row(17, "1.4,0.1"), @"
     error: readings.csv:18: row 17, column `t_s`: the times do not increase
@@ -323,11 +308,6 @@ fn rows() {
     error: readings.csv:18: row 17, column `t_s`: two rows with the same time
       found: 1.5 after 1.5 in line 17
       expected: a time greater than 1.5
-    ");
-    assert_snapshot!(with_row(17, "1.61,0.1"), @"
-    error: readings.csv:18: row 17, column `t_s`: the times are not equally spaced
-      found: 1.61 after 1.5, a spacing of 0.11
-      expected: a spacing of 0.1, as between most rows
     ");
 }
 

@@ -72,22 +72,6 @@ fn without_iterations_or_tests_the_default_tolerance_holds() {
 }
 
 #[test]
-fn times_that_drift_are_not_equally_spaced() {
-    let bench = Workbench::with_small_model();
-    // Every spacing is within the tolerance, but the middle is off by ten times as much.
-    let mut text = String::from("t_s,y_m\n");
-    let mut t = 0.0f64;
-    for i in 0..41 {
-        text += &format!("{t},{}\n", (0.1 * f64::from(i)).cos());
-        t += 0.1 * (1.0 + if i < 20 { 0.45e-6 } else { -0.45e-6 });
-    }
-    bench.write("readings.csv", &text);
-    let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
-    assert_eq!(code, 2);
-    assert!(stderr.contains("they drift"), "{stderr}");
-}
-
-#[test]
 fn simulate_does_not_write_over_the_model_s_readings() {
     let bench = Workbench::with_small_model();
     let before = bench.contents();

@@ -3,8 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::scalar::{Count, Knots, Number, NumberOrColumn, Start, Weight};
-use kmcfit::config::spec::{Basis, FitMethod, Gradient, SmoothSpec, StepMethod, WeightRule};
+use kmcfit::config::scalar::{
+    ColumnId, Count, Knots, Nodes, Number, NumberOrColumn, NumberOrEstimate, ScalarOr, Sigma,
+    Start, Weight,
+};
+use kmcfit::config::spec::{
+    Basis, FitMethod, Gradient, InitialSpec, SmoothSpec, StepMethod, WeightRule,
+};
 
 pub const FULL: &str = "\
 format: 1
@@ -57,17 +62,19 @@ fn every_key_is_read() {
     assert_eq!(first.name.as_deref(), Some("free decay"));
     assert_eq!(first.data.as_deref(), Some("../data/noisy.csv"));
     let columns = first.columns.as_ref().unwrap();
-    assert_eq!(columns.time.as_deref(), Some("t_s"));
-    assert_eq!(columns.displacement.as_deref(), Some("y_m"));
-    let sigma = first.sigma.as_ref().unwrap().displacement;
-    assert_eq!(sigma, Some(Number(0.1)));
-    assert_eq!(first.initial.velocity, Number(1.0));
+    assert_eq!(columns.time, Some(ColumnId::Name("t_s".into())));
+    assert_eq!(
+        columns.displacement,
+        Some(ScalarOr::Scalar(ColumnId::Name("y_m".into())))
+    );
+    let sigma = first.sigma.as_ref().unwrap().displacement.clone();
+    assert_eq!(sigma, Some(Sigma::Number(Number(0.1))));
+    assert_eq!(known(&first.initial)[1], 1.0);
     assert_eq!(second.name, None);
-    assert_eq!(second.initial.displacement, Number(-2e-3));
-    assert_eq!(second.initial.velocity, Number(0.5));
+    assert_eq!(known(&second.initial), [-2e-3, 0.5]);
 
     let grid = spec.grid.unwrap();
-    assert_eq!(grid.nodes, Some(Count(2000)));
+    assert_eq!(grid.nodes, Some(Nodes::Count(Count(2000))));
     assert_eq!(grid.method, Some(StepMethod::Midpoint));
     assert_eq!(grid.duration.map(f64::from), Some(25.0));
 
@@ -212,4 +219,15 @@ fn choices_say_their_names() {
         assert_eq!(method.to_string(), *name);
     }
     assert_eq!(StepMethod::Rk4.name(), "rk4");
+}
+
+/// Displacement and velocity of an initial state that is known.
+fn known(initial: &InitialSpec) -> [f64; 2] {
+    let ScalarOr::Map(state) = initial else {
+        panic!("a state")
+    };
+    [&state.displacement, &state.velocity].map(|value| match value {
+        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => number.0,
+        other => panic!("{other:?}"),
+    })
 }

@@ -84,7 +84,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("fixed: 1", "Fixed: 1"), @"
     m.yaml:18:32: functions.stiffness: unknown key
       found: `Fixed`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation
+      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
       hint: did you mean `fixed`?
     ");
     assert_snapshot!(changed("cost_ratio", "cost-ratio"), @"
@@ -96,7 +96,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("  mass: {", "  friction: {"), @"
     m.yaml:14:3: functions: unknown key
       found: `friction`
-      expected: one of: mass, damping, stiffness
+      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, offset
     ");
     assert_snapshot!(changed("column: damping", "colunm: damping"), @"
     m.yaml:17:30: functions.damping.start: unknown key
@@ -107,12 +107,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("time: t_s", "\"ti`me, expected `x\\n\": t_s"), @r"
     m.yaml:6:15: experiments[0].columns: unknown key
       found: `ti`me, expected `x\n`
-      expected: one of: time, displacement
-    ");
-    assert_snapshot!(changed("sigma: {displacement", "sigma: {velocity"), @"
-    m.yaml:7:13: experiments[0].sigma: unknown key
-      found: `velocity`
-      expected: `displacement`
+      expected: one of: time, displacement, velocity, acceleration, force, base_acceleration, base_displacement
     ");
     assert_snapshot!(changed("grid: {nodes", "grid: {<<: {}, nodes"), @"
     m.yaml:12:8: grid: unknown key
@@ -187,78 +182,73 @@ fn repeated_keys() {
 #[test]
 fn numbers() {
     assert_snapshot!(changed("velocity: 1}", "velocity: fast}"), @"
-    m.yaml:8:44: experiments[0].initial.velocity: not a number
+    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor `estimate`
       found: text `fast`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: 1.5 m/s}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1.5 m/s`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: write 1.5 alone, without a unit
     ");
     assert_snapshot!(changed("velocity: +0.5", "velocity: 0,5"), @"
     m.yaml:11:17: experiments[1].initial.velocity: not a number
       found: text `0,5`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: write 0.5, with a decimal point
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: '1'}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: write 1, without quotes or leading zeros
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: 1e999}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1e999`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: the number is too large
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: .nan}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a finite number
       found: .nan, which is not a number
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: -.inf}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a finite number
       found: an infinite number
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: yes}"), @"
-    m.yaml:8:44: experiments[0].initial.velocity: not a number
+    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor `estimate`
       found: text `yes`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: true}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: the truth value true
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: }"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: nothing
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: [1, 2]}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: a list
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: {a: 2}}"), @"
-    m.yaml:8:44: experiments[0].initial.velocity: not a number
-      found: a map
-      expected: a finite number
+    m.yaml:8:45: experiments[0].initial.velocity: unknown key
+      found: `a`
+      expected: one of: start, prior
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: !f 1}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: a value with a YAML tag (`!…`)
-      expected: a finite number
-    ");
-    assert_snapshot!(changed("displacement: 0.1", "displacement: 10 000 x"), @"
-    m.yaml:7:27: experiments[0].sigma.displacement: not a number
-      found: text `10 000 x`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
 }
 
@@ -267,50 +257,50 @@ fn counts() {
     assert_snapshot!(changed("nodes: 2000", "nodes: 2e3"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2000
-      expected: an integer
+      expected: an integer, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 2000.0"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2000
-      expected: an integer
+      expected: an integer, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 2.5"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2.5
-      expected: an integer
+      expected: an integer, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: -3"), @"
     m.yaml:12:15: grid.nodes: a count cannot be negative
       found: the integer -3
-      expected: an integer, 0 or more
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 2_000"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: text `2_000`
-      expected: an integer
+      expected: an integer, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: many"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: text `many`
-      expected: an integer
+      expected: an integer, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 99999999999999999999"), @"
     m.yaml:12:15: grid.nodes: the count is too large
       found: the integer 99999999999999999999
-      expected: an integer
+      expected: an integer, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 9999999999999999999999999999999999999999999"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 1e43
-      expected: an integer
+      expected: an integer, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: [2000]"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: a list
-      expected: an integer
+      expected: an integer, or `auto`
     ");
 }
 
@@ -416,12 +406,12 @@ fn wrong_kinds() {
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: [3.3, 1]"), @"
     m.yaml:8:14: experiments[0].initial: this is the wrong kind of value
       found: a list
-      expected: a map such as {displacement: 3.3, velocity: 1.0}
+      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: true"), @"
     m.yaml:8:14: experiments[0].initial: this is the wrong kind of value
       found: the truth value true
-      expected: a map such as {displacement: 3.3, velocity: 1.0}
+      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: {a: b}"), @"
     m.yaml:2:8: title: this is the wrong kind of value
@@ -565,7 +555,14 @@ fn what_the_yaml_crate_does_not_cope_with() {
         "displacement: &a 1, velocity: &a 2",
     );
     let read = ModelFile::parse("m.yaml", twice.clone()).unwrap();
-    assert_eq!(read.spec.experiments[0].initial.velocity.0, 2.0);
+    let kmcfit::config::scalar::ScalarOr::Map(state) = &read.spec.experiments[0].initial else {
+        panic!("a state")
+    };
+    let two = kmcfit::config::scalar::NumberOrEstimate::Number(kmcfit::config::Number(2.0));
+    assert_eq!(
+        state.velocity,
+        kmcfit::config::scalar::ScalarOr::Scalar(two)
+    );
     assert_snapshot!(message(&format!("{twice}predict:\n  - {{displacement: &b 7, velocity: *a}}\n")), @"
     m.yaml:3:45: an anchor is given twice
       found: `&a` again; it is first given in line 3
@@ -613,13 +610,13 @@ fn more_broken_yaml() {
     assert_snapshot!(changed("velocity: 1}", "velocity: 1.5e3N}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1.5e3N`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: write 1500 alone, without a unit
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: 007}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `007`
-      expected: a finite number
+      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
       hint: write 7, without quotes or leading zeros
     ");
 }
@@ -689,7 +686,7 @@ fn repeated_aliases_are_limited() {
     assert_snapshot!(message(&bomb), @"
     m.yaml:2:8: experiments[0]: unknown key
       found: `b`
-      expected: one of: name, data, columns, sigma, initial
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, hold_out
     ");
 }
 

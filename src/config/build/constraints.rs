@@ -6,7 +6,7 @@ mod statement;
 
 pub(super) use start::move_start;
 
-use super::functions::slots;
+use super::functions::{Assemblies, slots};
 use super::listed;
 use crate::config::ModelFile;
 use crate::config::spec::ConstraintSpec;
@@ -25,12 +25,13 @@ pub(super) struct Place {
 pub(super) fn build(
     file: &ModelFile,
     problem: &mut Problem,
+    assemblies: &Assemblies,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Place>, InputError> {
     let mut places = Vec::new();
     for slot in slots(file) {
         let (key, quantity, spec) = (&slot.key, slot.quantity, slot.spec);
-        let device = slot.owner.map_or(0, |i| problem.experiments[i].device);
+        let device = slot.owner.map_or(0, |i| assemblies.of_experiment[i]);
         let given = [
             (format!("{key}.min"), &spec.min, &None),
             (format!("{key}.max"), &None, &spec.max),

@@ -1,6 +1,7 @@
 //! How to fit.
 
 use super::Purpose;
+use super::experiments::is_held_out;
 use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
@@ -63,8 +64,11 @@ pub(super) fn measurements(
         return Ok(None);
     }
     let measurements = Measurements::of(problem).map_err(|unsuited| {
+        let written = file.spec.experiments.iter().enumerate();
+        let fitted = written.filter(|(_, spec)| !is_held_out(spec));
+        let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
         file.error_at(
-            &format!("experiments[{}]", unsuited.experiment),
+            &format!("experiments[{}]", place.unwrap_or_default()),
             "the method `equation-error` cannot tell the motion from these readings",
         )
         .found(unsuited.reason)

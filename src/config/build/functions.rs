@@ -108,8 +108,17 @@ pub(super) fn assemblies(file: &ModelFile) -> Result<Assemblies, InputError> {
         devices: vec![main.clone()],
         of_experiment: Vec::new(),
     };
-    for i in 0..file.spec.experiments.len() {
+    for (i, spec) in file.spec.experiments.iter().enumerate() {
         let mut device = main.clone();
+        if let (true, Some(_)) = (spec.hold_out == Some(true), &spec.functions) {
+            return Err(file
+                .error_at(
+                    &format!("experiments[{i}].functions"),
+                    "an experiment that is held out cannot have functions of its own",
+                )
+                .found("`functions` beside `hold_out: true`")
+                .expected("the shared functions: they are what is to be tested"));
+        }
         for (f, slot) in slots.iter().enumerate().filter(|(_, s)| s.owner == Some(i)) {
             let Some(place) = shared.iter().position(|q| *q == slot.quantity) else {
                 let name = slot.quantity.name();

@@ -1,8 +1,11 @@
 //! The time grid: from the model, or one node per reading.
 
+mod auto;
+
 use super::Purpose;
-use super::experiments::Record;
+use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
+use crate::config::scalar::{Count, Nodes};
 use crate::config::spec::StepMethod;
 use crate::dynamics::{Grid, Method};
 use crate::error::{InputError, Place};
@@ -14,15 +17,28 @@ pub(super) fn build(
     file: &ModelFile,
     purpose: Purpose,
     records: &[Option<Record>],
+    remarks: &mut Vec<String>,
 ) -> Result<Grid, InputError> {
-    let spec = file.spec.grid.as_ref();
-    let asked = spec.and_then(|g| g.nodes.as_ref()).map(|n| n.0);
-    let nodes = purpose.nodes().or(asked);
-    let (start, duration, readings) = span(file, records)?;
-    let nodes = nodes.or(readings).ok_or_else(|| {
-        file.error_at("grid", "the number of nodes is missing")
-            .expected("`nodes`, since there are no readings to take it from")
-    })?;
+    let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
+    let asked = match (purpose.nodes(), asked) {
+        (Some(nodes), _) => Some(Nodes::Count(Count(nodes))),
+        (None, asked) => asked.copied(),
+    };
+    let (start, duration) = span(file, records)?;
+    let measured = records.iter().flatten().any(|r| !r.channels.is_empty());
+    let nodes = match asked {
+        Some(Nodes::Count(count)) => count.0,
+        _ if !measured => {
+            return Err(file
+                .error_at("grid", "the number of nodes is missing")
+                .expected("`nodes`, since there are no readings to take it from"));
+        }
+        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_NODES, remarks),
+        None => match node_per_reading(records) {
+            Some(nodes) => nodes,
+            None => auto::nodes(method(file), records, duration, MOST_NODES, remarks),
+        },
+    };
     if !(Grid::FEWEST_NODES..=MOST_NODES).contains(&nodes) {
         let problem = "this number of nodes cannot be used";
         let error = match purpose.nodes() {
@@ -40,11 +56,22 @@ pub(super) fn build(
     })
 }
 
-/// First time, length and number of readings of the records; the length from the model without.
-fn span(
-    file: &ModelFile,
-    records: &[Option<Record>],
-) -> Result<(f64, f64, Option<usize>), InputError> {
+/// One node per reading, where all channels of all records have the same equally spaced times.
+fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
+    let mut channels = records.iter().flatten().flat_map(|r| &r.channels);
+    let first = channels.next()?;
+    let spacing = first.spacing?;
+    let same = |c: &RawChannel| {
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-6 * spacing;
+        c.times.len() == first.times.len()
+            && c.spacing.is_some_and(|s| close(s, spacing))
+            && close(c.times[0], first.times[0])
+    };
+    channels.all(same).then_some(first.times.len())
+}
+
+/// First time and length of the records; the length from the model without.
+fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.duration.as_ref());
     if let Some(duration) = asked
         && duration.0 <= 0.0
@@ -54,23 +81,28 @@ fn span(
             .found(duration.0)
             .expected("a length of time in s, greater than 0"));
     }
-    let Some(first) = records.iter().flatten().next() else {
+    let measured = || records.iter().flatten().filter(|r| !r.channels.is_empty());
+    let Some(first) = measured().next() else {
         let duration = asked.ok_or_else(|| {
             file.error_at("grid", "the length of the motion is missing")
                 .expected("`duration` in s, since there are no readings to take it from")
         })?;
-        return Ok((0.0, duration.0, None));
+        return Ok((0.0, duration.0));
     };
+    let start = measured().map(Record::start).fold(f64::INFINITY, f64::min);
+    let end = measured()
+        .map(Record::end)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let duration = end - start;
     if let Some(asked) = asked
-        && (asked.0 - first.duration).abs() > first.spacing * 1e-6
+        && (asked.0 - duration).abs() > first.spacing() * 1e-6
     {
         return Err(file
             .error_at("grid.duration", "the duration is not that of the readings")
             .found(asked.0)
-            .expected(format!("{} (or leave it out)", first.duration)));
+            .expected(format!("{duration} (or leave it out)")));
     }
-    let duration = asked.map_or(first.duration, |asked| asked.0);
-    Ok((first.start, duration, Some(first.values.len())))
+    Ok((start, asked.map_or(duration, |asked| asked.0)))
 }
 
 /// The stepper; classical Runge–Kutta unless the model says otherwise.

@@ -8,14 +8,17 @@ mod grid;
 mod on_grid;
 mod penalties;
 
+pub use experiments::{ChannelNote, HoldOut};
 pub use penalties::WeightSearch;
 
 use super::ModelFile;
+use super::scalar::ScalarOr;
+use super::spec::InitialSpec;
 use crate::dynamics::{Device, Oscillator, State};
 use crate::error::{InputError, Place};
 use crate::functions::Functions;
 use crate::problem::Problem;
-use crate::solvers::FitSettings;
+use crate::solvers::{self, FitSettings};
 
 /// Everything that a model file means.
 #[derive(Debug, Clone)]
@@ -32,10 +35,16 @@ pub struct Model {
     pub weight_rule: Option<WeightSearch>,
     /// The true device on the grid, where it is known.
     pub truth: Option<Device>,
+    /// What reports say about the channels of each experiment.
+    pub notes: Vec<Vec<ChannelNote>>,
+    /// Experiments that are only predicted and scored.
+    pub held_out: Vec<HoldOut>,
     /// Initial states to predict the motion from.
     pub predictions: Vec<State>,
     /// What the user should know although it is no error.
     pub warnings: Vec<String>,
+    /// What was chosen for the user, and why.
+    pub remarks: Vec<String>,
 }
 
 /// What a model is built for.
@@ -90,11 +99,12 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
 pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let spec = &file.spec;
     experiments::distinct_names(file)?;
-    let records = experiments::read(file, purpose)?;
-    let grid = grid::build(file, purpose, &records)?;
     let mut warnings = Vec::new();
-    let list = functions::build(file, &grid, &mut warnings)?;
+    let mut remarks = Vec::new();
     let assemblies = functions::assemblies(file)?;
+    let records = experiments::read(file, purpose, &mut warnings)?;
+    let grid = grid::build(file, purpose, &records, &mut remarks)?;
+    let list = functions::build(file, &grid, &mut warnings)?;
     let functions =
         Functions::with_devices(list, assemblies.devices.clone(), grid.nodes(), grid.step());
     let functions = functions.ok_or_else(|| {
@@ -108,13 +118,16 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         method: grid::method(file),
         terms: functions::terms(file)?,
     };
-    let experiments = experiments::build(file, purpose, &grid, records)?;
-    let mut problem = Problem::new(oscillator, functions, experiments);
+    let built = experiments::build(file, purpose, &grid, records, &assemblies)?;
+    let functions = functions.with_scalars(built.scalars);
+    let mut problem = Problem::new(oscillator, functions, built.fitted);
     let measured = fit::measurements(file, purpose, &problem, &mut warnings)?;
     let weight_rule = penalties::build(file, &mut problem, measured.as_ref(), &mut warnings)?;
     penalties::add_variations(file, &mut problem);
-    let places = constraints::build(file, &mut problem, &mut warnings)?;
+    let places = constraints::build(file, &mut problem, &assemblies, &mut warnings)?;
     problem.soft = problem.constraints.take_soft();
+    experiments::unidentifiable(file, &problem)?;
+    start_from_readings(file, &mut problem);
     let settings = fit::build(file, &problem, weight_rule.is_some())?;
     let given_start = problem.functions.start();
     // A simulation is of the functions as they are given.
@@ -133,9 +146,42 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         settings,
         weight_rule,
         truth,
+        notes: built.notes,
+        held_out: built.held_out,
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
+        remarks,
     })
+}
+
+/// Initial states that are sought without a start or a prior begin where the readings do.
+fn start_from_readings(file: &ModelFile, problem: &mut Problem) {
+    let sought = problem.experiments.iter().any(|e| e.sought != [None; 2]);
+    if !sought {
+        return;
+    }
+    let given = |i: usize, q: usize| match &file.spec.experiments[i].initial {
+        InitialSpec::Scalar(_) => false,
+        InitialSpec::Map(state) => {
+            let value = [&state.displacement, &state.velocity][q];
+            matches!(value, ScalarOr::Map(e) if e.start.is_some() || e.prior.is_some())
+        }
+    };
+    let fitted = (file.spec.experiments.iter().enumerate())
+        .filter(|(_, spec)| !experiments::is_held_out(spec))
+        .map(|(i, _)| i);
+    let mut start = problem.start();
+    let first = problem.functions.scalar_range().start;
+    let states = solvers::states_from_readings(problem);
+    for ((i, experiment), state) in fitted.zip(&problem.experiments).zip(states) {
+        let Some(state) = state else { continue };
+        for (q, value) in [state.displacement, state.velocity].into_iter().enumerate() {
+            if let (Some(index), false) = (experiment.sought[q], given(i, q)) {
+                start[first + index] = value;
+            }
+        }
+    }
+    problem.functions = problem.functions.clone().with_start(&start);
 }
 
 /// Names in a row: `a`, `a and b`, `a, b and c`.

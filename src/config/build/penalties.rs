@@ -3,7 +3,7 @@
 use super::fit::{is_equation_error, method};
 use super::functions::{slots, values};
 use crate::config::ModelFile;
-use crate::config::scalar::Weight;
+use crate::config::scalar::{Sigma, Weight};
 use crate::config::spec::{SmoothSpec, WeightRule};
 use crate::error::InputError;
 use crate::functions::{Basis, Design, Penalty, Variation};
@@ -175,11 +175,20 @@ fn can_choose(
             .found(format!("`{rule}` beside `{}`", first.rule.name()))
             .expected("the same rule, or a number"));
     }
-    let sigma = |e: &crate::config::spec::ExperimentSpec| {
-        let sigma = e.sigma.as_ref();
-        sigma.and_then(|s| s.displacement.as_ref()).is_some()
+    // Which channels there are was checked when they were read; `estimate` is no known noise.
+    let known = |sigma: &Option<Sigma>| sigma.as_ref().is_some_and(|s| *s != Sigma::Estimate);
+    let with_sigma = |e: &crate::config::spec::ExperimentSpec| {
+        let any = |s: &crate::config::spec::SigmaSpec| {
+            let all = [&s.displacement, &s.velocity, &s.acceleration];
+            all.iter().any(|s| known(s)) && !all.iter().any(|s| **s == Some(Sigma::Estimate))
+        };
+        e.sigma.as_ref().is_some_and(any)
     };
-    let without = file.spec.experiments.iter().position(|e| !sigma(e));
+    let fitted = |e: &&crate::config::spec::ExperimentSpec| e.hold_out != Some(true);
+    let mut experiments = file.spec.experiments.iter().enumerate();
+    let without = experiments
+        .find(|(_, e)| fitted(e) && !with_sigma(e))
+        .map(|(i, _)| i);
     match without {
         Some(i) if rule == WeightRule::Discrepancy => Err(file
             .error_at(

@@ -20,9 +20,11 @@ impl ColumnId {
 
     fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
         match scalar {
-            Scalar::Text("") | Scalar::Nothing => {
-                Err(Complaint::new("the text is empty", "nothing", Self::EXPECTED))
-            }
+            Scalar::Text("") | Scalar::Nothing => Err(Complaint::new(
+                "the text is empty",
+                "nothing",
+                Self::EXPECTED,
+            )),
             Scalar::Text(name) => Ok(Self::Name(name.to_owned())),
             Scalar::Integer(number) => match usize::try_from(number) {
                 Ok(number) if number > 0 => Ok(Self::Number(number)),
@@ -32,7 +34,11 @@ impl ColumnId {
                     Self::EXPECTED,
                 )),
             },
-            other => Err(Complaint::new("not a column", other.describe(), Self::EXPECTED)),
+            other => Err(Complaint::new(
+                "not a column",
+                other.describe(),
+                Self::EXPECTED,
+            )),
         }
     }
 }

@@ -20,8 +20,7 @@ pub enum NumberOrEstimate {
 }
 
 impl NumberOrEstimate {
-    const EXPECTED: &'static str =
-        "a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}";
+    const EXPECTED: &'static str = "a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}";
 
     fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
         match scalar {

@@ -159,22 +159,30 @@ macro_rules! choice {
 pub(super) use {choice, deserialize_scalar, scalar_visits};
 
 // After the macros, which they use.
+mod column;
 mod count;
+mod either;
+mod estimate;
 mod format;
 mod knots;
 mod list;
 mod names;
+mod nodes;
 mod number;
 mod over_time;
 mod text;
 mod weight;
 mod written;
 
+pub use column::ColumnId;
 pub use count::Count;
+pub use either::ScalarOr;
+pub use estimate::{Estimate, NumberOrEstimate, Sigma};
 pub use format::Format;
 pub use knots::Knots;
 pub use list::{OneOrList, OneOrMany};
 pub(super) use names::choose;
+pub use nodes::Nodes;
 pub use number::Number;
 pub use over_time::{NumberOrColumn, Start};
 pub use text::Text;

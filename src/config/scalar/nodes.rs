@@ -18,10 +18,12 @@ impl Nodes {
     fn read(scalar: Scalar<'_>) -> Result<Self, Complaint> {
         match scalar {
             Scalar::Text("auto") => Ok(Self::Auto),
-            other => Count::read(other).map(Self::Count).map_err(|complaint| Complaint {
-                expected: format!("{}, or `auto`", complaint.expected),
-                ..complaint
-            }),
+            other => Count::read(other)
+                .map(Self::Count)
+                .map_err(|complaint| Complaint {
+                    expected: format!("{}, or `auto`", complaint.expected),
+                    ..complaint
+                }),
         }
     }
 }

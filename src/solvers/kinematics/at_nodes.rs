@@ -42,7 +42,9 @@ fn smoothed(channel: &Channel) -> Option<Vec<f64>> {
     let noise = match channel.weighting() {
         Weighting::Sigma(sigma) => *sigma,
         Weighting::Sigmas(sigmas) => rms(sigmas),
-        Weighting::Integral { .. } | Weighting::Trapezoid(_) => noise_level(observed),
+        Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
+            noise_level(observed)
+        }
     };
     if noise <= NOISELESS * rms(observed) {
         return Some(observed.to_vec());

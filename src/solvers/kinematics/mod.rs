@@ -30,6 +30,16 @@ pub(super) struct Kinematics {
     pub weight: f64,
 }
 
+/// The states at the beginning of each experiment as its readings suggest them; `None` where they are
+/// too few or begin later.
+pub fn states_from_readings(problem: &Problem) -> Vec<Option<State>> {
+    let start = problem.start();
+    let scalars = problem.scalars(&start);
+    (problem.experiments.iter())
+        .map(|experiment| Kinematics::of(problem, experiment, scalars)?.initial)
+        .collect()
+}
+
 impl Kinematics {
     /// From all channels of an experiment, with the sensors at the values `scalars`; `None` for too
     /// few readings.

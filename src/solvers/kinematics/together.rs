@@ -104,7 +104,9 @@ impl<'a> Plain<'a> {
         let noise = match channel.weighting() {
             Weighting::Sigma(sigma) => *sigma,
             Weighting::Sigmas(sigmas) => rms(sigmas),
-            Weighting::Integral { .. } | Weighting::Trapezoid(_) => noise_level(&values),
+            Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
+                noise_level(&values)
+            }
         };
         Self {
             channel,

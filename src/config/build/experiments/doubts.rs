@@ -1,0 +1,155 @@
+//! What looks wrong in a record, and what no record can tell.
+
+use super::{Record, name};
+use crate::config::ModelFile;
+use crate::config::scalar::{NumberOrEstimate, ScalarOr};
+use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::dynamics::ChannelKind;
+use crate::error::InputError;
+use crate::problem::Problem;
+use crate::signal::Spectrum;
+use std::f64::consts::TAU;
+
+/// Factors between channels, or between a reading and a known state, that look like a wrong unit.
+const SUSPICIOUS: [(f64, &str); 8] = [
+    (1e3, "a factor of 1000, as between m and mm"),
+    (1e-3, "a factor of 1/1000, as between mm and m"),
+    (1e6, "a factor of 10^6, as between m and um"),
+    (1e-6, "a factor of 10^-6, as between um and m"),
+    (1e2, "a factor of 100, as between m and cm"),
+    (1e-2, "a factor of 1/100, as between cm and m"),
+    (9.80665, "a factor of 9.81, as between g and m/s^2"),
+    (1.0 / 9.80665, "a factor of 1/9.81, as between m/s^2 and g"),
+];
+/// How near a ratio must be to such a factor, as a ratio of the two: channels of one motion agree
+/// within some ten per cent, for its frequency is not single.
+const NEAR: f64 = 1.5;
+
+/// Warns where channels of one motion, or a reading and the known state, disagree by a factor that
+/// looks like a wrong unit.
+pub fn sizes(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    record: &Record,
+    warnings: &mut Vec<String>,
+) {
+    let mut say = |ratio: f64, what: String| {
+        let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
+        if let Some((_, factor)) = SUSPICIOUS.iter().find(|(f, _)| near(*f)) {
+            warnings.push(format!(
+                "experiments[{i}] ({}): {what} {ratio:.3e} times what it should be: {factor}? \
+                 `units` converts",
+                name(file, i)
+            ));
+        }
+    };
+    let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
+    let displacement = first(ChannelKind::Displacement);
+    if let (Some(channel), InitialSpec::Map(state)) = (displacement, &spec.initial)
+        && let ScalarOr::Scalar(NumberOrEstimate::Number(start)) = &state.displacement
+        && start.0 != 0.0
+    {
+        say(
+            (channel.values[0] / start.0).abs(),
+            "the first displacement is".to_owned(),
+        );
+    }
+    for pair in [
+        [ChannelKind::Displacement, ChannelKind::Velocity],
+        [ChannelKind::Velocity, ChannelKind::Acceleration],
+        [ChannelKind::Displacement, ChannelKind::Acceleration],
+    ] {
+        let [Some(low), Some(high)] = pair.map(first) else {
+            continue;
+        };
+        let Some(spectrum) = Spectrum::of(&low.values, low.median_spacing) else {
+            continue;
+        };
+        let omega = TAU * spectrum.dominant();
+        let orders = pair[1] as i32 - pair[0] as i32;
+        let ratio = spread(&high.values) / (omega.powi(orders) * spread(&low.values));
+        if ratio.is_finite() && ratio > 0.0 {
+            let [low, high] = pair.map(ChannelKind::name);
+            say(ratio, format!("the {high} beside the {low} is"));
+        }
+    }
+}
+
+/// Standard deviation about the mean.
+fn spread(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Refuses gains that stand for the same freedom as something else: in a linear device a free motion
+/// and its initial state, or a forced motion and the scale of mass, damping and stiffness, can be
+/// multiplied by what the gain is divided by.
+pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputError> {
+    if !problem.oscillator.terms.iter().all(|term| term.is_linear()) {
+        return Ok(());
+    }
+    let scalars = problem.functions.scalars();
+    let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
+    let gains_open = |e: &crate::problem::Experiment| {
+        let gain = |c: &crate::objective::Channel| {
+            // A base that is added to the motion is a scale of its own.
+            open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
+        };
+        !e.channels.is_empty() && e.channels.iter().all(gain)
+    };
+    let starts_open = |e: &crate::problem::Experiment| {
+        let rest = [e.initial.displacement, e.initial.velocity];
+        (0..2).all(|q| match e.sought[q] {
+            Some(index) => open(Some(index)),
+            None => rest[q] == 0.0,
+        })
+    };
+    let is_free = |e: &crate::problem::Experiment| e.is_free();
+    for (place, e) in problem.experiments.iter().enumerate() {
+        if is_free(e) && gains_open(e) && starts_open(e) {
+            return Err(file
+                .error_at(
+                    "experiments",
+                    format!(
+                        "the gain and the initial state of {} cannot both be estimated: a larger \
+                         motion seen by a weaker sensor looks the same",
+                        e.name
+                    ),
+                )
+                .found(format!(
+                    "no known gain, state or prior in record {}",
+                    place + 1
+                ))
+                .expected("a number for one of them, or a `prior`"));
+        }
+    }
+    let forced: Vec<_> = problem.experiments.iter().filter(|e| !is_free(e)).collect();
+    let by_force =
+        |e: &&crate::problem::Experiment| e.excitation.as_ref().is_some_and(|x| x.base.is_none());
+    let mut functions = problem.functions.iter();
+    let scale_is_open = functions.all(|f| f.offset.iter().all(|p| *p == 0.0));
+    let held = problem.constraints.groups.iter().any(|group| {
+        (0..group.rows.len()).any(|r| {
+            let [low, high] = group.bounds(r);
+            low == high && low != 0.0
+        })
+    });
+    let all = !forced.is_empty()
+        && forced.iter().all(by_force)
+        && forced.iter().all(|e| gains_open(e) && starts_open(e));
+    if all && scale_is_open && !held {
+        return Err(file
+            .error_at(
+                "experiments",
+                "the gains and the scale of mass, damping and stiffness cannot both be \
+                 estimated: a heavier device seen by a stronger sensor looks the same",
+            )
+            .found("no known gain, no fixed function and no value that holds the scale")
+            .expected(
+                "a known gain or a `prior` in one forced experiment, a fixed function, or a \
+                 constraint such as {function: mass, mean: 1.0}",
+            ));
+    }
+    Ok(())
+}

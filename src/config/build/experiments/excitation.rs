@@ -1,0 +1,348 @@
+//! Force and motion of the base.
+
+use super::source::{self, Wanted};
+use crate::config::ModelFile;
+use crate::config::scalar::Number;
+use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
+use crate::dynamics::Grid;
+use crate::error::InputError;
+use crate::problem::{BaseMotion, Drive, Experiment, Waveform};
+use crate::signal::{Interpolation, Shape, Signal, SweepLaw};
+use crate::units::Kind;
+
+/// What drives an experiment, as the model gives it.
+#[derive(Default)]
+pub struct RawExcitation {
+    drive: Drive,
+}
+
+impl RawExcitation {
+    /// Whether nothing drives it.
+    pub fn is_empty(&self) -> bool {
+        self.drive.force.is_none() && self.drive.base.is_none()
+    }
+
+    /// Spacing of the samples, where they are equally spaced, s.
+    pub fn spacing(&self) -> Option<f64> {
+        let force = match &self.drive.force {
+            Some(Waveform::Samples(signal)) => Some(signal),
+            _ => None,
+        };
+        let base = match &self.drive.base {
+            Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
+                Some(signal)
+            }
+            None => None,
+        };
+        let times = force.or(base)?.times();
+        let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
+        let regular = times
+            .windows(2)
+            .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
+        (regular && spacing > 0.0).then_some(spacing)
+    }
+}
+
+/// Reads what drives experiment `i`.
+pub fn read(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    warnings: &mut Vec<String>,
+) -> Result<RawExcitation, InputError> {
+    let key = format!("experiments[{i}]");
+    let columns = spec.columns.as_ref();
+    let units = spec.units.as_ref();
+    let force_column = columns.and_then(|c| c.force.as_ref());
+    let force = match (force_column, &spec.force) {
+        (None, None) => None,
+        (None, Some(force)) => Some(Waveform::Shape(shape(file, &key, force)?)),
+        (Some(column), force) => {
+            if let Some(named) = force.as_ref().and_then(|f| f.shape) {
+                return Err(file
+                    .error_at(&format!("{key}.force.shape"), "there are two forces")
+                    .found(format!("a column and the shape `{named}`"))
+                    .expected("one of the two"));
+            }
+            let interpolation = force.as_ref().and_then(|f| f.interpolation);
+            let wanted = Wanted {
+                experiment: i,
+                name: "force",
+                kind: Kind::Force,
+                column,
+                unit: units.and_then(|u| u.force.as_ref()),
+                beside: None,
+            };
+            let meant = interpolation_of(interpolation, Interpolation::Linear);
+            Some(Waveform::Samples(signal(
+                file, spec, &wanted, meant, warnings,
+            )?))
+        }
+    };
+    let base = base(file, i, spec, warnings)?;
+    let drive = Drive { force, base };
+    Ok(RawExcitation { drive })
+}
+
+fn base(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    warnings: &mut Vec<String>,
+) -> Result<Option<BaseMotion>, InputError> {
+    let key = format!("experiments[{i}]");
+    let columns = spec.columns.as_ref();
+    let units = spec.units.as_ref();
+    let acceleration = columns.and_then(|c| c.base_acceleration.as_ref());
+    let displacement = columns.and_then(|c| c.base_displacement.as_ref());
+    let interpolation = spec.base.as_ref().and_then(|b| b.interpolation);
+    let (column, is_acceleration) = match (acceleration, displacement) {
+        (None, None) => {
+            return match &spec.base {
+                Some(_) => Err(file
+                    .error_at(&format!("{key}.base"), "the motion of the base is missing")
+                    .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`")),
+                None => Ok(None),
+            };
+        }
+        (Some(_), Some(_)) => {
+            return Err(file
+                .error_at(
+                    &format!("{key}.columns.base_displacement"),
+                    "the motion of the base is given twice",
+                )
+                .found("`base_acceleration` and `base_displacement`")
+                .expected("one of the two"));
+        }
+        (Some(column), None) => (column, true),
+        (None, Some(column)) => (column, false),
+    };
+    if !is_acceleration && interpolation.is_some_and(|i| i != InterpolationName::Cubic) {
+        return Err(file
+            .error_at(
+                &format!("{key}.base.interpolation"),
+                "a displacement of the base is differentiated twice, so it must be smooth",
+            )
+            .found(format!(
+                "`{}`",
+                interpolation.map_or("", InterpolationName::name)
+            ))
+            .expected("`cubic`"));
+    }
+    let wanted = Wanted {
+        experiment: i,
+        name: match is_acceleration {
+            true => "base_acceleration",
+            false => "base_displacement",
+        },
+        kind: match is_acceleration {
+            true => Kind::Acceleration,
+            false => Kind::Displacement,
+        },
+        column,
+        unit: units.and_then(|u| match is_acceleration {
+            true => u.base_acceleration.as_ref(),
+            false => u.base_displacement.as_ref(),
+        }),
+        beside: None,
+    };
+    let usual = match is_acceleration {
+        true => Interpolation::Linear,
+        false => Interpolation::Cubic,
+    };
+    let meant = interpolation_of(interpolation, usual);
+    let signal = signal(file, spec, &wanted, meant, warnings)?;
+    Ok(Some(match is_acceleration {
+        true => BaseMotion::Acceleration(signal),
+        false => BaseMotion::Displacement(signal),
+    }))
+}
+
+fn interpolation_of(given: Option<InterpolationName>, usual: Interpolation) -> Interpolation {
+    match given {
+        None => usual,
+        Some(InterpolationName::Hold) => Interpolation::Hold,
+        Some(InterpolationName::Linear) => Interpolation::Linear,
+        Some(InterpolationName::Cubic) => Interpolation::Cubic,
+    }
+}
+
+/// A column as a signal; it must have no gaps, as what drives a motion acts at all times.
+fn signal(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    wanted: &Wanted,
+    interpolation: Interpolation,
+    warnings: &mut Vec<String>,
+) -> Result<Signal, InputError> {
+    // What drives the motion is needed a little beyond the window of the readings.
+    let unbounded = ExperimentSpec {
+        window: None,
+        ..spec.clone()
+    };
+    let source = source::read(file, &unbounded, wanted, warnings)?;
+    let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
+    let missing = source.values.iter().filter(|v| v.is_nan()).count();
+    if missing > 0 {
+        let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
+        return Err(file
+            .error_at(&key, "what drives the motion has gaps")
+            .found(format!(
+                "{missing} of {} values missing, the first at {} s",
+                source.values.len(),
+                source.times[first]
+            ))
+            .expected("a value in every row: it acts at all times"));
+    }
+    let samples = source.times.len();
+    Signal::new(source.times, source.values, interpolation).ok_or_else(|| {
+        file.error_at(&key, "these samples make no signal")
+            .found(format!("{samples} samples"))
+            .expected("finite values at increasing times")
+    })
+}
+
+/// Refuses a force or a motion of the base that does not reach over the record.
+pub fn covers(
+    file: &ModelFile,
+    i: usize,
+    excitation: &RawExcitation,
+    [start, end]: [f64; 2],
+) -> Result<(), InputError> {
+    let short = |name: &str, signal: &Signal| {
+        let times = signal.times();
+        match signal.covers(start, end) {
+            true => Ok(()),
+            false => Err(file
+                .error_at(
+                    &format!("experiments[{i}].columns.{name}"),
+                    format!("the {} is shorter than the record", name.replace('_', " ")),
+                )
+                .found(format!("{} s to {} s", times[0], times[times.len() - 1]))
+                .expected(format!(
+                    "at least {start} s to {end} s: outside its samples nothing is known of it"
+                ))),
+        }
+    };
+    if let Some(Waveform::Samples(signal)) = &excitation.drive.force {
+        short("force", signal)?;
+    }
+    match &excitation.drive.base {
+        Some(BaseMotion::Acceleration(signal)) => short("base_acceleration", signal),
+        Some(BaseMotion::Displacement(signal)) => short("base_displacement", signal),
+        None => Ok(()),
+    }
+}
+
+/// Gives an experiment its excitation.
+pub fn place(raw: &RawExcitation, grid: &Grid, nodes: usize, experiment: &mut Experiment) {
+    if !raw.is_empty() {
+        experiment.excitation = Some(raw.drive.on(grid, nodes));
+        experiment.drive = raw.drive.clone();
+    }
+}
+
+/// A force without samples.
+fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, InputError> {
+    let key = format!("{key}.force");
+    let Some(shape) = spec.shape else {
+        return Err(file
+            .error_at(&key, "the force is missing")
+            .expected("`columns: {force: …}`, or `shape` here"));
+    };
+    let keys = [
+        ("amplitude", spec.amplitude),
+        ("frequency", spec.frequency),
+        ("phase", spec.phase),
+        ("from", spec.from),
+        ("to", spec.to),
+        ("at", spec.at),
+        ("duration", spec.duration),
+    ];
+    let (needed, possible): (&[&str], &[&str]) = match shape {
+        ForceShape::Constant => (&["amplitude"], &[]),
+        ForceShape::Sine => (&["amplitude", "frequency"], &["phase"]),
+        ForceShape::Sweep => (&["amplitude", "from", "to", "duration"], &["at"]),
+        ForceShape::Step => (&["amplitude"], &["at"]),
+        ForceShape::HalfSine => (&["amplitude", "duration"], &["at"]),
+    };
+    for (name, value) in keys {
+        let known = needed.contains(&name) || possible.contains(&name);
+        match value {
+            Some(_) if !known => {
+                let of = listed_keys(needed, possible);
+                return Err(file
+                    .error_at(
+                        &format!("{key}.{name}"),
+                        format!("a {shape} has no `{name}`"),
+                    )
+                    .found(format!("`{name}`"))
+                    .expected(of));
+            }
+            None if needed.contains(&name) => {
+                return Err(file
+                    .error_at(&key, format!("a {shape} needs its `{name}`"))
+                    .expected(listed_keys(needed, possible)));
+            }
+            _ => {}
+        }
+    }
+    if spec.interpolation.is_some() {
+        return Err(file
+            .error_at(
+                &format!("{key}.interpolation"),
+                "a shape is not interpolated",
+            )
+            .found(format!("`interpolation` beside `{shape}`"))
+            .expected("one of the two"));
+    }
+    for (name, value) in [("frequency", spec.frequency), ("duration", spec.duration)] {
+        if let Some(value) = value.filter(|v| v.0 <= 0.0) {
+            return Err(file
+                .error_at(
+                    &format!("{key}.{name}"),
+                    format!("the {name} must be positive"),
+                )
+                .found(value.0)
+                .expected("a number greater than 0"));
+        }
+    }
+    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+    let amplitude = number(spec.amplitude);
+    Ok(match shape {
+        ForceShape::Constant => Shape::Constant { amplitude },
+        ForceShape::Sine => Shape::Sine {
+            amplitude,
+            frequency: number(spec.frequency),
+            phase: number(spec.phase),
+        },
+        ForceShape::Sweep => Shape::Sweep {
+            amplitude,
+            from: number(spec.from),
+            to: number(spec.to),
+            start: number(spec.at),
+            duration: number(spec.duration),
+            law: SweepLaw::Linear,
+        },
+        ForceShape::Step => Shape::Step {
+            amplitude,
+            at: number(spec.at),
+        },
+        ForceShape::HalfSine => Shape::HalfSine {
+            amplitude,
+            at: number(spec.at),
+            duration: number(spec.duration),
+        },
+    })
+}
+
+fn listed_keys(needed: &[&str], possible: &[&str]) -> String {
+    let quoted = |names: &[&str]| -> String {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        names.join(", ")
+    };
+    match possible {
+        [] => quoted(needed),
+        _ => format!("{}, and if need be {}", quoted(needed), quoted(possible)),
+    }
+}

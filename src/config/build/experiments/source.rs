@@ -1,0 +1,337 @@
+//! Columns of files as times and values.
+
+use crate::config::ModelFile;
+use crate::config::build::asked_for;
+use crate::config::scalar::{ColumnId, ScalarOr, Text};
+use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec};
+use crate::error::InputError;
+use crate::observations::{ColumnName, Table, TableFormat, increasing_at};
+use crate::units::{Kind, Unit};
+
+/// Default name of the column of times.
+const TIME_COLUMN: &str = "t_s";
+
+/// A column of a file in SI units, in the window; NaN where a reading is missing.
+pub struct Source {
+    /// s, increasing.
+    pub times: Vec<f64>,
+    /// In SI.
+    pub values: Vec<f64>,
+    /// The values' unit in the file.
+    pub unit: Unit,
+    /// What else is wanted from the same file: the values of another column at the same times.
+    pub beside: Option<Vec<f64>>,
+    /// Rows outside the window.
+    pub outside: usize,
+    /// Name of the column in the file.
+    pub label: String,
+}
+
+/// Which column is wanted, and where the model says so.
+pub struct Wanted<'a> {
+    /// Number of the experiment.
+    pub experiment: usize,
+    /// Name of the channel: a key of `columns` and `units`.
+    pub name: &'a str,
+    /// What it measures.
+    pub kind: Kind,
+    /// The column.
+    pub column: &'a ColumnRef,
+    /// Unit that the model gives.
+    pub unit: Option<&'a Text>,
+    /// Another column of the same file, in the same unit, and its key.
+    pub beside: Option<(&'a str, &'a str)>,
+}
+
+fn column_name(id: &ColumnId) -> ColumnName {
+    match id {
+        ColumnId::Name(name) => ColumnName::Name(name.clone()),
+        ColumnId::Number(number) => ColumnName::Number(*number),
+    }
+}
+
+/// Reads the wanted column.
+pub fn read(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    wanted: &Wanted,
+    warnings: &mut Vec<String>,
+) -> Result<Source, InputError> {
+    let experiment = format!("experiments[{}]", wanted.experiment);
+    let column_key = format!("{experiment}.columns.{}", wanted.name);
+    let (id, own) = match wanted.column {
+        ScalarOr::Scalar(id) => (id, None),
+        ScalarOr::Map(source) => (&source.column, Some(source)),
+    };
+    let (data, data_key) = match own.and_then(|s| s.data.as_ref()) {
+        Some(data) => (data, format!("{column_key}.data")),
+        None => {
+            let data = spec.data.as_ref().ok_or_else(|| {
+                file.error_at(&experiment, "this experiment has no data")
+                    .expected("`data`, a CSV file with the readings")
+            })?;
+            (data, format!("{experiment}.data"))
+        }
+    };
+    let table = Table::read_with(file.resolve(&data.0), &format(spec))
+        .map_err(|error| about_format(file, &experiment, error))
+        .map_err(asked_for(file, &data_key))?;
+    let column_key = match own {
+        Some(_) => format!("{column_key}.column"),
+        None => column_key,
+    };
+    let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
+    let unit = unit(file, &experiment, wanted, &table, index, warnings)?;
+    let factor = unit.factor();
+    let times = times(file, spec, &experiment, own, &table)?;
+    let values = table
+        .readings(index)
+        .map_err(asked_for(file, &column_key))?;
+    let beside = match wanted.beside {
+        Some((name, key)) => {
+            let found = table
+                .find(&ColumnName::from(name))
+                .map_err(asked_for(file, key))?;
+            Some(table.readings(found).map_err(asked_for(file, key))?)
+        }
+        None => None,
+    };
+    let label = table.label(index);
+    if label == times.label {
+        return Err(file
+            .error_at(
+                &format!("{experiment}.columns"),
+                format!(
+                    "time and {} are the same column",
+                    wanted.name.replace('_', " ")
+                ),
+            )
+            .found(format!("`{label}`"))
+            .expected("two columns"));
+    }
+    let window = window(file, &experiment, spec)?;
+    let zero = spec.time_zero.map_or(0.0, |t| t.0);
+    let inside: Vec<usize> = (0..times.values.len())
+        .filter(|&r| (window[0]..=window[1]).contains(&times.values[r]))
+        .collect();
+    if inside.is_empty() {
+        return Err(file
+            .error_at(
+                &format!("{experiment}.window"),
+                "no reading lies in the window",
+            )
+            .found(format!("{} s to {} s", window[0], window[1]))
+            .expected(format!(
+                "a part of {} s to {} s",
+                times.values[0],
+                times.values[times.values.len() - 1]
+            )));
+    }
+    Ok(Source {
+        times: inside.iter().map(|&r| times.values[r] - zero).collect(),
+        values: inside.iter().map(|&r| factor * values[r]).collect(),
+        beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
+        outside: times.values.len() - inside.len(),
+        unit,
+        label,
+    })
+}
+
+/// How the files of an experiment are written.
+fn format(spec: &ExperimentSpec) -> TableFormat {
+    let Some(given) = &spec.format else {
+        return TableFormat::default();
+    };
+    TableFormat {
+        delimiter: given.delimiter.map(|d| match d {
+            Delimiter::Comma => ',',
+            Delimiter::Semicolon => ';',
+            Delimiter::Tab => '\t',
+        }),
+        decimal: given.decimal.map(|d| match d {
+            DecimalSign::Point => '.',
+            DecimalSign::Comma => ',',
+        }),
+        skip: given.skip.map(|count| count.0),
+        header: given.header,
+        units_row: given.units_row,
+    }
+}
+
+/// A complaint about the format as an argument is one about its key.
+fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
+    match &error.place {
+        crate::error::Place::Argument(name) => {
+            let here = file.error_at(&format!("{experiment}.format.{name}"), &error.problem);
+            InputError {
+                place: here.place,
+                key: here.key,
+                ..error
+            }
+        }
+        _ => error,
+    }
+}
+
+struct Times {
+    values: Vec<f64>,
+    label: String,
+}
+
+/// The times of all rows, in s.
+fn times(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    experiment: &str,
+    own: Option<&crate::config::spec::SourceSpec>,
+    table: &Table,
+) -> Result<Times, InputError> {
+    let own_rate = own.and_then(|s| s.sample_rate);
+    let own_column = own.and_then(|s| s.time.as_ref());
+    let shared_column = spec.columns.as_ref().and_then(|c| c.time.as_ref());
+    let rate = match (own_rate, own_column) {
+        (Some(rate), None) => Some(rate),
+        (None, Some(_)) => None,
+        (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+        (None, None) => match (spec.sample_rate, shared_column) {
+            (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+            (rate, _) => rate,
+        },
+    };
+    if let Some(rate) = rate {
+        if rate.0 <= 0.0 {
+            return Err(file
+                .error_at(
+                    &format!("{experiment}.sample_rate"),
+                    "a rate must be positive",
+                )
+                .found(rate.0)
+                .expected("readings per s, a number greater than 0"));
+        }
+        let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
+        let label = String::new();
+        return Ok(Times { values, label });
+    }
+    let default = ColumnId::Name(TIME_COLUMN.to_owned());
+    let id = own_column.or(shared_column).unwrap_or(&default);
+    let key = format!("{experiment}.columns.time");
+    let index = table.find(&column_name(id)).map_err(|error| {
+        let error = asked_for(file, &key)(error);
+        match own_column.or(shared_column) {
+            None => error.hint("`columns: {time: …}` names it; `sample_rate: …` does without"),
+            Some(_) => error,
+        }
+    })?;
+    let given = spec.units.as_ref().and_then(|u| u.time.as_ref());
+    let unit = match given {
+        Some(text) => parse(file, &format!("{experiment}.units.time"), Kind::Time, text)?,
+        None => table
+            .unit(index)
+            .and_then(|text| Unit::recognise(Kind::Time, text))
+            .unwrap_or(Unit::si(Kind::Time)),
+    };
+    let values = increasing_at(table, index).map_err(asked_for(file, &key))?;
+    Ok(Times {
+        values: values.iter().map(|t| t * unit.factor()).collect(),
+        label: table.label(index),
+    })
+}
+
+fn two_times(file: &ModelFile, experiment: &str) -> InputError {
+    file.error_at(
+        &format!("{experiment}.sample_rate"),
+        "there are times from a rate and from a column",
+    )
+    .found("`sample_rate` beside a column of times")
+    .expected("one of the two")
+}
+
+fn parse(file: &ModelFile, key: &str, kind: Kind, text: &Text) -> Result<Unit, InputError> {
+    Unit::parse(kind, &text.0).map_err(|error| {
+        let here = file.error_at(key, &error.problem);
+        InputError {
+            place: here.place,
+            key: here.key,
+            ..error
+        }
+    })
+}
+
+/// The unit of a column: the model's word, else the file's own, else SI.
+fn unit(
+    file: &ModelFile,
+    experiment: &str,
+    wanted: &Wanted,
+    table: &Table,
+    index: usize,
+    warnings: &mut Vec<String>,
+) -> Result<Unit, InputError> {
+    let own = table.unit(index);
+    if let Some(text) = wanted.unit {
+        let key = format!("{experiment}.units.{}", wanted.name);
+        let unit = parse(file, &key, wanted.kind, text)?;
+        let other = own.and_then(|own| Unit::recognise(wanted.kind, own));
+        if let Some(other) = other.filter(|other| other.factor() != unit.factor()) {
+            warnings.push(format!(
+                "{key}: the column `{}` is taken in {}, though the file says {}",
+                table.label(index),
+                unit.symbol(),
+                other.symbol()
+            ));
+        }
+        return Ok(unit);
+    }
+    let Some(own) = own else {
+        let label = table.label(index);
+        let suffix = label.rsplit_once('_').map_or("", |(_, suffix)| suffix);
+        let looks = Unit::recognise(wanted.kind, suffix);
+        if let Some(looks) = looks.filter(|unit| unit.factor() != 1.0) {
+            warnings.push(format!(
+                "{experiment}.columns.{}: the column `{label}` is taken in {}, though its name \
+                 ends like {}; if that is its unit, say `units: {{{}: {}}}`",
+                wanted.name,
+                Unit::si(wanted.kind).symbol(),
+                looks.symbol(),
+                wanted.name,
+                looks.symbol(),
+            ));
+        }
+        // A name like `phi_rad` or `acc_V` says what reports should call the unit.
+        let label = looks.filter(|unit| unit.factor() == 1.0);
+        return Ok(label.unwrap_or(Unit::si(wanted.kind)));
+    };
+    match Unit::recognise(wanted.kind, own) {
+        Some(unit) => Ok(unit),
+        None => {
+            warnings.push(format!(
+                "{experiment}.columns.{}: `{own}`, which the file gives as the unit of `{}`, is \
+                 not known as one of {}; the values are taken as they are, in {}",
+                wanted.name,
+                table.label(index),
+                wanted.kind.name(),
+                Unit::si(wanted.kind).symbol(),
+            ));
+            Ok(Unit::si(wanted.kind))
+        }
+    }
+}
+
+/// First and last time that is used, as the file counts.
+fn window(
+    file: &ModelFile,
+    experiment: &str,
+    spec: &ExperimentSpec,
+) -> Result<[f64; 2], InputError> {
+    let Some(window) = &spec.window else {
+        return Ok([f64::NEG_INFINITY, f64::INFINITY]);
+    };
+    let from = window.min.map_or(f64::NEG_INFINITY, |t| t.0);
+    let to = window.max.map_or(f64::INFINITY, |t| t.0);
+    if from >= to {
+        return Err(file
+            .error_at(&format!("{experiment}.window"), "the window is empty")
+            .found(format!("{from} s to {to} s"))
+            .expected("`min` less than `max`"));
+    }
+    Ok([from, to])
+}
