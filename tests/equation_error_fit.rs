@@ -437,6 +437,29 @@ fn constraints_and_soft_constraints() {
     assert!(last > 0.999, "a high price is a bound: {last}");
 }
 
+/// Functions whose sizes are five orders apart, with many bounds met: the program is solved in units of
+/// these sizes.
+#[test]
+fn bounds_on_functions_of_unlike_size() {
+    let (mut problem, _) = shaken(3, free_at_nodes(NODES));
+    let free = run(&problem);
+    let mut group = RowGroup::new("damping >= 0");
+    for j in 0..NODES {
+        group.push([(j, 1.0)], [0.0, f64::INFINITY], [0.0, 60.0]);
+    }
+    problem.constraints.groups.push(group);
+    let bounded = run(&problem);
+    assert_eq!(
+        bounded.outcome.status,
+        Status::Converged,
+        "{:?}",
+        bounded.outcome
+    );
+    assert_eq!(bounded.counts.qp, 1);
+    let [free, bounded] = [free, bounded].map(|fit| fit.best.evaluation.cost);
+    assert!(free < bounded && bounded < 1.5 * free, "{free} {bounded}");
+}
+
 /// What nobody can tell ends as `failed`, with the start kept.
 #[test]
 fn readings_without_a_motion() {

@@ -42,7 +42,11 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
             let point = cost.point(minimum.parameters.clone());
             let device = &point.evaluation.device;
             let reason = reason(problem, &minimum, device.mass.iter().all(|m| *m > 0.0));
-            (Outcome::new(Status::Converged, reason), Some(point))
+            let status = match minimum.program {
+                Some(ConicStatus::Almost) => Status::Stalled,
+                _ => Status::Converged,
+            };
+            (Outcome::new(status, reason), Some(point))
         }
         Err(status) => {
             counts.qp = 1;
@@ -77,7 +81,7 @@ fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> String {
     }
     let how = match minimum.program {
         None => "one sparse factorisation",
-        Some(ConicStatus::Almost) => "a quadratic program, to reduced accuracy",
+        Some(ConicStatus::Almost) => "a quadratic program, but to reduced accuracy only",
         Some(_) => "a quadratic program",
     };
     let but = match has_mass {
@@ -162,7 +166,7 @@ impl<'a> Cost<'a> {
         self.add_soft(start, &mut sub);
         let sizes = self.measurements.sizes(problem, start);
         let excess = |theta: &[f64]| self.excess(theta);
-        minimise(problem, sub, start, &sizes, KEPT, &excess)
+        minimise(problem, sub, start, &sizes, KEPT, true, &excess)
     }
 
     /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`

@@ -55,7 +55,7 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     let natural = Measurements { experiments }.sizes(problem, start);
     let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
     let sizes: Vec<f64> = own.into_iter().zip(natural).map(either).collect();
-    let minimum = minimise(problem, sub, start, &sizes, KEPT, &|_| Vec::new())?;
+    let minimum = minimise(problem, sub, start, &sizes, KEPT, false, &|_| Vec::new())?;
     Ok(minimum.parameters)
 }
 
@@ -67,7 +67,9 @@ struct Minimum {
 }
 
 /// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
-/// `sub` may have variables after the parameters: `rest` tells them for given parameters.
+/// `sub` may have variables after the parameters: `rest` tells them for given parameters. `in_units`
+/// says whether a quadratic program is solved in units of the `sizes` of the functions, which it
+/// needs for an optimum where these differ by many orders.
 ///
 /// # Errors
 /// How the convex problem ended, if not with a solution.
@@ -77,6 +79,7 @@ fn minimise(
     start: &[f64],
     sizes: &[f64],
     kept: f64,
+    in_units: bool,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
 ) -> Result<Minimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
@@ -107,7 +110,15 @@ fn minimise(
             });
         }
     }
-    let solution = sub.solve();
+    let mut units = vec![1.0; sub.variables];
+    if in_units {
+        for (range, size) in problem.functions.ranges().iter().zip(sizes) {
+            units[range.clone()].fill(if *size > 0.0 { *size } else { 1.0 });
+        }
+    }
+    let mut solution = sub.in_units(&units).solve();
+    let z = solution.z.iter_mut().zip(&units);
+    z.for_each(|(z, unit)| *z *= unit);
     match solution.status {
         ConicStatus::Solved | ConicStatus::Almost => Ok(Minimum {
             parameters: moved(&solution.z),
