@@ -50,7 +50,7 @@
 //! 6. [`qp`] solves the convex subproblems: a sparse factorisation where no inequality is met, Clarabel
 //!    where one is.
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
-//!    starts and the choice of a weight.
+//!    starts, the choice of a weight; and the equation error, which simulates nothing.
 //! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.
 //! 9. [`report`] writes tables, figures and the result document, and compares runs.
 //! 10. [`cli`] is one file per command.

@@ -451,19 +451,19 @@ fn penalties() {
     assert_snapshot!(smooth("{order: 2, weight: discrepency}"), @"
     m.yaml:5:61: functions.mass.smooth.weight: unknown choice
       found: `discrepency`
-      expected: a finite number, or one of: discrepancy, l-curve, gcv
+      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
       hint: did you mean `discrepancy`?
     ");
     assert_snapshot!(smooth("{order: 2, weight: 1e-3 s}"), @"
     m.yaml:5:61: functions.mass.smooth.weight: not a number
       found: text `1e-3 s`
-      expected: a finite number, or one of: discrepancy, l-curve, gcv
+      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
       hint: write 0.001 alone, without a unit
     ");
     assert_snapshot!(smooth("{order: 2, weight: [1]}"), @"
     m.yaml:5:61: functions.mass.smooth.weight: not a number
       found: a list
-      expected: a finite number, or one of: discrepancy, l-curve, gcv
+      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
     ");
     assert_snapshot!(smooth("{weight: 1}"), @"
     m.yaml:5:34: functions.mass.smooth: the key `order` is missing

@@ -534,7 +534,7 @@ pub struct SmoothSpec {
 }
 
 choice! {
-    /// How the weight of a penalty is chosen from the data.
+    /// How the weight of a penalty follows from the data.
     pub enum WeightRule {
         /// The largest weight that still fits the readings within their noise.
         Discrepancy = "discrepancy",
@@ -542,6 +542,8 @@ choice! {
         LCurve = "l-curve",
         /// Generalised cross-validation.
         Gcv = "gcv",
+        /// So that the function follows the readings within a dominant period of the motion.
+        Period = "period",
     }
 }
 
@@ -679,6 +681,8 @@ choice! {
         ProjectedGradient = "projected-gradient",
         /// Gauss-Newton steps, under constraints.
         GaussNewton = "gauss-newton",
+        /// The minimum of the equation error, under constraints: nothing is simulated.
+        EquationError = "equation-error",
     }
 }
 

@@ -88,6 +88,13 @@ impl Rows {
         }
     }
 
+    /// Multiplies every column by its factor.
+    pub fn scale_columns(&mut self, factors: &[f64]) {
+        for (column, value) in self.columns.iter().zip(&mut self.values) {
+            *value *= factors[*column];
+        }
+    }
+
     /// Number of stored entries.
     pub fn entries(&self) -> usize {
         self.values.len()

@@ -281,7 +281,7 @@ impl Channel {
     }
 
     /// Force and base at reading `i`: as given, or else linear over the step.
-    fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
+    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
         match (self.around.get(i), excitation) {
             (Some(around), _) => *around,
             (None, Some(excitation)) => excitation.around(self.places[i]),

@@ -69,7 +69,8 @@ impl Problem {
         priors || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
     }
 
-    fn penalty_gradient(&self, theta: &[f64]) -> Vec<f64> {
+    /// Euclidean gradient of [`Problem::regularisation`] in the parameters.
+    pub(crate) fn penalty_gradient(&self, theta: &[f64]) -> Vec<f64> {
         let mut gradient = vec![0.0; theta.len()];
         for penalty in &self.penalties {
             let range = self.functions.ranges()[penalty.function].clone();

@@ -130,6 +130,24 @@ impl Subproblem {
         solutions.map(exact).collect()
     }
 
+    /// The same problem in the variables `z_j / units_j`.
+    #[must_use]
+    pub fn in_units(&self, units: &[f64]) -> Self {
+        let mut scaled = self.clone();
+        let cones = scaled.cones.iter_mut().map(|cone| &mut cone.rows);
+        let rows = [
+            &mut scaled.residuals,
+            &mut scaled.absolute,
+            &mut scaled.equalities,
+            &mut scaled.inequalities,
+        ];
+        let rows = rows.into_iter().chain(cones);
+        rows.for_each(|rows| rows.scale_columns(units));
+        let proximal = scaled.proximal.iter_mut().zip(units);
+        proximal.for_each(|(d, unit)| *d *= unit * unit);
+        scaled
+    }
+
     /// Sets the right-hand sides of the equalities to zero.
     pub fn homogeneous(&mut self) {
         self.equalities.clear_right();

@@ -3,6 +3,7 @@
 use crate::constraints::RowGroup;
 use crate::functions::{Penalty, Quantity};
 use crate::problem::Problem;
+use crate::solvers::Solver;
 use serde::{Deserialize, Serialize};
 
 /// How the misfit in J is measured.
@@ -15,11 +16,16 @@ pub enum CostKind {
     ChiSquare,
     /// Some records have a sigma and some have none.
     Mixed,
+    /// `integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt` with the motion from the readings.
+    EquationError,
 }
 
 impl CostKind {
-    /// The kind of a problem's misfit.
-    pub fn of(problem: &Problem) -> Self {
+    /// The kind of a problem's misfit, for the solver that fits it.
+    pub fn of(problem: &Problem, solver: Solver) -> Self {
+        if solver == Solver::EquationError {
+            return CostKind::EquationError;
+        }
         let kinds: Vec<bool> = (problem.channels())
             .map(|c| !c.weighting().is_sigma())
             .collect();
@@ -41,15 +47,20 @@ impl CostKind {
                  readings, m^2 s) + sum of ((y - y_obs)/sigma)^2 over the readings with sigma \
                  (chi-square)"
             }
+            CostKind::EquationError => {
+                "integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the readings, with y, y' \
+                 and y'' from the readings and not from a simulation (N^2 s)"
+            }
         }
     }
 }
 
-/// The whole of J with all its factors, as [`Problem::evaluate`] computes it: the misfit and every
-/// penalty that the problem has, with its weight.
-pub fn cost_definition(problem: &Problem) -> String {
+/// The whole of J with all its factors, as [`Problem::evaluate`] computes it, or for
+/// [`Solver::EquationError`] the fit itself: the misfit and every penalty that the problem has, with
+/// its weight.
+pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
     let quantities: Vec<Quantity> = problem.functions.iter().map(|f| f.quantity).collect();
-    let misfit = CostKind::of(problem).misfit().to_string();
+    let misfit = CostKind::of(problem, solver).misfit().to_string();
     let smooth = (problem.penalties.iter()).map(|p| penalty(p, quantities[p.function].symbol()));
     let jumps = problem.variations.iter().map(|variation| {
         let symbol = quantities[variation.function].symbol();

@@ -99,7 +99,8 @@ pub struct ModelSummary {
     /// Width of Coulomb friction, m/s, where there is any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction_width: Option<f64>,
-    /// How the misfit in J is measured: `integral`, `chi-square` or `mixed`.
+    /// How the misfit in J is measured: `integral`, `chi-square`, `mixed` or
+    /// `equation-error`.
     pub cost_kind: CostKind,
     /// The whole of J in one sentence, with all its factors.
     pub cost_definition: String,

@@ -10,7 +10,7 @@ use super::document::{
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::OutputFolder;
-use super::measured::{self, ChannelSummary};
+use super::measured::{self, ChannelSummary, StatisticsSummary};
 use super::render;
 use crate::config::{ChannelNote, Model};
 use crate::diagnostics::rms;
@@ -19,7 +19,8 @@ use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction, Ratios};
 use crate::objective::Channel;
 use crate::solvers::{
-    ActiveGroup, Fit, PathPoint, Row, Rung, Status, WeightPath, WeightRule, active_constraints,
+    ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
+    active_constraints,
 };
 use std::collections::BTreeMap;
 use std::io;
@@ -103,13 +104,27 @@ impl Run<'_> {
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
             held_out: measured::held_out(model, fit),
-            scalars: measured::scalars(&model.problem, &fit.best.evaluation),
-            statistics: measured::statistics(&model.problem, &fit.best.evaluation),
-            half_step: measured::refined(&model.problem, &fit.best.evaluation),
+            scalars: match self.is_simulated() {
+                true => measured::scalars(&model.problem, &fit.best.evaluation),
+                false => Vec::new(),
+            },
+            statistics: match self.is_simulated() {
+                true => measured::statistics(&model.problem, &fit.best.evaluation),
+                false => StatisticsSummary::default(),
+            },
+            half_step: match self.is_simulated() {
+                true => measured::refined(&model.problem, &fit.best.evaluation),
+                false => None,
+            },
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
         }
+    }
+
+    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    fn is_simulated(&self) -> bool {
+        self.model.settings.solver != Solver::EquationError
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -131,8 +146,8 @@ impl Run<'_> {
                 Term::CoulombFriction { width } => Some(*width),
                 _ => None,
             }),
-            cost_kind: CostKind::of(problem),
-            cost_definition: cost_definition(problem),
+            cost_kind: CostKind::of(problem, self.model.settings.solver),
+            cost_definition: cost_definition(problem, self.model.settings.solver),
         }
     }
 
@@ -207,7 +222,10 @@ impl Run<'_> {
 
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let problem = &self.model.problem;
-        let covariance = problem.covariance(&self.fit.best.evaluation);
+        let covariance = match self.is_simulated() {
+            true => problem.covariance(&self.fit.best.evaluation),
+            false => None,
+        };
         let list = self.named_functions().into_iter().enumerate();
         list.map(|(i, (function, values))| {
             let index = problem.functions.ranges()[i].start;

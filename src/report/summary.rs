@@ -1,5 +1,6 @@
 //! What a person reads in ten seconds.
 
+use super::cost::CostKind;
 use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
 use std::fmt::Write;
@@ -101,6 +102,7 @@ fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::R
             "on half the step the model's readings change by at most {:.1e} of the largest one",
             half.change_per_reading
         ),
+        None if document.model.cost_kind == CostKind::EquationError => Ok(()),
         None => writeln!(text, "on half the step there is no motion"),
     }
 }

@@ -7,7 +7,7 @@ use super::point::{Counts, Point, Work};
 use super::projected_gradient::ProjectedGradient;
 use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Rung, Solver, Step};
+use super::{Descend, FitSettings, Rung, Solver, Step, equation_error};
 use crate::dynamics::{Breakdown, Cause};
 use crate::functions::Functions;
 use crate::problem::Problem;
@@ -50,7 +50,8 @@ impl Fit {
 /// Runs one solver from `start`; `observe` is called after every iteration. `reference` is what the
 /// ratios of cost and gradient are taken to, by default the start itself.
 ///
-/// Every method accepts only points of lower cost, so the last point is the best one.
+/// Every method accepts only points of lower cost, so the last point is the best one. The equation
+/// error is no search: it is minimised at once.
 ///
 /// # Errors
 /// A [`Breakdown`] if the start itself cannot be evaluated.
@@ -61,6 +62,9 @@ pub(super) fn search(
     reference: Option<Reference>,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
+    if settings.solver == Solver::EquationError {
+        return Ok(equation_error::fit(problem, start, observe));
+    }
     let run = Run {
         method: method(settings.solver),
         settings,
@@ -86,6 +90,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
         Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
         Solver::ProjectedGradient => Box::<ProjectedGradient>::default(),
         Solver::GaussNewton => Box::<GaussNewton>::default(),
+        Solver::EquationError => unreachable!("it takes no steps"),
     }
 }
 

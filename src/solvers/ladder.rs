@@ -75,7 +75,7 @@ impl Attempt {
 /// Fits `problem` from `start`; `observe` is called after every iteration.
 ///
 /// Gauss–Newton climbs the ladder until a rung explains the record; the rung with the lowest cost
-/// is returned. The other solvers take the first rung only.
+/// is returned. The other solvers take the first rung only, and the equation error has no use for one.
 ///
 /// # Errors
 /// A [`Breakdown`] if no rung has a motion at its start.
@@ -85,6 +85,9 @@ pub fn fit(
     settings: &FitSettings,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
+    if settings.solver == Solver::EquationError {
+        return search(problem, start, settings, None, observe);
+    }
     let attempts = match settings.initial {
         Initial::Functions => [Attempt::Functions, Attempt::Data, Attempt::GrowingHorizon],
         Initial::Data => [Attempt::Data, Attempt::Functions, Attempt::GrowingHorizon],

@@ -24,7 +24,7 @@ mod stopping;
 mod weight_path;
 
 pub use activity::{ActiveGroup, active_constraints};
-pub use equation_error::equation_error;
+pub use equation_error::{Measurements, Unsuited, equation_error};
 pub use executor::Fit;
 pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
@@ -57,6 +57,9 @@ pub enum Solver {
     ProjectedGradient,
     /// Gauss–Newton with a proximal term, under constraints.
     GaussNewton,
+    /// The minimum of the equation error ([`Measurements`]), a convex problem that is solved once: the
+    /// cost is another one, and neither start, gradient nor stopping test has a part in it.
+    EquationError,
 }
 
 impl Solver {
@@ -67,6 +70,7 @@ impl Solver {
             Solver::Lbfgs { .. } => "lbfgs",
             Solver::ProjectedGradient => "projected-gradient",
             Solver::GaussNewton => "gauss-newton",
+            Solver::EquationError => "equation-error",
         }
     }
 }

@@ -131,7 +131,7 @@ fn kinds_of_value() {
     assert_snapshot!(changed("method: lbfgs", "method: l-bgfs"), @"
     error: model.yaml:14:11: fit.method: unknown choice
       found: `l-bgfs`
-      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton, equation-error
       hint: did you mean `lbfgs`?
     ");
     assert_snapshot!(changed("basis: nodal", "basis: nodes"), @"

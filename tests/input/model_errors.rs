@@ -315,18 +315,18 @@ fn choices() {
     assert_snapshot!(changed("method: lbfgs", "method: steepest_descent"), @"
     m.yaml:20:11: fit.method: unknown choice
       found: `steepest_descent`
-      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton, equation-error
       hint: did you mean `steepest-descent`?
     ");
     assert_snapshot!(changed("method: lbfgs", "method: magic"), @"
     m.yaml:20:11: fit.method: unknown choice
       found: `magic`
-      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton, equation-error
     ");
     assert_snapshot!(changed("method: lbfgs", "method: 3"), @"
     m.yaml:20:11: fit.method: not one of the choices
       found: the integer 3
-      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton
+      expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton, equation-error
     ");
     assert_snapshot!(changed("gradient: continuous", "gradient: [discrete]"), @"
     m.yaml:21:13: fit.gradient: not one of the choices

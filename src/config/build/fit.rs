@@ -1,11 +1,13 @@
 //! How to fit.
 
+use super::Purpose;
+use super::experiments::is_held_out;
 use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
-use crate::solvers::{FitSettings, Initial, Solver, Stopping};
+use crate::solvers::{FitSettings, Initial, Measurements, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
@@ -20,6 +22,7 @@ pub(super) fn build(
     let spec = file.spec.fit.as_ref();
     let gradient = gradient(file, problem)?;
     let solver = solver(file)?;
+    takes_steps(file, solver)?;
     can_constrain(file, problem, solver)?;
     can_regularise(file, problem, searches, solver)?;
     let initial = match spec.and_then(|f| f.initial) {
@@ -39,10 +42,66 @@ pub(super) fn build(
     })
 }
 
+/// Whether the method is the equation error.
+pub(super) fn is_equation_error(file: &ModelFile) -> bool {
+    method(file) == FitMethod::EquationError
+}
+
+/// The method asked for, or the default.
+pub(super) fn method(file: &ModelFile) -> FitMethod {
+    let method = file.spec.fit.as_ref().and_then(|f| f.method);
+    method.unwrap_or(FitMethod::GaussNewton)
+}
+
+/// The motions as the readings tell them, where the method is to use them.
+pub(super) fn measurements(
+    file: &ModelFile,
+    purpose: Purpose,
+    problem: &Problem,
+    warnings: &mut Vec<String>,
+) -> Result<Option<Measurements>, InputError> {
+    if !is_equation_error(file) || matches!(purpose, Purpose::Simulate { .. }) {
+        return Ok(None);
+    }
+    let measurements = Measurements::of(problem).map_err(|unsuited| {
+        let written = file.spec.experiments.iter().enumerate();
+        let fitted = written.filter(|(_, spec)| !is_held_out(spec));
+        let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
+        file.error_at(
+            &format!("experiments[{}]", place.unwrap_or_default()),
+            "the method `equation-error` cannot tell the motion from these readings",
+        )
+        .found(unsuited.reason)
+        .expected("readings from which displacement, velocity and acceleration follow")
+    })?;
+    warnings.extend(measurements.remarks(problem));
+    Ok(Some(measurements))
+}
+
+/// Refuses what is about the steps of a search where there are none.
+fn takes_steps(file: &ModelFile, solver: Solver) -> Result<(), InputError> {
+    let Some(fit) = file.spec.fit.as_ref() else {
+        return Ok(());
+    };
+    let given = [
+        ("initial", fit.initial.is_some()),
+        ("gradient", fit.gradient.is_some()),
+        ("stop", fit.stop.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((key, _)) if solver == Solver::EquationError => Err(file
+            .error_at(
+                &format!("fit.{key}"),
+                "the method `equation-error` solves one convex problem and takes no steps",
+            )
+            .expected(format!("no `{key}`, or another method"))),
+        _ => Ok(()),
+    }
+}
+
 fn solver(file: &ModelFile) -> Result<Solver, InputError> {
     let memory = memory(file)?;
-    let method = file.spec.fit.as_ref().and_then(|f| f.method);
-    let solver = match method.unwrap_or(FitMethod::GaussNewton) {
+    let solver = match method(file) {
         FitMethod::SteepestDescent => Solver::SteepestDescent,
         FitMethod::Lbfgs => {
             return Ok(Solver::Lbfgs {
@@ -51,6 +110,7 @@ fn solver(file: &ModelFile) -> Result<Solver, InputError> {
         }
         FitMethod::ProjectedGradient => Solver::ProjectedGradient,
         FitMethod::GaussNewton => Solver::GaussNewton,
+        FitMethod::EquationError => Solver::EquationError,
     };
     match memory {
         None => Ok(solver),
@@ -90,7 +150,7 @@ fn can_regularise(
         (true, false) => return Ok(()),
     };
     match solver {
-        Solver::GaussNewton => Ok(()),
+        Solver::GaussNewton | Solver::EquationError => Ok(()),
         _ => Err(file
             .error_at("fit.method", format!("this method knows no {asked}"))
             .found(format!("`{}`", solver.name()))

@@ -121,7 +121,8 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let built = experiments::build(file, purpose, &grid, records, &assemblies)?;
     let functions = functions.with_scalars(built.scalars);
     let mut problem = Problem::new(oscillator, functions, built.fitted);
-    let weight_rule = penalties::build(file, &mut problem, &mut warnings)?;
+    let measured = fit::measurements(file, purpose, &problem, &mut warnings)?;
+    let weight_rule = penalties::build(file, &mut problem, measured.as_ref(), &mut warnings)?;
     penalties::add_variations(file, &mut problem);
     let places = constraints::build(file, &mut problem, &assemblies, &mut warnings)?;
     problem.soft = problem.constraints.take_soft();

@@ -1,5 +1,6 @@
 //! Penalties: `smooth` and `variation` of the functions.
 
+use super::fit::{is_equation_error, method};
 use super::functions::{slots, values};
 use crate::config::ModelFile;
 use crate::config::scalar::{Sigma, Weight};
@@ -7,7 +8,7 @@ use crate::config::spec::{SmoothSpec, WeightRule};
 use crate::error::InputError;
 use crate::functions::{Basis, Design, Penalty, Variation};
 use crate::problem::Problem;
-use crate::solvers;
+use crate::solvers::{self, Measurements};
 
 /// A weight that is still to be chosen from the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,10 +19,12 @@ pub struct WeightSearch {
     pub penalties: Vec<usize>,
 }
 
-/// Adds the penalties of all functions to the problem; those whose weight is a rule have weight 1.
+/// Adds the penalties of all functions to the problem; those whose weight is still to be chosen have
+/// weight 1.
 pub(super) fn build(
     file: &ModelFile,
     problem: &mut Problem,
+    measured: Option<&Measurements>,
     warnings: &mut Vec<String>,
 ) -> Result<Option<WeightSearch>, InputError> {
     let mut search: Option<WeightSearch> = None;
@@ -31,6 +34,10 @@ pub(super) fn build(
             let key = format!("{}.smooth{place}", slot.key);
             let weight = match spec.weight {
                 Weight::Number(weight) => weight.0,
+                Weight::Rule(WeightRule::Period) => {
+                    has_period(file, &key, spec)?;
+                    measured.map_or(0.0, |m| m.period_weight(problem, j, spec.order.0))
+                }
                 Weight::Rule(rule) => {
                     can_choose(file, &key, rule, search.as_ref())?;
                     1.0
@@ -52,9 +59,11 @@ pub(super) fn build(
                 ));
                 continue;
             }
-            if let Weight::Rule(rule) = spec.weight {
+            if let Weight::Rule(rule) = spec.weight
+                && let Some(rule) = meant(rule)
+            {
                 let search = search.get_or_insert_with(|| WeightSearch {
-                    rule: meant(rule),
+                    rule,
                     penalties: Vec::new(),
                 });
                 search.penalties.push(problem.penalties.len());
@@ -108,12 +117,39 @@ fn penalty(
     Ok(penalty)
 }
 
-fn meant(rule: WeightRule) -> solvers::WeightRule {
+/// The rule by which a weight is searched for; `None` for one that computes it.
+fn meant(rule: WeightRule) -> Option<solvers::WeightRule> {
     match rule {
-        WeightRule::Discrepancy => solvers::WeightRule::Discrepancy,
-        WeightRule::LCurve => solvers::WeightRule::LCurve,
-        WeightRule::Gcv => solvers::WeightRule::Gcv,
+        WeightRule::Discrepancy => Some(solvers::WeightRule::Discrepancy),
+        WeightRule::LCurve => Some(solvers::WeightRule::LCurve),
+        WeightRule::Gcv => Some(solvers::WeightRule::Gcv),
+        WeightRule::Period => None,
     }
+}
+
+/// Refuses the rule `period` where it has no meaning.
+fn has_period(file: &ModelFile, key: &str, spec: &SmoothSpec) -> Result<(), InputError> {
+    if !is_equation_error(file) {
+        return Err(file
+            .error_at(
+                &format!("{key}.weight"),
+                "the rule `period` is a rule of the method `equation-error` alone",
+            )
+            .found(format!("`{}`", method(file)))
+            .expected(
+                "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
+            ));
+    }
+    if spec.order.0 == 0 {
+        return Err(file
+            .error_at(
+                &format!("{key}.order"),
+                "the rule `period` is about a derivative",
+            )
+            .found(0)
+            .expected("order 1 or 2, or a number for the weight"));
+    }
+    Ok(())
 }
 
 /// Refuses a second rule, and a rule that the readings give no footing.
@@ -124,7 +160,16 @@ fn can_choose(
     search: Option<&WeightSearch>,
 ) -> Result<(), InputError> {
     let key = format!("{key}.weight");
-    if let Some(first) = search.filter(|first| first.rule != meant(rule)) {
+    if is_equation_error(file) {
+        return Err(file
+            .error_at(
+                &key,
+                "the method `equation-error` knows no search for the weight",
+            )
+            .found(format!("`{rule}`"))
+            .expected("`period`, which follows from the motion, or a number"));
+    }
+    if let Some(first) = search.filter(|first| Some(first.rule) != meant(rule)) {
         return Err(file
             .error_at(&key, "there is one rule for all weights that are chosen")
             .found(format!("`{rule}` beside `{}`", first.rule.name()))

@@ -4,6 +4,7 @@ use super::run::ComparedRun;
 use super::verdict;
 use crate::dynamics::Device;
 use crate::functions::Ratios;
+use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
 use serde::Serialize;
 
@@ -30,7 +31,7 @@ pub struct Measures {
     pub parameters: usize,
     /// Part of J from the readings, in `misfit_unit`.
     pub misfit: f64,
-    /// `m^2 s`; `1` for a chi-square.
+    /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error.
     pub misfit_unit: &'static str,
     /// `J/J0`.
     pub cost_ratio: f64,
@@ -71,9 +72,10 @@ impl Measures {
             nodes: document.model.nodes,
             parameters: document.model.parameters,
             misfit: document.cost.misfit,
-            misfit_unit: match verdict::is_chi_square(document) {
-                true => "1",
-                false => "m^2 s",
+            misfit_unit: match document.model.cost_kind {
+                CostKind::ChiSquare => "1",
+                CostKind::EquationError => "N^2 s",
+                CostKind::Integral | CostKind::Mixed => "m^2 s",
             },
             cost_ratio: document.cost.ratio,
             iterations: document.counts.iterations

@@ -51,6 +51,11 @@ fn matching(run: &ComparedRun) -> (bool, String) {
             format!("{verb} the motion within its noise (chi-square {misfit:.0} of {n} readings)");
         return (matched, how);
     }
+    if document.model.cost_kind == CostKind::EquationError {
+        // The motion of such a run is the measured one.
+        let how = format!("fits the equation of motion, not a motion (J/J0 {ratio:.1e})");
+        return (false, how);
+    }
     let left = residual_share(run);
     match left <= MATCHED {
         true => (true, format!("matches the motion (J/J0 {ratio:.1e})")),

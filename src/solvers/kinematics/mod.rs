@@ -2,10 +2,14 @@
 //! needs no model of the device.
 
 mod at_nodes;
+mod in_band;
 mod stencil;
 mod together;
 
+pub(super) use in_band::Band;
+
 use crate::dynamics::State;
+use crate::objective::Channel;
 use crate::problem::{Experiment, Problem};
 
 /// A smooth motion near the readings, at some nodes of the grid.
@@ -63,6 +67,21 @@ fn noise_level(observed: &[f64]) -> f64 {
     (squares / (70.0 * observed.len().saturating_sub(4).max(1) as f64)).sqrt()
 }
 
-fn rms(values: &[f64]) -> f64 {
+/// Readings as a perfect sensor that moves with the base would give them, and the sensor's gain, with
+/// the sensors at the values `scalars`.
+pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
+    let [gain, offset, drift] = channel.sensor().values(scalars);
+    let gain = if gain == 0.0 { 1.0 } else { gain };
+    let filtered = !channel.filter().is_empty();
+    let plain = |(i, reading): (usize, &f64)| match filtered {
+        // The filter has taken the offset.
+        true => reading / gain,
+        false => (reading - offset - drift * channel.age(i)) / gain - channel.base_at(i),
+    };
+    let values = channel.observed().iter().enumerate().map(plain);
+    (values.collect(), gain)
+}
+
+pub(super) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|y| y * y).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

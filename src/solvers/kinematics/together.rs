@@ -7,7 +7,7 @@
 //! a phase.
 
 use super::stencil::weights;
-use super::{Kinematics, noise_level, rms};
+use super::{Kinematics, noise_level, rms, unsensed};
 use crate::dynamics::{ChannelKind, Place, State};
 use crate::objective::{Channel, Weighting};
 use crate::problem::{Experiment, Problem};
@@ -100,15 +100,7 @@ fn weight_of(channel: &Channel) -> f64 {
 
 impl<'a> Plain<'a> {
     fn new(channel: &'a Channel, scalars: &[f64]) -> Self {
-        let [gain, offset, drift] = channel.sensor().values(scalars);
-        let gain = if gain == 0.0 { 1.0 } else { gain };
-        let filtered = !channel.filter().is_empty();
-        let plain = |(i, reading): (usize, &f64)| match filtered {
-            // The filter has taken the offset.
-            true => reading / gain,
-            false => (reading - offset - drift * channel.age(i)) / gain - channel.base_at(i),
-        };
-        let values: Vec<f64> = channel.observed().iter().enumerate().map(plain).collect();
+        let (values, gain) = unsensed(channel, scalars);
         let noise = match channel.weighting() {
             Weighting::Sigma(sigma) => *sigma,
             Weighting::Sigmas(sigmas) => rms(sigmas),

@@ -1,0 +1,262 @@
+//! The equation error as a method of its own: one convex problem, solved once.
+
+use super::measured::{Measured, Measurements, Unsuited};
+use super::{Minimum, add_rows, device, minimise};
+use crate::dynamics::Device;
+use crate::objective::{Evaluation, Gradient};
+use crate::problem::{Experiment, Problem};
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::gauss_newton::{add_penalties, add_variations};
+use crate::solvers::recorder::ratio;
+use crate::solvers::{Counts, Fit, Outcome, Point, Row, Status};
+use std::time::Instant;
+
+/// A minimum moved into the constraints may lose this share of the decrease: the accuracy to which
+/// the convex problem is solved.
+const KEPT: f64 = 1.0 - 1e-9;
+
+/// Minimises over the readings of all experiments
+///
+/// ```text
+/// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
+/// ```
+///
+/// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
+/// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
+/// the equation of motion says of the readings there. Scalars keep their values at the start.
+pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> Fit {
+    let clock = Instant::now();
+    let measurements = match Measurements::with_scalars(problem, problem.scalars(start)) {
+        Ok(measurements) => measurements,
+        Err(reason) => return failed(problem, start, &reason),
+    };
+    let cost = Cost {
+        problem,
+        measurements: &measurements,
+    };
+    let first = cost.point(start.to_vec());
+    let mut counts = Counts::default();
+    let (outcome, found) = match cost.minimise(start) {
+        Ok(minimum) => {
+            counts.qp = u64::from(minimum.program.is_some());
+            let point = cost.point(minimum.parameters.clone());
+            let device = &point.evaluation.device;
+            let reason = reason(problem, &minimum, device.mass.iter().all(|m| *m > 0.0));
+            let status = match minimum.program {
+                Some(ConicStatus::Almost) => Status::Stalled,
+                _ => Status::Converged,
+            };
+            (Outcome::new(status, reason), Some(point))
+        }
+        Err(status) => {
+            counts.qp = 1;
+            let word = match status {
+                ConicStatus::Infeasible => Status::Infeasible,
+                _ => Status::Stalled,
+            };
+            (Outcome::new(word, status.sentence()), None)
+        }
+    };
+    let history: Vec<Row> = (found.iter())
+        .map(|best| row(problem, &first, best))
+        .collect();
+    history.iter().for_each(observe);
+    Fit {
+        initial_cost: first.evaluation.cost,
+        started_from: first.evaluation.cost,
+        initial_norm_squared: first.gradient.norm_squared,
+        best: found.unwrap_or(first),
+        history,
+        snapshots: Vec::new(),
+        outcome,
+        counts,
+        elapsed: clock.elapsed(),
+        rungs: Vec::new(),
+    }
+}
+
+fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> String {
+    if problem.functions.iter().all(|f| f.parameters() == 0) {
+        return "there is nothing to fit: every function is fixed".into();
+    }
+    let how = match minimum.program {
+        None => "one sparse factorisation",
+        Some(ConicStatus::Almost) => "a quadratic program, but to reduced accuracy only",
+        Some(_) => "a quadratic program",
+    };
+    let but = match has_mass {
+        true => "",
+        false => "; its mass is not positive at all times, so the device has no motion",
+    };
+    format!("the equation error is convex, and its minimum was found by {how}{but}")
+}
+
+/// The only row of the history.
+fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
+    Row {
+        iteration: 1,
+        cost: best.evaluation.cost,
+        cost_ratio: ratio(best.evaluation.cost, first.evaluation.cost),
+        gradient_norm_squared_ratio: ratio(
+            first.gradient.norm_squared,
+            first.gradient.norm_squared,
+        ),
+        step: 1.0,
+        relative_change: problem.relative_change(
+            &first.evaluation,
+            &first.parameters,
+            &best.parameters,
+        ),
+    }
+}
+
+/// The end of a fit whose readings tell no motion: the start, without a cost.
+fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
+    let mut evaluation = problem.workspace();
+    evaluation.device = problem.functions.device(start);
+    for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
+        for (predicted, channel) in readings.iter_mut().zip(&experiment.channels) {
+            *predicted = vec![f64::NAN; channel.len()];
+        }
+    }
+    Fit {
+        best: Point {
+            parameters: start.to_vec(),
+            evaluation,
+            gradient: Gradient {
+                euclidean: vec![f64::NAN; start.len()],
+                l2: vec![f64::NAN; start.len()],
+                norm_squared: f64::NAN,
+            },
+        },
+        initial_cost: f64::NAN,
+        started_from: f64::NAN,
+        initial_norm_squared: f64::NAN,
+        history: Vec::new(),
+        snapshots: Vec::new(),
+        outcome: Outcome::new(Status::Failed, reason.to_string()),
+        counts: Counts::default(),
+        elapsed: std::time::Duration::ZERO,
+        rungs: Vec::new(),
+    }
+}
+
+/// J of the equation error.
+struct Cost<'a> {
+    problem: &'a Problem,
+    measurements: &'a Measurements,
+}
+
+impl<'a> Cost<'a> {
+    fn experiments(&self) -> impl Iterator<Item = (&'a Experiment, &'a Measured)> {
+        let all = self.problem.experiments.iter();
+        let pairs = all.zip(&self.measurements.experiments);
+        pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
+    }
+
+    fn minimise(&self, start: &[f64]) -> Result<Minimum, ConicStatus> {
+        let problem = self.problem;
+        let mut sub = Subproblem::new(problem.parameters());
+        for (experiment, measured) in self.experiments() {
+            let root = measured.weight.sqrt();
+            add_rows(problem, experiment, measured, root, start, &mut sub);
+        }
+        add_penalties(problem, start, &mut sub);
+        add_variations(problem, start, &mut sub);
+        self.add_soft(start, &mut sub);
+        let sizes = self.measurements.sizes(problem, start);
+        let excess = |theta: &[f64]| self.excess(theta);
+        minimise(problem, sub, start, &sizes, KEPT, true, &excess)
+    }
+
+    /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`
+    /// at the price `weight excess^2`.
+    fn add_soft(&self, start: &[f64], sub: &mut Subproblem) {
+        for group in &self.problem.soft {
+            let excess = sub.add_variables(group.rows.len());
+            let root = group.row_weight().sqrt();
+            for (i, &e) in excess.iter().enumerate() {
+                sub.residuals.push([(e, root)], 0.0);
+                let value: f64 = group.rows.row(i).map(|(j, a)| a * start[j]).sum();
+                let [lower, upper] = group.bounds(i).map(|bound| bound - value);
+                let row = group.rows.row(i).chain([(e, -1.0)]);
+                sub.bound(row, lower, upper);
+            }
+        }
+    }
+
+    fn excess(&self, theta: &[f64]) -> Vec<f64> {
+        let groups = self.problem.soft.iter();
+        groups
+            .flat_map(|group| (0..group.rows.len()).map(|i| group.excess(i, theta)))
+            .collect()
+    }
+
+    /// Everything about the parameters `theta`.
+    fn point(&self, theta: Vec<f64>) -> Point {
+        let problem = self.problem;
+        let mut evaluation = problem.workspace();
+        problem
+            .functions
+            .device_into(&theta, 0, &mut evaluation.device);
+        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+            problem.functions.device_into(&theta, i + 1, own);
+        }
+        evaluation.scalars.copy_from_slice(problem.scalars(&theta));
+        evaluation.misfit = self
+            .experiments()
+            .map(|(experiment, measured)| {
+                let device = device(problem, experiment, &theta);
+                measured.misfit(&measured.errors(problem, &device))
+            })
+            .sum();
+        evaluation.regularisation = problem.regularisation(&theta);
+        evaluation.cost = evaluation.misfit + evaluation.regularisation;
+        self.say_motions(&mut evaluation);
+        Point {
+            gradient: self.gradient(&theta),
+            parameters: theta,
+            evaluation,
+        }
+    }
+
+    /// The measured motions, and what the model says of the readings there.
+    fn say_motions(&self, evaluation: &mut Evaluation) {
+        let problem = self.problem;
+        for (e, measured) in self.measurements.experiments.iter().enumerate() {
+            let Some(measured) = measured else { continue };
+            let experiment = &problem.experiments[e];
+            evaluation.trajectories[e] =
+                measured.trajectory(&problem.oscillator.grid, experiment.nodes);
+            let view = problem.view(evaluation, e);
+            let channels = experiment.channels.iter();
+            let predictions = channels.map(|channel| measured.predict(problem, channel, view));
+            evaluation.predictions[e] = predictions.collect();
+        }
+    }
+
+    fn gradient(&self, theta: &[f64]) -> Gradient {
+        let problem = self.problem;
+        let mut euclidean = problem.penalty_gradient(theta);
+        for (experiment, measured) in self.experiments() {
+            let device = device(problem, experiment, theta);
+            let errors = measured.errors(problem, &device);
+            let mut nodal: Device = problem.functions.empty_device();
+            for (f, values) in nodal.functions_mut().enumerate() {
+                for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
+                    let push = 2.0 * measured.weight * error * measured.response(problem, f, i);
+                    values[place.step] += push * (1.0 - place.fraction);
+                    values[place.step + 1] += push * place.fraction;
+                }
+            }
+            let functions = &problem.functions;
+            functions.add_transpose(&nodal, experiment.device, &mut euclidean);
+        }
+        let l2 = problem.functions.gram_solve(&euclidean);
+        Gradient {
+            norm_squared: problem.functions.norm_squared(&l2),
+            euclidean,
+            l2,
+        }
+    }
+}
