@@ -27,9 +27,18 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
         .collect();
-    let start = &with_initial_states(problem, start, &motions);
+    from_motions(problem, start, &motions)
+}
+
+/// [`equation_error`] with the motion of each experiment.
+pub(super) fn from_motions(
+    problem: &Problem,
+    start: &[f64],
+    motions: &[Option<Kinematics>],
+) -> Result<Vec<f64>, ConicStatus> {
+    let start = &with_initial_states(problem, start, motions);
     let mut sub = Subproblem::new(problem.parameters());
-    for (experiment, motion) in problem.experiments.iter().zip(&motions) {
+    for (experiment, motion) in problem.experiments.iter().zip(motions) {
         if let Some(motion) = motion {
             add_experiment(problem, experiment, motion, start, &mut sub);
         }
@@ -176,7 +185,7 @@ fn add_experiment(
 }
 
 /// `start` with the initial states that are sought taken from the motions, where these begin.
-fn with_initial_states(
+pub(super) fn with_initial_states(
     problem: &Problem,
     start: &[f64],
     motions: &[Option<Kinematics>],

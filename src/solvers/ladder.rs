@@ -3,8 +3,10 @@
 //!
 //! A motion whose period is off by a few per cent fits worse than no motion at all, so descent from
 //! a wrong start ends in a minimum that means nothing. The rungs: the start as given; the
-//! equation-error start; a horizon that grows from an eighth of the record to all of it.
+//! equation-error start; a horizon that grows from an eighth of the record to all of it; states and
+//! functions together, from a motion near the readings.
 
+use super::all_at_once::all_at_once;
 use super::executor::search;
 use super::recorder::Reference;
 use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
@@ -60,6 +62,7 @@ enum Attempt {
     Functions,
     Data,
     GrowingHorizon,
+    AllAtOnce,
 }
 
 impl Attempt {
@@ -68,6 +71,7 @@ impl Attempt {
             Attempt::Functions => "start values",
             Attempt::Data => "equation error",
             Attempt::GrowingHorizon => "growing horizon",
+            Attempt::AllAtOnce => "motion of the readings",
         }
     }
 }
@@ -85,10 +89,13 @@ pub fn fit(
     settings: &FitSettings,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
-    let attempts = match settings.initial {
-        Initial::Functions => [Attempt::Functions, Attempt::Data, Attempt::GrowingHorizon],
-        Initial::Data => [Attempt::Data, Attempt::Functions, Attempt::GrowingHorizon],
+    let first = match settings.initial {
+        Initial::Functions => [Attempt::Functions, Attempt::Data],
+        Initial::Data => [Attempt::Data, Attempt::Functions],
     };
+    let attempts = first
+        .into_iter()
+        .chain([Attempt::GrowingHorizon, Attempt::AllAtOnce]);
     let mut reference = reference(problem, start, settings);
     let climbs = settings.solver == Solver::GaussNewton;
     let mut best: Option<Fit> = None;
@@ -213,6 +220,11 @@ fn run(
                     parameters = fit.best.parameters;
                 }
             }
+            search(problem, &parameters, settings, reference, observe)
+        }
+        Attempt::AllAtOnce => {
+            let parameters =
+                all_at_once(problem, start).unwrap_or_else(|| from_data(problem, start));
             search(problem, &parameters, settings, reference, observe)
         }
     }

@@ -8,7 +8,7 @@
 
 use super::stencil::weights;
 use super::{Kinematics, noise_level, rms};
-use crate::dynamics::{ChannelKind, Place, State};
+use crate::dynamics::{ChannelKind, Place, State, Trajectory};
 use crate::objective::{Channel, Weighting};
 use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
@@ -20,6 +20,9 @@ const POINTS: usize = 6;
 /// Rounds of the search for the smoothing weight, and its decimal exponents.
 const ROUNDS: u32 = 12;
 const EXPONENTS: [f64; 2] = [-12.0, 12.0];
+/// How much more than without smoothing a smooth curve may miss the readings, where that is more than
+/// their noise.
+const ALLOWED: f64 = 1.05;
 /// How far below the dominant frequency the band ends in which readings are integrated.
 const BAND: f64 = 6.0;
 /// Nodes further than so many median spacings from a reading lie in a gap.
@@ -40,7 +43,7 @@ pub fn kinematics(
     problem: &Problem,
     experiment: &Experiment,
     scalars: &[f64],
-) -> Option<Kinematics> {
+) -> Option<(Kinematics, Trajectory)> {
     let grid = &problem.oscillator.grid;
     let nodes = experiment.nodes;
     if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
@@ -68,29 +71,31 @@ pub fn kinematics(
     let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
     let near = near_readings(&channels, nodes, grid.start(), step, settling);
     let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
-    let [mut v, mut a] = [Vec::new(), Vec::new()];
-    for &i in &chosen {
-        let [_, slope, curvature] = derivatives(i);
-        v.push(slope);
-        a.push(curvature);
-    }
+    let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
+    let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
     let main = channels.first()?;
     let begins = channels
         .iter()
         .any(|c| c.channel.times()[0] - grid.start() <= GAP * c.spacing());
     let initial = begins.then(|| State {
         displacement: y[0],
-        velocity: derivatives(0)[1],
+        velocity: v[0],
     });
-    (chosen.len() >= POINTS).then(|| Kinematics {
-        y: chosen.iter().map(|&i| y[i]).collect(),
-        v,
-        a,
+    let at_chosen = |f: &[f64]| chosen.iter().map(|&i| f[i]).collect();
+    let near = (chosen.len() >= POINTS).then(|| Kinematics {
+        y: at_chosen(&y),
+        v: at_chosen(&v),
+        a: at_chosen(&a),
         initial,
         size: main.values.iter().fold(0.0f64, |m, x| m.max(x.abs())),
         weight: weight_of(main.channel),
-        nodes: chosen,
-    })
+        nodes: chosen.clone(),
+    })?;
+    let motion = Trajectory {
+        displacement: y.clone(),
+        velocity: v.clone(),
+    };
+    Some((near, motion))
 }
 
 /// A typical weight of a channel's readings.
@@ -190,26 +195,27 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
         for i in 0..nodes {
             sub.residuals.push([(i, ridge.root * share)], 0.0);
         }
-        if sub.residuals.len() > readings && channels.iter().all(|c| c.order() == 2) {
-            return smooth(&sub, nodes, 10f64.powf(EXPONENTS[0]));
-        }
     }
+    let misfit = |candidate: &[f64]| -> f64 {
+        let fitted = sub.residuals.multiply(candidate);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+    };
     let [mut low, mut high] = EXPONENTS;
-    let mut best = None;
+    // What holds an integrated curve near zero may cost more than the noise.
+    let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
+    let enough = (ALLOWED * misfit(&best)).max(count);
     for _ in 0..ROUNDS {
         let middle = 0.5 * (low + high);
         let candidate = smooth(&sub, nodes, 10f64.powf(middle))?;
-        let fitted = sub.residuals.multiply(&candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
-        let chi_square: f64 = pairs.map(|(a, b)| (a - b) * (a - b)).sum();
-        if chi_square <= count {
+        if misfit(&candidate) <= enough {
             low = middle;
-            best = Some(candidate);
+            best = candidate;
         } else {
             high = middle;
         }
     }
-    best.or_else(|| smooth(&sub, nodes, 10f64.powf(EXPONENTS[0])))
+    Some(best)
 }
 
 impl Plain<'_> {

@@ -1,0 +1,146 @@
+//! A start from states and parameters together: the motion near the readings and the functions are
+//! corrected at once, and the equation of motion holds only in the end.
+//!
+//! A motion that runs through the record cannot slip by a period, because it begins at the readings
+//! and not at a device. So this start knows no local minima of a wrong period however long the
+//! record is. The steps are linear in the functions: if the motion is right, one of them finds the
+//! functions from anywhere.
+
+use super::equation_error::{from_motions, with_initial_states};
+use super::gauss_newton::linearise_about;
+use super::kinematics::{self, Kinematics};
+use crate::constraints::TOLERANCE;
+use crate::dynamics::Trajectory;
+use crate::objective::{Evaluation, View};
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+
+/// Most corrections of states and parameters.
+const ROUNDS: usize = 10;
+/// Corrections end when no function changes by more than this share of its size: the fit that follows
+/// needs a start, not an optimum.
+const SETTLED: f64 = 1e-6;
+/// A pull towards the last parameters, relative to the misfit of no motion at all: it decides what the
+/// readings leave open.
+const PULL: f64 = 1e-9;
+
+/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a motion.
+pub(super) fn all_at_once(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let scalars = problem.scalars(start);
+    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+        .map(|e| kinematics::together(problem, e, scalars).map(|(near, _)| near))
+        .collect();
+    let mut theta = from_motions(problem, start, &motions)
+        .unwrap_or_else(|_| with_initial_states(problem, start, &motions));
+    let mut states = first_states(problem, &theta)?;
+    let mut evaluation = problem.workspace();
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for _ in 0..ROUNDS {
+        look(problem, &theta, &states, &mut evaluation);
+        let mut sub = linearise_about(problem, &theta, &evaluation);
+        add_pull(problem, &evaluation, &mut sub);
+        let Some(z) = solve(&sub) else { break };
+        let mut moved: Vec<f64> = theta.iter().zip(&z).map(|(t, d)| t + d).collect();
+        problem.constraints.clip(&mut moved);
+        let change = problem.relative_change(&evaluation, &theta, &moved);
+        if !change.is_finite() {
+            break;
+        }
+        theta = moved;
+        correct(problem, &theta, &z, &mut states);
+        if let Ok(free) = problem.evaluate(&theta)
+            && best.as_ref().is_none_or(|(cost, _)| free.cost < *cost)
+        {
+            best = Some((free.cost, theta.clone()));
+        }
+        if change <= SETTLED {
+            break;
+        }
+    }
+    best.map(|(_, theta)| theta)
+}
+
+/// The motion of each experiment near its readings; that of the parameters where there are too few.
+fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
+    let scalars = problem.scalars(theta);
+    let mut own = None;
+    let each = problem
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(e, experiment)| {
+            let mut motion = match kinematics::together(problem, experiment, scalars) {
+                Some((_, motion)) => motion,
+                None => {
+                    if own.is_none() {
+                        own = problem.evaluate(theta).ok();
+                    }
+                    own.as_ref()?.trajectories[e].clone()
+                }
+            };
+            begin(experiment.initial_state(scalars), &mut motion);
+            Some(motion)
+        });
+    each.collect()
+}
+
+fn begin(initial: crate::dynamics::State, motion: &mut Trajectory) {
+    motion.displacement[0] = initial.displacement;
+    motion.velocity[0] = initial.velocity;
+}
+
+/// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
+fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
+    let functions = &problem.functions;
+    functions.device_into(theta, 0, &mut evaluation.device);
+    for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+        functions.device_into(theta, i + 1, own);
+    }
+    evaluation.scalars.copy_from_slice(problem.scalars(theta));
+    evaluation.trajectories.clone_from_slice(states);
+    let each = problem
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(e, experiment)| {
+            let view: View = problem.view(evaluation, e);
+            experiment
+                .channels
+                .iter()
+                .map(|c| c.predict(view))
+                .collect()
+        });
+    evaluation.predictions = each.collect();
+}
+
+fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
+    let sizes = problem.natural_sizes(evaluation);
+    let duration = problem.oscillator.grid.duration();
+    let weight = PULL * problem.misfit_of_silence().max(f64::MIN_POSITIVE);
+    let metric = problem.functions.relative_metric(&sizes, duration);
+    for (d, m) in sub.proximal.iter_mut().zip(metric) {
+        *d = weight * m;
+    }
+}
+
+fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
+    if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, TOLERANCE)) {
+        return Some(z);
+    }
+    let solution = sub.solve();
+    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
+    solved.then_some(solution.z)
+}
+
+/// Adds the changes of the states, which follow the parameters in `z`.
+fn correct(problem: &Problem, theta: &[f64], z: &[f64], states: &mut [Trajectory]) {
+    let mut changes = z[theta.len()..].chunks_exact(2);
+    for (experiment, motion) in problem.experiments.iter().zip(states) {
+        for i in 1..experiment.nodes {
+            let Some(change) = changes.next() else { return };
+            motion.displacement[i] += change[0];
+            motion.velocity[i] += change[1];
+        }
+        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    }
+}
