@@ -4,7 +4,7 @@
 mod common;
 
 use kmcfit::constraints::RowGroup;
-use kmcfit::dynamics::{Device, Excitation, Method};
+use kmcfit::dynamics::{Device, Excitation, Method, Term};
 use kmcfit::functions::{CoefficientFunction, Quantity};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::equation_error;
@@ -94,4 +94,23 @@ fn a_fixed_function_or_value_sets_the_scale() {
             "{value}: {found:?}"
         );
     }
+}
+
+/// A device need not have a damping, nor a stiffness in any place of its list.
+#[test]
+fn a_spring_alone_has_an_equation_too() {
+    let mut oscillator = common::oscillator(NODES, Method::Rk4);
+    oscillator.terms = vec![Term::Stiffness];
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![1.5; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+    ];
+    let problem = common::problem_of(oscillator, list, motion.displacement, None);
+    let found = equation_error(&problem, &problem.functions.start()).unwrap();
+    close(found[0], 1.5);
 }

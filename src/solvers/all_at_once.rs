@@ -10,7 +10,7 @@ use super::equation_error::{from_motions, with_initial_states};
 use super::gauss_newton::linearise_about;
 use super::kinematics::{self, Kinematics};
 use crate::constraints::TOLERANCE;
-use crate::dynamics::Trajectory;
+use crate::dynamics::{State, Trajectory};
 use crate::objective::{Evaluation, View};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
@@ -25,7 +25,12 @@ const SETTLED: f64 = 1e-6;
 const PULL: f64 = 1e-9;
 
 /// The parameters with the lowest cost among the corrected ones; `None` if none of them has a motion.
-pub(super) fn all_at_once(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
+/// Ends early where `interrupted` says so.
+pub(super) fn all_at_once(
+    problem: &Problem,
+    start: &[f64],
+    interrupted: &dyn Fn() -> bool,
+) -> Option<Vec<f64>> {
     let scalars = problem.scalars(start);
     let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|e| kinematics::together(problem, e, scalars).map(|(near, _)| near))
@@ -37,6 +42,9 @@ pub(super) fn all_at_once(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> 
     let mut best: Option<(f64, Vec<f64>)> = None;
     for _ in 0..ROUNDS {
         look(problem, &theta, &states, &mut evaluation);
+        if interrupted() || !has_mass(&evaluation) {
+            break;
+        }
         let mut sub = linearise_about(problem, &theta, &evaluation);
         add_pull(problem, &evaluation, &mut sub);
         let Some(z) = solve(&sub) else { break };
@@ -84,7 +92,7 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     each.collect()
 }
 
-fn begin(initial: crate::dynamics::State, motion: &mut Trajectory) {
+fn begin(initial: State, motion: &mut Trajectory) {
     motion.displacement[0] = initial.displacement;
     motion.velocity[0] = initial.velocity;
 }
@@ -111,6 +119,12 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
                 .collect()
         });
     evaluation.predictions = each.collect();
+}
+
+/// Whether every device has a mass that an equation of motion can be solved for.
+fn has_mass(evaluation: &Evaluation) -> bool {
+    let mut devices = std::iter::once(&evaluation.device).chain(&evaluation.own_devices);
+    devices.all(|device| device.mass.iter().all(|m| *m > 0.0))
 }
 
 fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {

@@ -7,8 +7,8 @@
 use super::gauss_newton::{add_penalties, add_variations};
 use super::kinematics::Kinematics;
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
-use crate::dynamics::Stepwise;
 use crate::dynamics::quadrature::trapezoid_weights;
+use crate::dynamics::{Stepwise, Term};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 
@@ -156,8 +156,10 @@ fn add_experiment(
         .functions
         .device_into(start, experiment.device, &mut device);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let force_scale = (size(&device.mass) * size(&motion.a))
-        .max(size(&device.coefficients[1]) * size(&motion.y))
+    let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
+    let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
+    let springs = springs.map(|(_, k)| size(k) * size(&motion.y));
+    let force_scale = springs.fold(size(&device.mass) * size(&motion.a), f64::max)
         / motion.size.max(f64::MIN_POSITIVE);
     let force = experiment
         .excitation

@@ -12,6 +12,7 @@ use super::recorder::Reference;
 use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// A fit explains the record if its misfit is below this share of that of no motion at all, or if
@@ -223,8 +224,10 @@ fn run(
             search(problem, &parameters, settings, reference, observe)
         }
         Attempt::AllAtOnce => {
-            let parameters =
-                all_at_once(problem, start).unwrap_or_else(|| from_data(problem, start));
+            let flag = settings.interrupt.as_ref();
+            let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+            let parameters = all_at_once(problem, start, &interrupted)
+                .unwrap_or_else(|| from_data(problem, start));
             search(problem, &parameters, settings, reference, observe)
         }
     }
