@@ -12,7 +12,7 @@ use crate::dynamics::{ChannelKind, Place, State, Trajectory};
 use crate::objective::{Channel, Weighting};
 use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
-use crate::signal::Spectrum;
+use crate::signal::{Interpolation, Signal, Spectrum};
 use std::f64::consts::TAU;
 
 /// Points of a difference stencil: derivatives are of order 4 or better.
@@ -23,8 +23,12 @@ const EXPONENTS: [f64; 2] = [-12.0, 12.0];
 /// How much more than without smoothing a smooth curve may miss the readings, where that is more than
 /// their noise.
 const ALLOWED: f64 = 1.05;
-/// How far below the dominant frequency the band ends in which readings are integrated.
-const BAND: f64 = 6.0;
+/// How far below the dominant frequency the band ends in which readings are integrated: from readings
+/// full of noise to exact ones. What holds the curve near zero below the band takes a share of
+/// `band^(-2 p)` off the readings, with p the order of their derivative.
+const BAND: [f64; 2] = [6.0, 30.0];
+/// What lies lower than the dominant frequency loses a larger share: so many times as much is allowed.
+const SHARE: f64 = 2.0;
 /// Nodes further than so many median spacings from a reading lie in a gap.
 const GAP: f64 = 1.5;
 /// Dominant periods at the ends of an integrated record that are left out: there the integral still
@@ -137,6 +141,16 @@ impl<'a> Plain<'a> {
         spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
     }
 
+    /// Of as many values at equal distances, linear between the readings.
+    fn spectrum(&self) -> Option<Spectrum> {
+        let times = self.channel.times();
+        let (first, last) = (times.first()?, times.last()?);
+        let spacing = (last - first) / times.len().checked_sub(1)? as f64;
+        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
+    }
+
     fn order(&self) -> usize {
         match self.channel.kind() {
             ChannelKind::Displacement => 0,
@@ -153,14 +167,23 @@ struct Ridge {
     root: f64,
     /// Dominant frequency, Hz.
     frequency: f64,
+    /// What it takes off the readings, in units of their noise.
+    bias: f64,
 }
 
 fn ridge(channels: &[Plain]) -> Option<Ridge> {
     let highest = channels.iter().max_by_key(|c| c.order())?;
-    let frequency = Spectrum::of(&highest.values, highest.spacing())?.dominant();
-    let lowest = TAU * frequency / BAND;
-    let root = lowest.powi(highest.order() as i32) / highest.noise;
-    (frequency > 0.0 && root.is_finite()).then_some(Ridge { root, frequency })
+    let frequency = highest.spectrum()?.dominant();
+    let size = rms(&highest.values) / highest.noise;
+    let order = highest.order() as i32;
+    // As wide as the noise is small: so the share that is lost is no more than the noise.
+    let band = size.powf(0.5 / f64::from(order)).clamp(BAND[0], BAND[1]);
+    let root = (TAU * frequency / band).powi(order) / highest.noise;
+    (frequency > 0.0 && root.is_finite()).then(|| Ridge {
+        root,
+        frequency,
+        bias: SHARE * size * band.powi(-2 * order),
+    })
 }
 
 /// Difference weights of order 0, 1 and 2 at `x` (in steps) on the nodes from `first`.
@@ -204,7 +227,8 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
     let [mut low, mut high] = EXPONENTS;
     // What holds an integrated curve near zero may cost more than the noise.
     let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
-    let enough = (ALLOWED * misfit(&best)).max(count);
+    let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
+    let enough = (ALLOWED * misfit(&best)).max(count * bias * bias);
     for _ in 0..ROUNDS {
         let middle = 0.5 * (low + high);
         let candidate = smooth(&sub, nodes, 10f64.powf(middle))?;
