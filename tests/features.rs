@@ -689,6 +689,54 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     assert!(error < EXACT, "{error:e} {:#?}", found.rungs);
 }
 
+/// Fifty periods, with six nodes in each, of a device that is three times as stiff as the start says:
+/// differences are too coarse for an equation error. States and functions are corrected at once for
+/// several devices, sensors, unknown states and a filter together.
+#[test]
+fn all_of_it_from_far_away_on_a_coarse_grid() {
+    let rate = 1.0 / grid().step();
+    // Some six irregular readings in a period, every tenth of them missing.
+    let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
+    let times = (0..NODES - 1).filter(|i| i % 10 != 7);
+    let times = times.map(|i| (i as f64 + late(i)) * grid().step());
+    let mut displacement = Reading::of(ChannelKind::Displacement, times.collect())
+        .unknown_sensor([1.0, 0.05, 0.002], 2);
+    // A free record could not tell the gain from the initial state.
+    displacement.sought = [None, Some(2), Some(3)];
+    let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
+    filtered.filter = band_pass(2, 1.0, 8.0, rate).unwrap();
+    let mut first = Record::free(vec![displacement]);
+    first.sought = [Some(0), Some(1)];
+    let mut second = Record::driven(forced(), vec![filtered]);
+    second.device = 1;
+    let case = Case {
+        functions: vec![
+            damping(),
+            lines(
+                Quantity::Stiffness,
+                [400.0, 460.0, 430.0, 370.0, 410.0],
+                130.0,
+            ),
+        ],
+        own: vec![(
+            2,
+            lines(
+                Quantity::Stiffness,
+                [380.0, 350.0, 390.0, 420.0, 440.0],
+                130.0,
+            ),
+        )],
+        scalars: vec![
+            scalar(INITIAL.displacement, 1.0, None),
+            scalar(INITIAL.velocity, -0.2, None),
+            scalar(0.05, 0.0, None),
+            scalar(0.002, 0.0, None),
+        ],
+        ..Case::linear(vec![first, second])
+    };
+    case.check("far away");
+}
+
 /// A prior with another mean pulls, by as much as its weight beside that of the readings says.
 #[test]
 fn a_prior_pulls_towards_its_mean() {

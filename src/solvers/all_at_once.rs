@@ -11,12 +11,17 @@ use super::gauss_newton::linearise_about;
 use super::kinematics::{self, Kinematics};
 use crate::constraints::TOLERANCE;
 use crate::dynamics::{State, Trajectory};
-use crate::objective::{Evaluation, View};
+use crate::objective::{Channel, Evaluation, View};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 
-/// Most corrections of states and parameters.
-const ROUNDS: usize = 10;
+/// Most corrections of the parameters.
+const ROUNDS: usize = 16;
+/// In so many of these at most, and until no function changes by more than [`NEAR`] of its size, the
+/// motion is that of the readings again, as the sensors are known by then: the functions may still be
+/// far off, and a motion that follows them would be led away.
+const ANCHORED: usize = 8;
+const NEAR: f64 = 1e-3;
 /// Corrections end when no function changes by more than this share of its size: the fit that follows
 /// needs a start, not an optimum.
 const SETTLED: f64 = 1e-6;
@@ -37,10 +42,12 @@ pub(super) fn all_at_once(
         .collect();
     let mut theta = from_motions(problem, start, &motions)
         .unwrap_or_else(|_| with_initial_states(problem, start, &motions));
-    let mut states = first_states(problem, &theta)?;
+    let first = first_states(problem, &theta)?;
+    let mut states = first.clone();
     let mut evaluation = problem.workspace();
     let mut best: Option<(f64, Vec<f64>)> = None;
-    for _ in 0..ROUNDS {
+    let mut anchored = true;
+    for round in 1..=ROUNDS {
         look(problem, &theta, &states, &mut evaluation);
         if interrupted() || !has_mass(&evaluation) {
             break;
@@ -55,13 +62,17 @@ pub(super) fn all_at_once(
             break;
         }
         theta = moved;
-        correct(problem, &theta, &z, &mut states);
+        anchored = anchored && round < ANCHORED && change > NEAR;
+        match anchored {
+            true => states = motion_of_readings(problem, &theta, &first)?,
+            false => correct(problem, &theta, &z, &mut states),
+        }
         if let Ok(free) = problem.evaluate(&theta)
             && best.as_ref().is_none_or(|(cost, _)| free.cost < *cost)
         {
             best = Some((free.cost, theta.clone()));
         }
-        if change <= SETTLED {
+        if change <= SETTLED && !anchored {
             break;
         }
     }
@@ -90,6 +101,23 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
             Some(motion)
         });
     each.collect()
+}
+
+/// [`first_states`] as sensors and initial states are now seen; `first` as they were seen at first.
+fn motion_of_readings(
+    problem: &Problem,
+    theta: &[f64],
+    first: &[Trajectory],
+) -> Option<Vec<Trajectory>> {
+    let perfect = |c: &Channel| c.sensor().indices().iter().all(Option::is_none);
+    if !problem.channels().all(perfect) {
+        return first_states(problem, theta);
+    }
+    let mut states = first.to_vec();
+    for (experiment, motion) in problem.experiments.iter().zip(&mut states) {
+        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    }
+    Some(states)
 }
 
 fn begin(initial: State, motion: &mut Trajectory) {

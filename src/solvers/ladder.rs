@@ -15,8 +15,8 @@ use crate::problem::Problem;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// A fit explains the record if its misfit is below this share of that of no motion at all, or if
-/// noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// A fit explains the readings of a channel if its misfit is below this share of that of no motion at
+/// all, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another rung.
 const EXPLAINED: f64 = 1e-3;
 /// Parts of the record that the growing horizon fits in turn.
@@ -185,10 +185,19 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     }
 }
 
+/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
-    let misfit = fit.best.evaluation.misfit;
+    let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
-    misfit <= EXPLAINED * problem.misfit_of_silence() || noise.is_some_and(|noise| misfit <= noise)
+    let predictions = evaluation.predictions.iter().flatten();
+    let mut channels = problem.channels().zip(predictions);
+    noise.is_some_and(|noise| evaluation.misfit <= noise)
+        || channels.all(|(channel, predicted)| {
+            let silence = channel.cost(&vec![0.0; channel.len()]);
+            let noise = channel.largest_chi_square();
+            let misfit = channel.cost(predicted);
+            misfit <= EXPLAINED * silence || noise.is_some_and(|noise| misfit <= noise)
+        })
 }
 
 fn run(
