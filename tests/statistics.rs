@@ -22,6 +22,9 @@ const INITIAL: State = State {
     velocity: -0.8,
 };
 
+/// Readings from clean ones, sigma and a seed.
+type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
+
 /// A device of constants that is read through one channel at all nodes.
 struct Setup {
     terms: Vec<(Term, Quantity)>,
@@ -152,11 +155,7 @@ impl Setup {
 
     /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
     /// makes of the clean ones and sigma.
-    fn errors(
-        &self,
-        seeds: std::ops::RangeInclusive<u64>,
-        spoil: &dyn Fn(&[f64], f64, u64) -> Vec<f64>,
-    ) -> Vec<Vec<f64>> {
+    fn errors(&self, seeds: std::ops::RangeInclusive<u64>, spoil: Spoil) -> Vec<Vec<f64>> {
         let clean = self.clean();
         let sigma = NOISE * rms(&clean);
         let theta = self.theta();
@@ -173,7 +172,7 @@ impl Setup {
     }
 
     fn check(&self, words: &str) {
-        let errors = self.errors(1..=SEEDS, &with_noise);
+        let errors = self.errors(1..=SEEDS, with_noise);
         let count = SEEDS as f64;
         for j in 0..errors[0].len() {
             let mean = errors.iter().map(|e| e[j]).sum::<f64>() / count;
@@ -244,7 +243,7 @@ fn with_loss(loss: Loss) -> f64 {
         loss,
         ..Setup::forced(ChannelKind::Displacement)
     };
-    let errors = setup.errors(1..=40, &with_outliers);
+    let errors = setup.errors(1..=40, with_outliers);
     rms(&errors.concat())
 }
 

@@ -79,7 +79,7 @@ impl Place {
         }
         let step = x.floor();
         let inside = step >= 0.0 && step < last as f64;
-        inside.then(|| Self {
+        inside.then_some(Self {
             step: step as usize,
             fraction: x - step,
         })
