@@ -3,9 +3,11 @@
 
 mod common;
 
+use common::synthetic::Truth;
 use kmcfit::constraints::RowGroup;
-use kmcfit::dynamics::{Device, Excitation, Method};
+use kmcfit::dynamics::{ChannelKind, Device, Excitation, Method, Term};
 use kmcfit::functions::{CoefficientFunction, Quantity};
+use kmcfit::objective::{Channel, Weighting};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::equation_error;
 
@@ -94,4 +96,52 @@ fn a_fixed_function_or_value_sets_the_scale() {
             "{value}: {found:?}"
         );
     }
+}
+
+/// A device need not have a damping, nor a stiffness in any place of its list.
+#[test]
+fn a_spring_alone_has_an_equation_too() {
+    let mut oscillator = common::oscillator(NODES, Method::Rk4);
+    oscillator.terms = vec![Term::Stiffness];
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![1.5; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+    ];
+    let problem = common::problem_of(oscillator, list, motion.displacement, None);
+    let found = equation_error(&problem, &problem.functions.start()).unwrap();
+    close(found[0], 1.5);
+}
+
+/// Velocities at irregular times, with next to no noise: integrated without losing the displacement,
+/// though their spectrum is not that of as many equally spaced values.
+#[test]
+fn irregular_velocities_are_integrated() {
+    let mut problem = problem(Some(0.1), false);
+    let grid = problem.oscillator.grid;
+    let late = |i: usize| 0.4 * (1.0 + (1.7 * i as f64).sin() * (0.3 * i as f64).cos());
+    let times: Vec<f64> = (0..100).map(|i| 0.25 * (i as f64 + late(i))).collect();
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![0.1; NODES], vec![1.5; NODES]],
+    };
+    let maker = Truth {
+        oscillator: &problem.oscillator,
+        device: &truth,
+        excitation: None,
+        initial: common::INITIAL,
+    };
+    let kind = ChannelKind::Velocity;
+    let values = maker.seen(kind, &times, &[]);
+    let weighting = Weighting::Sigma(1e-3);
+    let channel = Channel::new(kind, times, values, weighting, &grid, NODES).unwrap();
+    problem.experiments[0].channels = vec![channel];
+    let found = equation_error(&problem, &problem.functions.start()).unwrap();
+    // The damping is known, so the scale is: to the few per cent of a start.
+    let ratio = found[1] / found[0];
+    assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
 }

@@ -66,7 +66,13 @@ functions:
     );
     let file = ModelFile::parse("roll.yaml", text).unwrap();
     let model = build(&file, Purpose::Fit).unwrap();
-    let run = fit(&model.problem, &model.problem.start(), &model.settings, &mut |_| {}).unwrap();
+    let run = fit(
+        &model.problem,
+        &model.problem.start(),
+        &model.settings,
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(run.outcome.status, Status::Converged, "{:?}", run.outcome);
     Some((model, run))
 }
@@ -98,8 +104,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     assert!((inertia / 135.75 - 1.0).abs() <= 0.01, "{inertia}");
     let omega = (821.96 / inertia).sqrt();
     let amplitude = 5f64.to_radians();
-    let equivalent =
-        linear + 8.0 / (3.0 * std::f64::consts::PI) * omega * amplitude * quadratic;
+    let equivalent = linear + 8.0 / (3.0 * std::f64::consts::PI) * omega * amplitude * quadratic;
     assert!((equivalent / 3.26 - 1.0).abs() <= 0.03, "{equivalent}");
 
     let with_offset = format!("{damping}\n  offset: {{basis: constant, start: 0.0}}");
@@ -114,8 +119,7 @@ fn the_roll_decay_with_nonlinear_damping() {
 #[test]
 fn the_roll_decay_with_damping_over_time() {
     for knots in [3, 4] {
-        let damping =
-            format!("  damping: {{basis: piecewise-linear, knots: {knots}, start: 1.0}}");
+        let damping = format!("  damping: {{basis: piecewise-linear, knots: {knots}, start: 1.0}}");
         let Some((model, run)) = roll_decay(&damping) else {
             return;
         };
@@ -125,6 +129,10 @@ fn the_roll_decay_with_damping_over_time() {
         let damping = &run.best.evaluation.device.coefficients[0];
         let at = |t: f64| damping[(t / grid.step()).round() as usize];
         assert!((at(10.0) - 4.8).abs() <= 0.3, "{knots} knots: {}", at(10.0));
-        assert!((at(55.0) - 3.15).abs() <= 0.2, "{knots} knots: {}", at(55.0));
+        assert!(
+            (at(55.0) - 3.15).abs() <= 0.2,
+            "{knots} knots: {}",
+            at(55.0)
+        );
     }
 }

@@ -19,6 +19,8 @@ pub struct Channel {
     times: Vec<f64>,
     places: Vec<Place>,
     observed: Vec<f64>,
+    /// The readings before the filter; none without one.
+    unfiltered: Vec<f64>,
     weighting: Weighting,
     loss: Loss,
     sensor: Sensor,
@@ -79,6 +81,7 @@ impl Channel {
             places: places?,
             times,
             observed: values,
+            unfiltered: Vec::new(),
             weighting,
             loss: Loss::Squares,
             sensor: Sensor::default(),
@@ -154,9 +157,18 @@ impl Channel {
     /// With a zero-phase filter for readings and model; the readings given so far are filtered.
     #[must_use]
     pub fn with_filter(mut self, filter: Vec<SecondOrder>) -> Self {
-        self.observed = zero_phase(&filter, &self.observed);
+        if self.unfiltered.is_empty() {
+            self.unfiltered = std::mem::take(&mut self.observed);
+        }
         self.filter = filter;
+        self.filter_readings();
         self
+    }
+
+    fn filter_readings(&mut self) {
+        if !self.unfiltered.is_empty() {
+            self.observed = zero_phase(&self.filter, &self.unfiltered);
+        }
     }
 
     /// With the weighting exchanged.
@@ -166,7 +178,7 @@ impl Channel {
         self
     }
 
-    /// The first `count` readings, at least one.
+    /// The first `count` readings, at least one; filtered as if there had been no more.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
         let mut part = self.clone();
@@ -174,6 +186,8 @@ impl Channel {
         part.times.truncate(count);
         part.places.truncate(count);
         part.observed.truncate(count);
+        part.unfiltered.truncate(count);
+        part.filter_readings();
         part.around.truncate(count);
         part.base.truncate(count);
         part.weighting.truncate(count);

@@ -3,17 +3,20 @@
 //!
 //! A motion whose period is off by a few per cent fits worse than no motion at all, so descent from
 //! a wrong start ends in a minimum that means nothing. The rungs: the start as given; the
-//! equation-error start; a horizon that grows from an eighth of the record to all of it.
+//! equation-error start; a horizon that grows from an eighth of the record to all of it; states and
+//! functions together, from a motion near the readings.
 
+use super::all_at_once::all_at_once;
 use super::executor::search;
 use super::recorder::Reference;
 use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// A fit explains the record if its misfit is below this share of that of no motion at all, or if
-/// noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// A fit explains the readings of a channel if its misfit is below this share of that of no motion at
+/// all, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another rung.
 const EXPLAINED: f64 = 1e-3;
 /// Parts of the record that the growing horizon fits in turn.
@@ -60,6 +63,7 @@ enum Attempt {
     Functions,
     Data,
     GrowingHorizon,
+    AllAtOnce,
 }
 
 impl Attempt {
@@ -68,6 +72,7 @@ impl Attempt {
             Attempt::Functions => "start values",
             Attempt::Data => "equation error",
             Attempt::GrowingHorizon => "growing horizon",
+            Attempt::AllAtOnce => "motion of the readings",
         }
     }
 }
@@ -88,10 +93,13 @@ pub fn fit(
     if settings.solver == Solver::EquationError {
         return search(problem, start, settings, None, observe);
     }
-    let attempts = match settings.initial {
-        Initial::Functions => [Attempt::Functions, Attempt::Data, Attempt::GrowingHorizon],
-        Initial::Data => [Attempt::Data, Attempt::Functions, Attempt::GrowingHorizon],
+    let first = match settings.initial {
+        Initial::Functions => [Attempt::Functions, Attempt::Data],
+        Initial::Data => [Attempt::Data, Attempt::Functions],
     };
+    let attempts = first
+        .into_iter()
+        .chain([Attempt::GrowingHorizon, Attempt::AllAtOnce]);
     let mut reference = reference(problem, start, settings);
     let climbs = settings.solver == Solver::GaussNewton;
     let mut best: Option<Fit> = None;
@@ -180,10 +188,19 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     }
 }
 
+/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
-    let misfit = fit.best.evaluation.misfit;
+    let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
-    misfit <= EXPLAINED * problem.misfit_of_silence() || noise.is_some_and(|noise| misfit <= noise)
+    let predictions = evaluation.predictions.iter().flatten();
+    let mut channels = problem.channels().zip(predictions);
+    noise.is_some_and(|noise| evaluation.misfit <= noise)
+        || channels.all(|(channel, predicted)| {
+            let silence = channel.cost(&vec![0.0; channel.len()]);
+            let noise = channel.largest_chi_square();
+            let misfit = channel.cost(predicted);
+            misfit <= EXPLAINED * silence || noise.is_some_and(|noise| misfit <= noise)
+        })
 }
 
 fn run(
@@ -216,6 +233,13 @@ fn run(
                     parameters = fit.best.parameters;
                 }
             }
+            search(problem, &parameters, settings, reference, observe)
+        }
+        Attempt::AllAtOnce => {
+            let flag = settings.interrupt.as_ref();
+            let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+            let parameters = all_at_once(problem, start, &interrupted)
+                .unwrap_or_else(|| from_data(problem, start));
             search(problem, &parameters, settings, reference, observe)
         }
     }

@@ -2,6 +2,7 @@
 //! record of what happened are shared.
 
 mod activity;
+mod all_at_once;
 mod conflict;
 mod covariance;
 mod equation_error;
@@ -91,6 +92,10 @@ pub struct FitSettings {
 }
 
 /// Where one iteration led.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one at a time, and nearly all have a point"
+)]
 pub(crate) enum Step {
     /// To a point with lower cost; `length` is the step along the direction. A `hindered` step is
     /// short because longer ones could not be computed: that it is short says nothing of a minimum.

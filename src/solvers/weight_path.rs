@@ -4,6 +4,7 @@ use super::executor::search;
 use super::gauss_newton::linearise_at;
 use super::{Counts, Fit, FitSettings, Row, Rung, Status, fit};
 use crate::dynamics::Breakdown;
+use crate::objective::Channel;
 use crate::problem::Problem;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -100,9 +101,21 @@ impl Problem {
     /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.channels().all(|c| c.weighting().is_sigma());
-        let n = self.reading_count() as f64;
-        known.then(|| n + 2.0 * (2.0 * n).sqrt())
+        known.then(|| largest_chi_square(self.reading_count()))
     }
+}
+
+impl Channel {
+    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
+    pub fn largest_chi_square(&self) -> Option<f64> {
+        let known = self.weighting().is_sigma();
+        known.then(|| largest_chi_square(self.len()))
+    }
+}
+
+fn largest_chi_square(readings: usize) -> f64 {
+    let n = readings as f64;
+    n + 2.0 * (2.0 * n).sqrt()
 }
 
 /// Fits `problem` for a path of factors on the penalties `which`, each from its neighbour, and once

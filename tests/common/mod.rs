@@ -4,6 +4,7 @@
 pub mod closed_form;
 pub mod reference;
 pub mod sensed;
+pub mod synthetic;
 
 use kmcfit::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};

@@ -16,7 +16,7 @@ use super::gauss_newton::{add_penalties, add_variations};
 use super::kinematics::Kinematics;
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::quadrature::trapezoid_weights;
-use crate::dynamics::{Device, Place};
+use crate::dynamics::{Device, Place, Term};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 use measured::Measured;
@@ -37,10 +37,19 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
         .collect();
-    let start = &with_initial_states(problem, start, &motions);
+    from_motions(problem, start, &motions)
+}
+
+/// [`equation_error`] with the motion of each experiment.
+pub(super) fn from_motions(
+    problem: &Problem,
+    start: &[f64],
+    motions: &[Option<Kinematics>],
+) -> Result<Vec<f64>, ConicStatus> {
+    let start = &with_initial_states(problem, start, motions);
     let mut sub = Subproblem::new(problem.parameters());
     let mut experiments = Vec::new();
-    for (experiment, motion) in problem.experiments.iter().zip(&motions) {
+    for (experiment, motion) in problem.experiments.iter().zip(motions) {
         experiments.push(motion.as_ref().map(|motion| {
             let measured = Measured::at_nodes(problem, experiment, motion);
             let root = root_weight(problem, experiment, motion, start);
@@ -137,8 +146,10 @@ fn root_weight(
 ) -> f64 {
     let device = device(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let force_scale = (size(&device.mass) * size(&motion.a))
-        .max(size(&device.coefficients[1]) * size(&motion.y))
+    let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
+    let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
+    let springs = springs.map(|(_, k)| size(k) * size(&motion.y));
+    let force_scale = springs.fold(size(&device.mass) * size(&motion.a), f64::max)
         / motion.size.max(f64::MIN_POSITIVE);
     motion.weight.sqrt() / force_scale
 }
@@ -232,7 +243,7 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
 }
 
 /// `start` with the initial states that are sought taken from the motions, where these begin.
-fn with_initial_states(
+pub(super) fn with_initial_states(
     problem: &Problem,
     start: &[f64],
     motions: &[Option<Kinematics>],

@@ -273,13 +273,34 @@ pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usi
         structured::subproblem(problem, &point.evaluation)
     };
     let readings = sub.residuals.len();
-    sub.constant = robust_surplus(problem, &point.evaluation);
-    add_penalties(problem, &point.parameters, &mut sub);
-    add_variations(problem, &point.parameters, &mut sub);
-    add_priors(problem, &point.parameters, &mut sub);
-    add_soft(problem, &point.parameters, &mut sub);
-    sub.constrain(&problem.constraints, &point.parameters);
+    add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub);
     (sub, readings)
+}
+
+/// The subproblem in parameters and states about any states, which need not be a motion.
+pub(super) fn linearise_about(
+    problem: &Problem,
+    parameters: &[f64],
+    evaluation: &Evaluation,
+) -> Subproblem {
+    let mut sub = structured::subproblem(problem, evaluation);
+    add_the_rest(problem, parameters, evaluation, &mut sub);
+    sub
+}
+
+/// All that the cost and the constraints have beside the readings.
+fn add_the_rest(
+    problem: &Problem,
+    parameters: &[f64],
+    evaluation: &Evaluation,
+    sub: &mut Subproblem,
+) {
+    sub.constant = robust_surplus(problem, evaluation);
+    add_penalties(problem, parameters, sub);
+    add_variations(problem, parameters, sub);
+    add_priors(problem, parameters, sub);
+    add_soft(problem, parameters, sub);
+    sub.constrain(&problem.constraints, parameters);
 }
 
 /// The cost of the readings less the weighted squares that stand for it: none for least squares.

@@ -8,7 +8,7 @@ mod together;
 
 pub(super) use in_band::Band;
 
-use crate::dynamics::State;
+use crate::dynamics::{State, Trajectory};
 use crate::objective::Channel;
 use crate::problem::{Experiment, Problem};
 
@@ -50,11 +50,21 @@ impl Kinematics {
                 Some(stride) => {
                     at_nodes::kinematics(channel, stride, problem.oscillator.grid.step())
                 }
-                None => together::kinematics(problem, experiment, scalars),
+                None => together(problem, experiment, scalars).map(|(near, _)| near),
             },
-            _ => together::kinematics(problem, experiment, scalars),
+            _ => together(problem, experiment, scalars).map(|(near, _)| near),
         }
     }
+}
+
+/// One curve through all channels of an experiment: what is near readings, and the motion at all
+/// nodes.
+pub(super) fn together(
+    problem: &Problem,
+    experiment: &Experiment,
+    scalars: &[f64],
+) -> Option<(Kinematics, Trajectory)> {
+    together::kinematics(problem, experiment, scalars)
 }
 
 /// Standard deviation of the noise from fourth differences, which a smooth motion hardly has: their

@@ -8,11 +8,11 @@
 
 use super::stencil::weights;
 use super::{Kinematics, noise_level, rms, unsensed};
-use crate::dynamics::{ChannelKind, Place, State};
+use crate::dynamics::{ChannelKind, Place, State, Trajectory};
 use crate::objective::{Channel, Weighting};
 use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
-use crate::signal::Spectrum;
+use crate::signal::{Interpolation, Signal, Spectrum};
 use std::f64::consts::TAU;
 
 /// Points of a difference stencil: derivatives are of order 4 or better.
@@ -20,8 +20,15 @@ const POINTS: usize = 6;
 /// Rounds of the search for the smoothing weight, and its decimal exponents.
 const ROUNDS: u32 = 12;
 const EXPONENTS: [f64; 2] = [-12.0, 12.0];
-/// How far below the dominant frequency the band ends in which readings are integrated.
-const BAND: f64 = 6.0;
+/// How much more than without smoothing a smooth curve may miss the readings, where that is more than
+/// their noise.
+const ALLOWED: f64 = 1.05;
+/// How far below the dominant frequency the band ends in which readings are integrated: from readings
+/// full of noise to exact ones. What holds the curve near zero below the band takes a share of
+/// `band^(-2 p)` off the readings, with p the order of their derivative.
+const BAND: [f64; 2] = [6.0, 30.0];
+/// What lies lower than the dominant frequency loses a larger share: so many times as much is allowed.
+const SHARE: f64 = 2.0;
 /// Nodes further than so many median spacings from a reading lie in a gap.
 const GAP: f64 = 1.5;
 /// Dominant periods at the ends of an integrated record that are left out: there the integral still
@@ -40,7 +47,7 @@ pub fn kinematics(
     problem: &Problem,
     experiment: &Experiment,
     scalars: &[f64],
-) -> Option<Kinematics> {
+) -> Option<(Kinematics, Trajectory)> {
     let grid = &problem.oscillator.grid;
     let nodes = experiment.nodes;
     if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
@@ -68,29 +75,31 @@ pub fn kinematics(
     let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
     let near = near_readings(&channels, nodes, grid.start(), step, settling);
     let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
-    let [mut v, mut a] = [Vec::new(), Vec::new()];
-    for &i in &chosen {
-        let [_, slope, curvature] = derivatives(i);
-        v.push(slope);
-        a.push(curvature);
-    }
+    let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
+    let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
     let main = channels.first()?;
     let begins = channels
         .iter()
         .any(|c| c.channel.times()[0] - grid.start() <= GAP * c.spacing());
     let initial = begins.then(|| State {
         displacement: y[0],
-        velocity: derivatives(0)[1],
+        velocity: v[0],
     });
-    (chosen.len() >= POINTS).then(|| Kinematics {
-        y: chosen.iter().map(|&i| y[i]).collect(),
-        v,
-        a,
+    let at_chosen = |f: &[f64]| chosen.iter().map(|&i| f[i]).collect();
+    let near = (chosen.len() >= POINTS).then(|| Kinematics {
+        y: at_chosen(&y),
+        v: at_chosen(&v),
+        a: at_chosen(&a),
         initial,
         size: main.values.iter().fold(0.0f64, |m, x| m.max(x.abs())),
         weight: weight_of(main.channel),
-        nodes: chosen,
-    })
+        nodes: chosen.clone(),
+    })?;
+    let motion = Trajectory {
+        displacement: y.clone(),
+        velocity: v.clone(),
+    };
+    Some((near, motion))
 }
 
 /// A typical weight of a channel's readings.
@@ -126,6 +135,16 @@ impl<'a> Plain<'a> {
         spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
     }
 
+    /// Of as many values at equal distances, linear between the readings.
+    fn spectrum(&self) -> Option<Spectrum> {
+        let times = self.channel.times();
+        let (first, last) = (times.first()?, times.last()?);
+        let spacing = (last - first) / times.len().checked_sub(1)? as f64;
+        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
+    }
+
     fn order(&self) -> usize {
         match self.channel.kind() {
             ChannelKind::Displacement => 0,
@@ -142,14 +161,23 @@ struct Ridge {
     root: f64,
     /// Dominant frequency, Hz.
     frequency: f64,
+    /// What it takes off the readings, in units of their noise.
+    bias: f64,
 }
 
 fn ridge(channels: &[Plain]) -> Option<Ridge> {
     let highest = channels.iter().max_by_key(|c| c.order())?;
-    let frequency = Spectrum::of(&highest.values, highest.spacing())?.dominant();
-    let lowest = TAU * frequency / BAND;
-    let root = lowest.powi(highest.order() as i32) / highest.noise;
-    (frequency > 0.0 && root.is_finite()).then_some(Ridge { root, frequency })
+    let frequency = highest.spectrum()?.dominant();
+    let size = rms(&highest.values) / highest.noise;
+    let order = highest.order() as i32;
+    // As wide as the noise is small: so the share that is lost is no more than the noise.
+    let band = size.powf(0.5 / f64::from(order)).clamp(BAND[0], BAND[1]);
+    let root = (TAU * frequency / band).powi(order) / highest.noise;
+    (frequency > 0.0 && root.is_finite()).then(|| Ridge {
+        root,
+        frequency,
+        bias: SHARE * size * band.powi(-2 * order),
+    })
 }
 
 /// Difference weights of order 0, 1 and 2 at `x` (in steps) on the nodes from `first`.
@@ -184,26 +212,28 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
         for i in 0..nodes {
             sub.residuals.push([(i, ridge.root * share)], 0.0);
         }
-        if sub.residuals.len() > readings && channels.iter().all(|c| c.order() == 2) {
-            return smooth(&sub, nodes, 10f64.powf(EXPONENTS[0]));
-        }
     }
+    let misfit = |candidate: &[f64]| -> f64 {
+        let fitted = sub.residuals.multiply(candidate);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+    };
     let [mut low, mut high] = EXPONENTS;
-    let mut best = None;
+    // What holds an integrated curve near zero may cost more than the noise.
+    let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
+    let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
+    let enough = (ALLOWED * misfit(&best)).max(count * bias * bias);
     for _ in 0..ROUNDS {
         let middle = 0.5 * (low + high);
         let candidate = smooth(&sub, nodes, 10f64.powf(middle))?;
-        let fitted = sub.residuals.multiply(&candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
-        let chi_square: f64 = pairs.map(|(a, b)| (a - b) * (a - b)).sum();
-        if chi_square <= count {
+        if misfit(&candidate) <= enough {
             low = middle;
-            best = Some(candidate);
+            best = candidate;
         } else {
             high = middle;
         }
     }
-    best.or_else(|| smooth(&sub, nodes, 10f64.powf(EXPONENTS[0])))
+    Some(best)
 }
 
 impl Plain<'_> {

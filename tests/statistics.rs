@@ -1,0 +1,264 @@
+//! Estimates under Gaussian noise: without bias, and with the spread of Cramer and Rao. Two hundred
+//! records of each problem, without bounds and penalties.
+
+mod common;
+
+use common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
+use kmcfit::dynamics::{ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit::functions::{CoefficientFunction, Functions, Quantity, Scalar, Value};
+use kmcfit::objective::{Channel, Loss, Sensor, Weighting};
+use kmcfit::problem::{Experiment, Problem};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const NODES: usize = 201;
+const DURATION: f64 = 12.0;
+const SEEDS: u64 = 200;
+/// Of the readings' size: small enough that the problem is linear over the errors that it makes (per
+/// mille to per cent), whose bias of second order is a hundredth of their spread.
+const NOISE: f64 = 0.02;
+const INITIAL: State = State {
+    displacement: 1.5,
+    velocity: -0.8,
+};
+
+/// Readings from clean ones, sigma and a seed.
+type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
+
+/// A device of constants that is read through one channel at all nodes.
+struct Setup {
+    terms: Vec<(Term, Quantity)>,
+    /// Mass first; `None` for what is known.
+    start: Vec<Option<f64>>,
+    truth: Vec<f64>,
+    kind: ChannelKind,
+    excitation: Option<Excitation>,
+    /// Whether the initial state is sought.
+    state: bool,
+    /// Gain and offset, where they are sought.
+    sensor: Option<[f64; 2]>,
+    loss: Loss,
+}
+
+impl Setup {
+    fn free(kind: ChannelKind) -> Self {
+        Self {
+            terms: vec![
+                (Term::Damping, Quantity::Damping),
+                (Term::Stiffness, Quantity::Stiffness),
+            ],
+            truth: vec![1.0, 0.2, 4.0],
+            start: vec![None, Some(0.25), Some(3.8)],
+            kind,
+            excitation: None,
+            state: false,
+            sensor: None,
+            loss: Loss::Squares,
+        }
+    }
+
+    fn forced(kind: ChannelKind) -> Self {
+        let grid = Grid::new(0.0, DURATION, NODES).unwrap();
+        let times = grid.times();
+        let force = times
+            .iter()
+            .map(|t| 2.0 * (1.1 * t).sin() + 1.5 * (2.7 * t).cos());
+        Self {
+            excitation: Some(Excitation::force_at_nodes(&force.collect::<Vec<f64>>())),
+            ..Self::free(kind)
+        }
+    }
+
+    fn oscillator(&self) -> Oscillator {
+        Oscillator {
+            grid: Grid::new(0.0, DURATION, NODES).unwrap(),
+            method: Method::Rk4,
+            terms: self.terms.iter().map(|t| t.0).collect(),
+        }
+    }
+
+    /// The true parameters, in the order of the problem's.
+    fn theta(&self) -> Vec<f64> {
+        let sought = self.truth.iter().zip(&self.start);
+        let mut theta: Vec<f64> = sought.filter_map(|(p, start)| start.map(|_| *p)).collect();
+        if self.state {
+            theta.extend([INITIAL.displacement, INITIAL.velocity]);
+        }
+        theta.extend(self.sensor.iter().flatten());
+        theta
+    }
+
+    fn clean(&self) -> Vec<f64> {
+        let oscillator = self.oscillator();
+        let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
+        let device = Device {
+            mass: each[0].clone(),
+            coefficients: each[1..].to_vec(),
+        };
+        let truth = Truth {
+            oscillator: &oscillator,
+            device: &device,
+            excitation: self.excitation.as_ref(),
+            initial: INITIAL,
+        };
+        let seen = truth.seen(self.kind, &oscillator.grid.times(), &[]);
+        let [gain, offset] = self.sensor.unwrap_or([1.0, 0.0]);
+        seen.iter().map(|x| gain * x + offset).collect()
+    }
+
+    fn problem(&self, values: Vec<f64>, sigma: f64) -> Problem {
+        let oscillator = self.oscillator();
+        let grid = oscillator.grid;
+        let quantities = std::iter::once(Quantity::Mass).chain(self.terms.iter().map(|t| t.1));
+        let list = quantities.zip(self.start.iter().zip(&self.truth));
+        let list = list
+            .map(|(quantity, (start, truth))| match start {
+                Some(start) => CoefficientFunction::constant(quantity, *start, NODES),
+                None => CoefficientFunction::fixed(quantity, vec![*truth; NODES]),
+            })
+            .collect();
+        let scalar = |start: f64| Scalar {
+            name: "a number".into(),
+            unit: String::new(),
+            start,
+            size: 1.0,
+            prior: None,
+        };
+        let mut scalars = Vec::new();
+        let weighting = Weighting::Sigma(sigma);
+        let mut channel =
+            Channel::new(self.kind, grid.times(), values, weighting, &grid, NODES).unwrap();
+        let mut experiment = Experiment::free("record", INITIAL, NODES);
+        experiment.excitation = self.excitation.clone();
+        if self.state {
+            experiment.sought = [Some(0), Some(1)];
+            scalars.extend([scalar(1.3), scalar(-0.6)]);
+        }
+        if self.sensor.is_some() {
+            channel = channel.with_sensor(Sensor {
+                gain: Value::Sought(scalars.len()),
+                offset: Value::Sought(scalars.len() + 1),
+                ..Sensor::default()
+            });
+            scalars.extend([scalar(1.0), scalar(0.0)]);
+        }
+        channel = channel.with_loss(self.loss);
+        let functions = Functions::new(list, NODES, grid.step())
+            .unwrap()
+            .with_scalars(scalars);
+        Problem::new(
+            oscillator,
+            functions,
+            vec![experiment.with_channel(channel)],
+        )
+    }
+
+    /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
+    /// makes of the clean ones and sigma.
+    fn errors(&self, seeds: std::ops::RangeInclusive<u64>, spoil: Spoil) -> Vec<Vec<f64>> {
+        let clean = self.clean();
+        let sigma = NOISE * rms(&clean);
+        let theta = self.theta();
+        let exact = self.problem(clean.clone(), sigma);
+        let covariance = cramer_rao(&exact, &theta);
+        let each = seeds.map(|seed| {
+            let found = run(&self.problem(spoil(&clean, sigma, seed), sigma));
+            let pairs = found.best.parameters.iter().zip(&theta).enumerate();
+            pairs
+                .map(|(j, (a, b))| (a - b) / covariance[(j, j)].sqrt())
+                .collect()
+        });
+        each.collect()
+    }
+
+    fn check(&self, words: &str) {
+        let errors = self.errors(1..=SEEDS, with_noise);
+        let count = SEEDS as f64;
+        for j in 0..errors[0].len() {
+            let mean = errors.iter().map(|e| e[j]).sum::<f64>() / count;
+            let squares = errors.iter().map(|e| (e[j] - mean).powi(2)).sum::<f64>();
+            let spread = (squares / (count - 1.0)).sqrt();
+            let standard = mean * count.sqrt();
+            println!("{words} [{j}]: mean {standard:+.2} standard errors, spread {spread:.3}");
+            // By chance once in two thousand times.
+            assert!(standard.abs() < 3.5, "{words} {j}: {standard}");
+            // The spread of 200 normal values has a standard error of 1/20.
+            assert!((0.82..1.18).contains(&spread), "{words} {j}: {spread}");
+        }
+    }
+}
+
+#[test]
+fn an_acceleration_and_an_unknown_initial_state() {
+    Setup {
+        state: true,
+        ..Setup::free(ChannelKind::Acceleration)
+    }
+    .check("c, k, y(0), v(0) from acceleration");
+}
+
+#[test]
+fn a_gain_and_an_offset() {
+    Setup {
+        sensor: Some([1.2, 0.3]),
+        ..Setup::forced(ChannelKind::Displacement)
+    }
+    .check("c, k, gain, offset");
+}
+
+#[test]
+fn a_cubic_stiffness() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup
+        .terms
+        .push((Term::CubicStiffness, Quantity::CubicStiffness));
+    setup.truth.push(1.5);
+    setup.start.push(Some(1.0));
+    setup.check("c, k, cubic k");
+}
+
+#[test]
+fn a_force_that_gives_the_mass() {
+    let mut setup = Setup::forced(ChannelKind::Velocity);
+    setup.start[0] = Some(1.2);
+    setup.check("m, c, k under a force, from velocity");
+}
+
+/// One reading in twenty is off by 30 standard deviations, to either side.
+fn with_outliers(clean: &[f64], sigma: f64, seed: u64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+    let mut spoiled = with_noise(clean, sigma, seed);
+    for value in &mut spoiled {
+        if random.random_bool(0.05) {
+            let side = if random.random_bool(0.5) { 1.0 } else { -1.0 };
+            *value += side * 30.0 * sigma;
+        }
+    }
+    spoiled
+}
+
+/// Root mean square error in units of the spread of Cramer and Rao without outliers.
+fn with_loss(loss: Loss) -> f64 {
+    let setup = Setup {
+        loss,
+        ..Setup::forced(ChannelKind::Displacement)
+    };
+    let errors = setup.errors(1..=40, with_outliers);
+    rms(&errors.concat())
+}
+
+#[test]
+fn robust_losses_stay_close_where_least_squares_does_not() {
+    let squares = with_loss(Loss::Squares);
+    let huber = with_loss(Loss::Huber { threshold: 1.345 });
+    let student = with_loss(Loss::StudentT { degrees: 4.0 });
+    println!("5 % outliers: squares {squares:.2}, Huber {huber:.2}, Student {student:.2}");
+    // The variance of a reading is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
+    // know that to a tenth.
+    assert!((5.4..8.2).contains(&squares), "{squares}");
+    // Huber (1964): with a share e of outliers and the threshold a = 1.345 the variance is
+    // ((1 - e) E psi^2 + e a^2) / ((1 - e) E psi')^2 = 1.26 of the clean one, the spread 1.12, and that
+    // of Student's t about the same: 1.4 is three of its standard errors more.
+    assert!(huber < 1.4, "{huber}");
+    assert!(student < 1.4, "{student}");
+}
