@@ -19,6 +19,8 @@ use std::time::Instant;
 /// all, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another rung.
 const EXPLAINED: f64 = 1e-3;
+/// Most iterations of a rung before the next is tried: Gauss-Newton from a good start takes some ten.
+const PROBING_ITERATIONS: u64 = 60;
 /// Parts of the record that the growing horizon fits in turn.
 const HORIZONS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 /// Most iterations on each part but the last.
@@ -102,12 +104,18 @@ pub fn fit(
         .chain([Attempt::GrowingHorizon, Attempt::AllAtOnce]);
     let mut reference = reference(problem, start, settings);
     let climbs = settings.solver == Solver::GaussNewton;
+    // A rung that gets stuck in a false valley creeps: the others are tried before it goes on.
+    let mut probing = settings.clone();
+    let capped = climbs && settings.stopping.has_test();
+    if capped {
+        probing.stopping.iterations = settings.stopping.iterations.min(PROBING_ITERATIONS);
+    }
     let mut best: Option<Fit> = None;
     let mut rungs = Vec::new();
     let mut trouble = None;
     for attempt in attempts {
         let clock = Instant::now();
-        let result = run(problem, start, settings, attempt, reference, observe);
+        let result = run(problem, start, &probing, attempt, reference, observe);
         match result {
             Ok(mut fit) => {
                 // With the work that made the start.
@@ -147,7 +155,15 @@ pub fn fit(
         }
     }
     match (best, trouble) {
-        (Some(fit), _) => Ok(Fit { rungs, ..fit }),
+        (Some(fit), _) => {
+            let fit = match fit.outcome.status {
+                Status::MaxIterations if capped => {
+                    gone_on(problem, fit, settings, reference, &mut rungs, observe)?
+                }
+                _ => fit,
+            };
+            Ok(Fit { rungs, ..fit })
+        }
         (None, Some(breakdown)) => Err(breakdown),
         (None, None) => {
             unreachable!("there is at least one attempt, and it ends one way or the other")
@@ -166,6 +182,44 @@ fn reference(problem: &Problem, start: &[f64], settings: &FitSettings) -> Option
     Some(Reference {
         cost: evaluation.cost,
         norm_squared: gradient.norm_squared,
+    })
+}
+
+/// The fit that came furthest, given the iterations that it was not given as one rung of several.
+fn gone_on(
+    problem: &Problem,
+    fit: Fit,
+    settings: &FitSettings,
+    reference: Option<Reference>,
+    rungs: &mut Vec<Rung>,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<Fit, Breakdown> {
+    let mut settings = settings.clone();
+    let taken = fit.history.len() as u64;
+    settings.stopping.iterations = settings.stopping.iterations.saturating_sub(taken);
+    if settings.stopping.iterations == 0 {
+        return Ok(fit);
+    }
+    let start = &fit.best.parameters;
+    let more = search(problem, start, &settings, reference, observe)?;
+    rungs.push(Rung {
+        name: "best of these, continued",
+        initial_cost: more.started_from,
+        cost: more.best.evaluation.cost,
+        iterations: more.history.len() as u64,
+        outcome: more.outcome.clone(),
+    });
+    let mut history = fit.history;
+    history.extend(more.history.into_iter().map(|row| Row {
+        iteration: row.iteration + taken,
+        ..row
+    }));
+    Ok(Fit {
+        history,
+        snapshots: fit.snapshots,
+        counts: fit.counts + more.counts,
+        elapsed: fit.elapsed + more.elapsed,
+        ..more
     })
 }
 
