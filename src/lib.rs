@@ -2,25 +2,29 @@
 //!
 //! # Equations
 //!
-//! **Motion.** A device with mass `m(t) > 0` (kg), damping `c(t)` (N s/m) and stiffness `k(t)` (N/m)
-//! moves from a known state `y(0)`, `y'(0)` by
+//! **Motion.** A device with mass `m(t) > 0` (kg), damping `c(t)` (N s/m), stiffness `k(t)` (N/m) and
+//! further terms ([`dynamics::Term`]) moves from a state `y(0)`, `y'(0)`, known or sought, by
 //!
 //! ```text
-//! m y'' + c y' + k y = f,    f = 0 for free motion
+//! m (y'' + b'') + c y' + k y + sum_j p_j phi_j(y, y') = f
 //! ```
 //!
-//! stepped by an explicit Runge–Kutta method on equally spaced nodes. Each function is a basis times
+//! under a force `f` and on a base `b`, relative to which `y` counts; stepped by an explicit Runge–Kutta method on equally spaced nodes. Each function is a basis times
 //! parameters, and `theta` are the parameters of all.
 //!
 //! **Cost.** The fit minimises, without a factor 1/2,
 //!
 //! ```text
 //! J(theta) = sum over records     of  integral (y - y_obs)^2 dt             (no sigma given)
-//!                                 or  sum over readings ((y - y_obs)/sigma)^2
+//!                                 or  sum over readings rho((z - z_obs)/sigma)
 //!          + sum over penalties   of  weight * integral (d^q p/dt^q - ref)^2 dt    (ref: q = 0 only)
 //!          + sum over variations  of  weight * total variation of p
 //!          + sum over soft groups of  weight * mean over rows of excess^2
+//!          + sum over priors      of  ((x - mean)/sigma)^2
 //! ```
+//!
+//! where `z = gain * (y, y' or y'') + offset + drift * t` is the model of a reading
+//! ([`objective::Channel`]) and `rho(u) = u^2` or a robust loss ([`objective::Loss`]),
 //!
 //! subject to linear rows and second-order cones in `theta`. [`problem::Problem::evaluate`] computes
 //! it; the integral over the readings is the trapezoid rule.

@@ -2,6 +2,7 @@
 
 use crate::constraints::RowGroup;
 use crate::functions::{Penalty, Quantity};
+use crate::objective::Loss;
 use crate::problem::Problem;
 use crate::solvers::Solver;
 use serde::{Deserialize, Serialize};
@@ -41,10 +42,12 @@ impl CostKind {
             CostKind::Integral => {
                 "integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s)"
             }
-            CostKind::ChiSquare => "sum over the readings of ((y - y_obs)/sigma)^2 (chi-square)",
+            CostKind::ChiSquare => {
+                "sum over the readings of ((model - reading)/sigma)^2 (chi-square)"
+            }
             CostKind::Mixed => {
                 "integral (y - y_obs)^2 dt over the records without sigma (trapezoid rule over the \
-                 readings, m^2 s) + sum of ((y - y_obs)/sigma)^2 over the readings with sigma \
+                 readings, m^2 s) + sum of ((model - reading)/sigma)^2 over the readings with sigma \
                  (chi-square)"
             }
             CostKind::EquationError => {
@@ -60,7 +63,15 @@ impl CostKind {
 /// its weight.
 pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
     let quantities: Vec<Quantity> = problem.functions.iter().map(|f| f.quantity).collect();
-    let misfit = CostKind::of(problem, solver).misfit().to_string();
+    let misfit = CostKind::of(problem, solver).misfit().to_string() + &robust(problem);
+    let scalars = problem.functions.scalars().iter();
+    let priors = scalars.filter_map(|s| {
+        let prior = s.prior?;
+        Some(format!(
+            "(({} - {:?})/{:?})^2",
+            s.name, prior.mean, prior.sigma
+        ))
+    });
     let smooth = (problem.penalties.iter()).map(|p| penalty(p, quantities[p.function].symbol()));
     let jumps = problem.variations.iter().map(|variation| {
         let symbol = quantities[variation.function].symbol();
@@ -70,8 +81,32 @@ pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
         .chain(smooth)
         .chain(jumps)
         .chain(problem.soft.iter().map(soft))
+        .chain(priors)
         .collect();
     format!("J = {}", terms.join(" + "))
+}
+
+/// What robust losses put in the place of squares.
+fn robust(problem: &Problem) -> String {
+    let mut said: Vec<String> = Vec::new();
+    for channel in problem.channels() {
+        let words = match channel.loss() {
+            Loss::Squares => continue,
+            Loss::Huber { threshold } => format!(
+                ", where u^2 of the {} is 2*{threshold:?}*|u| - {threshold:?}^2 beyond |u| = \
+                 {threshold:?} (Huber)",
+                channel.kind().name()
+            ),
+            Loss::StudentT { degrees } => format!(
+                ", where u^2 of the {} is ({degrees:?} + 1) ln(1 + u^2/{degrees:?}) (Student's t)",
+                channel.kind().name()
+            ),
+        };
+        if !said.contains(&words) {
+            said.push(words);
+        }
+    }
+    said.concat()
 }
 
 fn penalty(penalty: &Penalty, symbol: &str) -> String {
