@@ -42,6 +42,28 @@ fn paper() {
 }
 
 #[test]
+fn further_experiments() {
+    let bench = Workbench::with_shipped_models();
+    for (name, experiment) in [("second", "second record"), ("forced", "forced record")] {
+        let out = format!("data/paper_{name}.csv");
+        let simulate = [
+            "simulate",
+            "models/paper-experiments.yaml",
+            "--experiment",
+            experiment,
+            "--out",
+            &out,
+        ];
+        fs::remove_file(bench.path(&out)).expect("a file can be removed");
+        bench.run_to(0, &simulate);
+        assert!(
+            bench.read(&out) == shipped(&format!("paper_{name}.csv")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
 fn noisy() {
     let bench = Workbench::with_shipped_models();
     let simulate = [

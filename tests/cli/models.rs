@@ -39,6 +39,9 @@ fn every_shipped_model_is_run_here() {
         "knots.yaml",
         "spline.yaml",
         "noisy.yaml",
+        "paper-experiments.yaml",
+        "paper-two-records.yaml",
+        "paper-forced.yaml",
         "accelerometer.yaml",
         "hammer-and-shaker.yaml",
         "duffing.yaml",
@@ -386,4 +389,29 @@ fn camera() {
     assert!((sigma.expect("a number") - 0.002).abs() < 3e-4, "{sigma:?}");
     let drift = scalar(&result, "drift of the displacement of photographs");
     assert!((drift - 0.002).abs() < 2e-4, "{drift}");
+}
+
+/// Two free records give the ratios and leave the scale; a force gives the scale as well.
+#[test]
+fn two_records_and_a_force() {
+    let largest = |bench: &Workbench, run: &str, of: &str, truth: &dyn Fn(&[f64]) -> f64| {
+        let text = bench.read(&format!("runs/{run}/functions.csv"));
+        let columns = ["true_mass_kg", "true_stiffness_N_per_m"].map(|c| column(&text, c));
+        let found = column(&text, of);
+        let off = (0..found.len()).map(|i| {
+            let true_value = truth(&[columns[0][i], columns[1][i]]);
+            (found[i] / true_value - 1.0).abs()
+        });
+        off.fold(0.0, f64::max)
+    };
+    let ratio = |t: &[f64]| t[1] / t[0];
+    let (bench, _) = fitted("paper-two-records", 0);
+    let off = largest(&bench, "paper-two-records", "k_over_m_per_s2", &ratio);
+    assert!(off < 5e-3, "{off}");
+    // Where nothing holds the scale, smoothness takes it as low as the bounds let it.
+    let off = largest(&bench, "paper-two-records", "mass_kg", &|t| t[0]);
+    assert!(off > 0.5, "{off}");
+    let (bench, _) = fitted("paper-forced", 0);
+    let off = largest(&bench, "paper-forced", "mass_kg", &|t| t[0]);
+    assert!(off < 5e-3, "{off}");
 }
