@@ -121,7 +121,9 @@ impl Bootstrap {
         }
         let mut mean = vec![0.0; n];
         for theta in self.found() {
-            mean.iter_mut().zip(theta).for_each(|(m, t)| *m += t / count as f64);
+            mean.iter_mut()
+                .zip(theta)
+                .for_each(|(m, t)| *m += t / count as f64);
         }
         let mut covariance = DMatrix::zeros(n, n);
         for theta in self.found() {

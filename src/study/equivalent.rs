@@ -52,7 +52,9 @@ impl Motion {
         let motion = &evaluation.trajectories[e];
         let nodes = experiment.nodes;
         let excitation = experiment.excitation.as_ref();
-        let force = excitation.and_then(|x| x.force.as_ref()).map(|f| f.at_nodes());
+        let force = excitation
+            .and_then(|x| x.force.as_ref())
+            .map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
             let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
@@ -121,7 +123,8 @@ pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, 
     let weights = trapezoid_weights(n, step);
     for (i, w) in weights.iter().enumerate() {
         let root = (w / duration).sqrt();
-        sub.residuals.push([(i, root)], root * wish.damping[i] / large_c);
+        sub.residuals
+            .push([(i, root)], root * wish.damping[i] / large_c);
     }
     let slope = (wish.smoothness[0] * duration / step).sqrt();
     for i in 0..n - 1 {
@@ -138,7 +141,11 @@ pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, 
             (n + i, large_k * motion.displacement[i] / inertia),
         ];
         sub.equalities.push(row, needed / inertia);
-        sub.bound([(n + i, 1.0)], wish.least_stiffness / large_k, f64::INFINITY);
+        sub.bound(
+            [(n + i, 1.0)],
+            wish.least_stiffness / large_k,
+            f64::INFINITY,
+        );
         if let Some(least) = wish.least_damping {
             sub.bound([(i, 1.0)], least / large_c, f64::INFINITY);
         }
@@ -163,13 +170,13 @@ pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, 
 /// nodes by linear interpolation; as far from `c` as the square of the step.
 pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
     let y = &motion.displacement;
-    let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| {
-        f(i) + share * (f(i + 1) - f(i))
-    };
+    let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
     let crossing = |i: usize| {
         (y[i] * y[i + 1] <= 0.0 && y[i] != y[i + 1] && y[i + 1] != 0.0).then(|| {
             let share = y[i] / (y[i] - y[i + 1]);
-            let force = at(i, share, &|i| motion.force[i] - mass[i] * motion.acceleration[i]);
+            let force = at(i, share, &|i| {
+                motion.force[i] - mass[i] * motion.acceleration[i]
+            });
             let velocity = at(i, share, &|i| motion.velocity[i]);
             let time = motion.grid.time(i) + share * motion.grid.step();
             (time, force / velocity)
@@ -180,7 +187,9 @@ pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
 
 fn rms(values: &[f64]) -> f64 {
     let squares: f64 = values.iter().map(|v| v * v).sum();
-    (squares / values.len() as f64).sqrt().max(f64::MIN_POSITIVE.sqrt())
+    (squares / values.len() as f64)
+        .sqrt()
+        .max(f64::MIN_POSITIVE.sqrt())
 }
 
 /// How far the equation is from holding along the motion for `device`, N at the nodes.

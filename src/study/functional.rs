@@ -85,7 +85,9 @@ impl Linear {
         let mut constant = 0.0;
         for (node, weight) in weights {
             if weight != 0.0 {
-                list.design.row(node).for_each(|(j, b)| dense[j] += weight * b);
+                list.design
+                    .row(node)
+                    .for_each(|(j, b)| dense[j] += weight * b);
                 constant += weight * list.offset[node];
             }
         }
@@ -107,7 +109,11 @@ impl Linear {
     /// `sqrt(a^T C a)`: its standard deviation for the covariance `C` of the parameters.
     pub fn deviation(&self, covariance: &nalgebra::DMatrix<f64>) -> f64 {
         let row = |&(i, a): &(usize, f64)| -> f64 {
-            let sum: f64 = self.entries.iter().map(|(j, b)| b * covariance[(i, *j)]).sum();
+            let sum: f64 = self
+                .entries
+                .iter()
+                .map(|(j, b)| b * covariance[(i, *j)])
+                .sum();
             a * sum
         };
         self.entries.iter().map(row).sum::<f64>().max(0.0).sqrt()

@@ -118,7 +118,11 @@ pub fn starts(problem: &Problem, how: &Multistart) -> Vec<Vec<f64>> {
     let drawn = (0..how.starts).map(|i| columns.iter().map(|c| c[i]).collect::<Vec<f64>>());
     match &how.ranges {
         Ranges::Parameters(ranges) => {
-            assert_eq!(ranges.len(), problem.parameters(), "one range per parameter");
+            assert_eq!(
+                ranges.len(),
+                problem.parameters(),
+                "one range per parameter"
+            );
             drawn.collect()
         }
         Ranges::Constants(ranges) => {
@@ -146,7 +150,9 @@ fn constants(problem: &Problem, levels: &[f64]) -> Vec<f64> {
 pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     let starts = starts(problem, how);
     let runs = map(starts.len(), how.threads, |i| run(problem, how, &starts[i]));
-    let mut order: Vec<usize> = (0..runs.len()).filter(|i| runs[*i].found.is_some()).collect();
+    let mut order: Vec<usize> = (0..runs.len())
+        .filter(|i| runs[*i].found.is_some())
+        .collect();
     let cost = |i: &usize| {
         let found = runs[*i].found.as_ref();
         found.map_or(f64::INFINITY, |f| f.evaluation.cost)
@@ -168,7 +174,10 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
         reason,
     };
     let Some(start) = nearest(problem, start, &sizes(problem, start)) else {
-        return failed(start, "the start cannot be brought into the constraints".into());
+        return failed(
+            start,
+            "the start cannot be brought into the constraints".into(),
+        );
     };
     let result = match how.ladder {
         true => fit(problem, &start, &how.settings, &mut |_| {}),
@@ -192,7 +201,10 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
 impl Waterfall {
     /// Sorted costs.
     pub fn costs(&self) -> Vec<f64> {
-        let found = self.order.iter().filter_map(|i| self.runs[*i].found.as_ref());
+        let found = self
+            .order
+            .iter()
+            .filter_map(|i| self.runs[*i].found.as_ref());
         found.map(|f| f.evaluation.cost).collect()
     }
 
@@ -250,7 +262,10 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
         let nodes = a.displacement.iter().zip(&b.displacement);
         nodes.map(|(a, b)| a - b)
     });
-    let own = a.trajectories.iter().flat_map(|t| t.displacement.iter().copied());
+    let own = a
+        .trajectories
+        .iter()
+        .flat_map(|t| t.displacement.iter().copied());
     let (change, own) = (rms(changes), rms(own));
     Distance {
         ratios,

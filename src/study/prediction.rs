@@ -94,7 +94,9 @@ pub fn predict(
             let variance: f64 = spread.row(i).dot(&jacobian.row(i));
             Z_95 * variance.max(0.0).sqrt()
         };
-        (0..y.len()).map(|i| [y[i] - width(i), y[i] + width(i)]).collect()
+        (0..y.len())
+            .map(|i| [y[i] - width(i), y[i] + width(i)])
+            .collect()
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;

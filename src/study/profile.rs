@@ -209,7 +209,10 @@ pub fn profile(
 /// Names of the constraints that are active at a point, the profile's own row left out.
 fn names(problem: &Problem, point: &Point) -> Vec<String> {
     let active = active_constraints(problem, point).into_iter();
-    active.map(|group| group.name).filter(|name| name != HELD).collect()
+    active
+        .map(|group| group.name)
+        .filter(|name| name != HELD)
+        .collect()
 }
 
 /// The problem with the number held at `value`.
@@ -289,8 +292,10 @@ impl Walk<'_> {
         // The point of the constraints whose number is nearest to what is far.
         let unit = (far - here).abs().max(f64::MIN_POSITIVE);
         let mut sub = Subproblem::new(theta.len());
-        sub.residuals
-            .push(self.of.entries.iter().map(|(j, a)| (*j, a / unit)), (far - here) / unit);
+        sub.residuals.push(
+            self.of.entries.iter().map(|(j, a)| (*j, a / unit)),
+            (far - here) / unit,
+        );
         sub.constrain(&self.problem.constraints, theta);
         for (d, size) in sub.proximal.iter_mut().zip(&self.sizes) {
             *d = 1e-12 / (size * size);
@@ -331,7 +336,11 @@ impl Walk<'_> {
                 return (None, End::Bound);
             }
             let wanted = here.value + side * step;
-            let value = if (limit - wanted) * side < 0.0 { limit } else { wanted };
+            let value = if (limit - wanted) * side < 0.0 {
+                limit
+            } else {
+                wanted
+            };
             let guess = extrapolated(behind.as_ref(), &here, value);
             let fit = self.fit(self.problem, value, &guess);
             let fit = fit.or_else(|_| self.fit(self.problem, value, &here.point.parameters));

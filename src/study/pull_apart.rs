@@ -126,7 +126,9 @@ pub struct Band {
 
 /// The targets of a tube of function `function` at `times` (s), those on the grid.
 pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Target> {
-    let each = times.iter().filter_map(|t| Linear::value(problem, function, *t));
+    let each = times
+        .iter()
+        .filter_map(|t| Linear::value(problem, function, *t));
     each.map(Target::Linear).collect()
 }
 
@@ -149,14 +151,19 @@ pub fn tube(
     threads: usize,
 ) -> Option<Vec<Band>> {
     let search = Search { problem, level };
-    let usable: Vec<&Vec<f64>> = starts.iter().filter(|s| search.point(s).is_some()).collect();
+    let usable: Vec<&Vec<f64>> = starts
+        .iter()
+        .filter(|s| search.point(s).is_some())
+        .collect();
     if usable.is_empty() {
         return None;
     }
     let job = |index: usize| {
         let target = &targets[index / 2];
         let side = if index % 2 == 0 { -1.0 } else { 1.0 };
-        let found = usable.iter().filter_map(|start| search.extreme(start, target, side));
+        let found = usable
+            .iter()
+            .filter_map(|start| search.extreme(start, target, side));
         found
             .max_by(|a, b| (side * a.value).total_cmp(&(side * b.value)))
             .expect("the start was within the level")
@@ -184,7 +191,9 @@ pub fn extreme(
 /// The misfit of the readings plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     let scalars = problem.functions.scalars().iter();
-    let priors = scalars.zip(problem.scalars(theta)).map(|(s, x)| s.price(*x));
+    let priors = scalars
+        .zip(problem.scalars(theta))
+        .map(|(s, x)| s.price(*x));
     evaluation.misfit + priors.sum::<f64>()
 }
 
@@ -278,7 +287,8 @@ impl Search<'_> {
         add_priors(self.problem, theta, &mut sub);
         let readings = std::mem::take(&mut sub.residuals);
         sub.residuals = Rows::new();
-        sub.cones.push(ball(&readings, AIM * self.level.misfit.sqrt()));
+        sub.cones
+            .push(ball(&readings, AIM * self.level.misfit.sqrt()));
         let ranges = self.problem.functions.ranges();
         for (penalty, budget) in &self.level.budgets {
             let range = ranges[penalty.function].clone();
@@ -346,12 +356,7 @@ impl Search<'_> {
         moved
     }
 
-    fn solved(
-        &self,
-        sub: &Subproblem,
-        evaluation: &Evaluation,
-        sizes: &[f64],
-    ) -> Option<Vec<f64>> {
+    fn solved(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Option<Vec<f64>> {
         let units = self.units(sub, evaluation, sizes);
         let solution = sub.in_units(&units).solve();
         matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost).then(|| {
@@ -393,14 +398,19 @@ fn ball(rows: &Rows, radius: f64) -> Cone {
     let mut cone = Rows::new();
     cone.push([], -1.0);
     for i in 0..rows.len() {
-        cone.push(rows.row(i).map(|(j, a)| (j, a / radius)), rows.right()[i] / radius);
+        cone.push(
+            rows.row(i).map(|(j, a)| (j, a / radius)),
+            rows.right()[i] / radius,
+        );
     }
     Cone { rows: cone }
 }
 
 fn rms(values: &[f64]) -> f64 {
     let squares: f64 = values.iter().map(|v| v * v).sum();
-    (squares / values.len() as f64).sqrt().max(f64::MIN_POSITIVE.sqrt())
+    (squares / values.len() as f64)
+        .sqrt()
+        .max(f64::MIN_POSITIVE.sqrt())
 }
 
 /// How large the number is, by the sizes of the parameters in it.

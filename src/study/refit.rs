@@ -32,7 +32,10 @@ pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
         return vec![1.0; theta.len()];
     };
     let natural = problem.natural_sizes(&evaluation);
-    let largest = natural.iter().copied().fold(f64::MIN_POSITIVE.sqrt(), f64::max);
+    let largest = natural
+        .iter()
+        .copied()
+        .fold(f64::MIN_POSITIVE.sqrt(), f64::max);
     let mut sizes = vec![0.0; theta.len()];
     for (range, size) in problem.functions.ranges().iter().zip(&natural) {
         sizes[range.clone()].fill(if *size > 0.0 { *size } else { largest });
@@ -53,7 +56,9 @@ pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f6
     if problem.constraints.are_simple() {
         let mut clipped = theta.to_vec();
         problem.constraints.clip(&mut clipped);
-        let holds = problem.constraints.hold(&clipped, crate::constraints::TOLERANCE);
+        let holds = problem
+            .constraints
+            .hold(&clipped, crate::constraints::TOLERANCE);
         return holds.then_some(clipped);
     }
     let metric: Vec<f64> = sizes.iter().map(|s| 1.0 / (s * s)).collect();

@@ -121,7 +121,8 @@ pub fn variation(
 ) -> Result<Vec<Varies>, Breakdown> {
     let varies = |f: &usize| problem.functions.ranges()[*f].len() > 1;
     let each = (0..problem.functions.ranges().len()).filter(varies);
-    each.map(|f| of_function(problem, optimum, f, how)).collect()
+    each.map(|f| of_function(problem, optimum, f, how))
+        .collect()
 }
 
 /// The verdict on function `function` alone.
@@ -140,8 +141,14 @@ pub fn of_function(
     let start = nearest(&reduced.problem, &start, &sizes_of).unwrap_or(start);
     let constant = fit_from(&reduced.problem, &start, &settings())?.best;
     let embedded = reduced.embed(&constant.parameters);
-    let there = fit_from(problem, optimum, &settings())?.best.evaluation.cost;
-    let here = fit_from(problem, &embedded, &settings())?.best.evaluation.cost;
+    let there = fit_from(problem, optimum, &settings())?
+        .best
+        .evaluation
+        .cost;
+    let here = fit_from(problem, &embedded, &settings())?
+        .best
+        .evaluation
+        .cost;
     let readings = problem.reading_count() as f64;
     let sigma = problem.channels().all(|c| c.weighting().is_sigma());
     let ratio = |constant: f64, varying: f64| match sigma {
@@ -247,7 +254,11 @@ impl Reduced {
             *group = kept;
         }
         let soft = groups(&whole.soft);
-        let penalties = whole.penalties.iter().filter_map(|p| self.penalty(p)).collect();
+        let penalties = whole
+            .penalties
+            .iter()
+            .filter_map(|p| self.penalty(p))
+            .collect();
         let variations = whole.variations.iter();
         let variations = variations.filter(|v| v.function != self.function).cloned();
         let variations = variations.collect();
@@ -307,7 +318,12 @@ impl Reduced {
     fn mean_of(&self, theta: &[f64]) -> Vec<f64> {
         let end = self.place + self.one.len();
         // The constant nearest to the parameters.
-        let along: f64 = self.one.iter().zip(&theta[self.place..end]).map(|(o, t)| o * t).sum();
+        let along: f64 = self
+            .one
+            .iter()
+            .zip(&theta[self.place..end])
+            .map(|(o, t)| o * t)
+            .sum();
         let own: f64 = self.one.iter().map(|o| o * o).sum();
         [&theta[..self.place], &[along / own], &theta[end..]].concat()
     }
@@ -335,7 +351,10 @@ impl Linearised {
             let residuals = penalty.residuals(&theta[range.clone()]);
             for (i, r) in residuals.iter().enumerate() {
                 let mut row = DVector::zeros(n);
-                penalty.rows.row(i).for_each(|(j, a)| row[range.start + j] += root * a);
+                penalty
+                    .rows
+                    .row(i)
+                    .for_each(|(j, a)| row[range.start + j] += root * a);
                 rest.push((row, -root * r));
             }
         }
@@ -364,7 +383,10 @@ impl Linearised {
             .flat_map(|c| (0..c.len()).map(|i| c.weighting().weight(i, c.len()).sqrt()));
         Self {
             spans: [span(constant), span(varying)],
-            noise: roots.zip(&sigmas).map(|(root, sigma)| root * sigma).collect(),
+            noise: roots
+                .zip(&sigmas)
+                .map(|(root, sigma)| root * sigma)
+                .collect(),
             asked: rest.iter().map(|(_, b)| *b).collect(),
         }
     }
