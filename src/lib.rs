@@ -56,8 +56,10 @@
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
 //!    starts, the choice of a weight; and the equation error, which simulates nothing.
 //! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.
-//! 9. [`report`] writes tables, figures and the result document, and compares runs.
-//! 10. [`cli`] is one file per command.
+//! 9. [`study`] asks what the readings say beyond one fit: profiles, equivalent and extreme devices,
+//!    many starts, whether a function varies at all, bootstrap, prediction.
+//! 10. [`report`] writes tables, figures and the result document, and compares runs.
+//! 11. [`cli`] is one file per command.
 //!
 //! Beside these, [`units`] knows units and their factors to SI, and [`signal`] what lies between
 //! samples, shapes of excitation, filters and spectra.
@@ -135,4 +137,5 @@ pub mod qp;
 pub mod report;
 pub mod signal;
 pub mod solvers;
+pub mod study;
 pub mod units;

@@ -165,6 +165,25 @@ impl Channel {
         self
     }
 
+    /// With other readings: `predicted`, as the model says them (after the filter), plus `noise` as a
+    /// sensor adds it (before the filter).
+    ///
+    /// # Panics
+    /// If there is not one of each for every reading.
+    #[must_use]
+    pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
+        assert_eq!(predicted.len(), self.len(), "one for each reading");
+        assert_eq!(noise.len(), self.len(), "one for each reading");
+        let filtered = match self.filter.is_empty() {
+            true => noise.to_vec(),
+            false => zero_phase(&self.filter, noise),
+        };
+        let pairs = predicted.iter().zip(&filtered);
+        self.observed = pairs.map(|(y, e)| y + e).collect();
+        self.unfiltered.clear();
+        self
+    }
+
     fn filter_readings(&mut self) {
         if !self.unfiltered.is_empty() {
             self.observed = zero_phase(&self.filter, &self.unfiltered);

@@ -84,6 +84,19 @@ pub(super) fn search(
     result.solver.finish(counts)
 }
 
+/// One search from `start` alone, without the ladder of [`fit`](super::fit): for fits whose start is
+/// near an optimum, or whose start is the question.
+///
+/// # Errors
+/// A [`Breakdown`] if the start itself has no motion.
+pub fn fit_from(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+) -> Result<Fit, Breakdown> {
+    search(problem, start, settings, None, &mut |_| {})
+}
+
 fn method(solver: Solver) -> Box<dyn Descend> {
     match solver {
         Solver::SteepestDescent => Box::<SteepestDescent>::default(),

@@ -26,7 +26,8 @@ mod weight_path;
 
 pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::{Measurements, Unsuited, equation_error};
-pub use executor::Fit;
+pub use executor::{Fit, fit_from};
+pub(crate) use gauss_newton::{add_priors, linear_readings, weighted_jacobian};
 pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
 pub use kinematics::states_from_readings;

@@ -9,7 +9,7 @@
 mod dense;
 mod structured;
 
-pub(super) use dense::weighted_jacobian;
+pub(crate) use dense::weighted_jacobian;
 
 use super::infeasible::no_step;
 use super::point::Work;
@@ -264,14 +264,21 @@ fn linearise(work: &mut Work, point: &Point) -> Subproblem {
     linearise_at(work.problem(), point).0
 }
 
+/// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
+/// variables are the change of the parameters; with many of them the changes of the states follow,
+/// tied to them by equalities.
+pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    if problem.parameters() <= FEW_PARAMETERS {
+        dense::subproblem(problem, evaluation)
+    } else {
+        structured::subproblem(problem, evaluation)
+    }
+}
+
 /// [`linearise`] without counting, and the number of residual rows that belong to the readings:
 /// they come first.
 pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usize) {
-    let mut sub = if problem.parameters() <= FEW_PARAMETERS {
-        dense::subproblem(problem, &point.evaluation)
-    } else {
-        structured::subproblem(problem, &point.evaluation)
-    };
+    let mut sub = linear_readings(problem, &point.evaluation);
     let readings = sub.residuals.len();
     add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub);
     (sub, readings)
@@ -319,7 +326,7 @@ fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
 }
 
 /// `(x + delta - mean) / sigma` of the scalars' priors as residual rows.
-pub(super) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     let functions = &problem.functions;
     for (index, scalar) in functions.scalar_range().zip(functions.scalars()) {
         if let Some(prior) = scalar.prior {

@@ -1,0 +1,157 @@
+//! Intervals from fits to simulated readings.
+//!
+//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to readings
+//! made from the optimum's predictions plus noise: normal with the readings' sigma (parametric), or
+//! the residuals themselves drawn with replacement within each channel, after their mean is taken off
+//! and they are widened by `sqrt(n / (n - p))` (residual). What is not in the predictions, a prior or
+//! a penalty, stays as it is.
+//!
+//! Source: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap*, Chapman & Hall 1993,
+//! chapters 6, 9 and 13.
+
+use super::functional::Linear;
+use super::parallel::map;
+use super::refit::settings;
+use super::simulate::{normal, sigmas, stream, with_readings};
+use crate::dynamics::Breakdown;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::solvers::{Status, fit_from};
+use nalgebra::DMatrix;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// Where the noise of a replicate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Noise {
+    /// Normal, with the sigma of the readings or that of the residuals.
+    Parametric,
+    /// The residuals, drawn again.
+    Residual,
+}
+
+/// The refits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bootstrap {
+    /// The optimum that the replicates start from.
+    pub optimum: Vec<f64>,
+    /// Parameters of each refit, in the order of the replicates; `Err` says why there is none.
+    pub replicates: Vec<Result<Vec<f64>, String>>,
+    /// The seed.
+    pub seed: u64,
+}
+
+/// `count` refits about `optimum`, on up to `threads` threads; the same bits for any number of them.
+///
+/// # Errors
+/// A [`Breakdown`] if the optimum has no motion.
+pub fn bootstrap(
+    problem: &Problem,
+    optimum: &[f64],
+    noise: Noise,
+    count: usize,
+    seed: u64,
+    threads: usize,
+) -> Result<Bootstrap, Breakdown> {
+    let evaluation = problem.evaluate(optimum)?;
+    let sigmas = sigmas(problem, &evaluation);
+    let job = |index: usize| {
+        let mut random = stream(seed, index);
+        let errors = match noise {
+            Noise::Parametric => {
+                let unit = normal(&mut random, sigmas.len());
+                unit.iter().zip(&sigmas).map(|(u, s)| u * s).collect()
+            }
+            Noise::Residual => drawn(problem, &evaluation, &mut random),
+        };
+        let simulated = with_readings(problem, &evaluation, &errors);
+        match fit_from(&simulated, optimum, &settings()) {
+            Err(breakdown) => Err(breakdown.to_string()),
+            Ok(fit) => match fit.outcome.status {
+                Status::Converged | Status::Completed => Ok(fit.best.parameters),
+                _ => Err(fit.outcome.reason),
+            },
+        }
+    };
+    Ok(Bootstrap {
+        replicates: map(count, threads, job),
+        optimum: optimum.to_vec(),
+        seed,
+    })
+}
+
+/// Residuals of every channel, centred, widened and drawn again. Readings with sigmas of their own
+/// keep them: what is drawn is the residual in units of sigma.
+fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
+    let readings = problem.reading_count() as f64;
+    let freedom = (readings - problem.parameters() as f64).max(1.0);
+    let wider = (readings / freedom).sqrt();
+    let mut all = Vec::with_capacity(problem.reading_count());
+    let predictions = evaluation.predictions.iter().flatten();
+    for (channel, predicted) in problem.channels().zip(predictions) {
+        let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
+        let residuals = channel.residuals(predicted).enumerate();
+        let units: Vec<f64> = residuals.map(|(i, r)| -r / sigma(i)).collect();
+        let mean = units.iter().sum::<f64>() / units.len() as f64;
+        for i in 0..units.len() {
+            let pick = units[random.random_range(0..units.len())];
+            all.push(wider * (pick - mean) * sigma(i));
+        }
+    }
+    all
+}
+
+impl Bootstrap {
+    /// The parameters of the refits that succeeded.
+    pub fn found(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.replicates.iter().filter_map(|r| r.as_ref().ok())
+    }
+
+    /// How many refits failed.
+    pub fn failures(&self) -> usize {
+        self.replicates.iter().filter(|r| r.is_err()).count()
+    }
+
+    /// Covariance of the refits about their mean; `None` with fewer than two.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let n = self.optimum.len();
+        let count = self.found().count();
+        if count < 2 {
+            return None;
+        }
+        let mut mean = vec![0.0; n];
+        for theta in self.found() {
+            mean.iter_mut()
+                .zip(theta)
+                .for_each(|(m, t)| *m += t / count as f64);
+        }
+        let mut covariance = DMatrix::zeros(n, n);
+        for theta in self.found() {
+            for i in 0..n {
+                for j in 0..n {
+                    covariance[(i, j)] += (theta[i] - mean[i]) * (theta[j] - mean[j]);
+                }
+            }
+        }
+        Some(covariance / (count - 1) as f64)
+    }
+
+    /// The interval of `of` that leaves `(1 - level)/2` of the refits on either side, linear between
+    /// them; `None` with fewer than two refits.
+    pub fn interval(&self, of: &Linear, level: f64) -> Option<[f64; 2]> {
+        let mut values: Vec<f64> = self.found().map(|theta| of.of(theta)).collect();
+        values.sort_by(f64::total_cmp);
+        (values.len() > 1).then(|| {
+            let tail = 0.5 * (1.0 - level);
+            [tail, 1.0 - tail].map(|share| quantile(&values, share))
+        })
+    }
+}
+
+/// The quantile of sorted values, linear between them.
+pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
+    let low = place.floor() as usize;
+    let high = (low + 1).min(sorted.len() - 1);
+    sorted[low] + (place - low as f64) * (sorted[high] - sorted[low])
+}

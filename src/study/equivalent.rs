@@ -1,0 +1,204 @@
+//! Other devices with the very same motion.
+//!
+//! Along a known motion `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
+//!
+//! ```text
+//! k = (f - m a - c v) / y
+//! ```
+//!
+//! is a stiffness. Where `y` crosses zero, `k` stays finite only if `c = (f - m a)/v` there, so the
+//! crossings anchor the damping and leave it free in between. Of all pairs this takes
+//!
+//! ```text
+//! min  1/T integral ((c - c_wish)^2/C^2 + s_c T^2 c'^2/C^2 + s_k T^4 k''^2/K^2) dt
+//! s.t. c v + k y = f - m a at every node,   k >= k_min,   c >= c_min (if stated)
+//! ```
+//!
+//! as one quadratic program with both functions as unknowns: at the crossings the equation itself
+//! holds the anchor, and nothing is divided by a small `y`. `C` and `K` are the sizes at which damping
+//! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
+//! a stepper of order two reproduces the motion to the square of its step.
+
+use crate::dynamics::quadrature::trapezoid_weights;
+use crate::dynamics::{Device, Grid};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+
+/// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
+/// record, so that the wish comes first between the anchors.
+const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
+
+/// A motion at the nodes of a grid, and the force that drives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// The nodes.
+    pub grid: Grid,
+    /// `y`, m.
+    pub displacement: Vec<f64>,
+    /// `y'`, m/s.
+    pub velocity: Vec<f64>,
+    /// `y''`, with that of the base where it moves, m/s^2.
+    pub acceleration: Vec<f64>,
+    /// `f`, N.
+    pub force: Vec<f64>,
+}
+
+impl Motion {
+    /// The motion of experiment `e` of a fit, its acceleration from the equation itself.
+    pub fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Self {
+        let experiment = &problem.experiments[e];
+        let device = evaluation.device_of(experiment.device);
+        let motion = &evaluation.trajectories[e];
+        let nodes = experiment.nodes;
+        let excitation = experiment.excitation.as_ref();
+        let force = excitation
+            .and_then(|x| x.force.as_ref())
+            .map(|f| f.at_nodes());
+        let force = force.unwrap_or_else(|| vec![0.0; nodes]);
+        let acceleration = |i: usize| {
+            let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
+            let (y, v) = (motion.displacement[i], motion.velocity[i]);
+            let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
+            (force[i] - resisting) / device.mass[i]
+        };
+        let grid = problem.oscillator.grid;
+        let length = grid.step() * (nodes - 1) as f64;
+        Self {
+            grid: Grid::new(grid.start(), length, nodes).unwrap_or(grid),
+            displacement: motion.displacement.clone(),
+            velocity: motion.velocity.clone(),
+            acceleration: (0..nodes).map(acceleration).collect(),
+            force,
+        }
+    }
+}
+
+/// Which of the devices with the motion is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// The damping to be near to, N s/m at the nodes.
+    pub damping: Vec<f64>,
+    /// Least stiffness, N/m.
+    pub least_stiffness: f64,
+    /// Least damping, N s/m, if any.
+    pub least_damping: Option<f64>,
+    /// `s_c` and `s_k`, without unit.
+    pub smoothness: [f64; 2],
+}
+
+impl Wish {
+    /// Near to `damping`, with a stiffness of at least `least_stiffness` (N/m).
+    pub fn near(damping: Vec<f64>, least_stiffness: f64) -> Self {
+        Self {
+            damping,
+            least_stiffness,
+            least_damping: None,
+            smoothness: SMOOTHNESS,
+        }
+    }
+}
+
+/// The device with mass `mass` (kg at the nodes), damping near the wish, and the stiffness that gives
+/// it the motion; `Err` says how the program ended where there is none, as where a crossing asks for
+/// less damping than the wish allows.
+///
+/// # Panics
+/// If mass, motion and wish do not have one value per node.
+pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, ConicStatus> {
+    let n = motion.grid.nodes();
+    let lengths = [mass.len(), motion.displacement.len(), wish.damping.len()];
+    assert_eq!(lengths, [n; 3], "one value per node");
+    let step = motion.grid.step();
+    let duration = motion.grid.duration();
+    let needed: Vec<f64> = (0..n)
+        .map(|i| motion.force[i] - mass[i] * motion.acceleration[i])
+        .collect();
+    let inertia = rms(&needed);
+    let over = |f: &[f64]| inertia / rms(f);
+    let [large_c, large_k] = [over(&motion.velocity), over(&motion.displacement)];
+
+    // Unknowns: c/C at the nodes, then k/K.
+    let mut sub = Subproblem::new(2 * n);
+    let weights = trapezoid_weights(n, step);
+    for (i, w) in weights.iter().enumerate() {
+        let root = (w / duration).sqrt();
+        sub.residuals
+            .push([(i, root)], root * wish.damping[i] / large_c);
+    }
+    let slope = (wish.smoothness[0] * duration / step).sqrt();
+    for i in 0..n - 1 {
+        sub.residuals.push([(i, -slope), (i + 1, slope)], 0.0);
+    }
+    let bend = (wish.smoothness[1] * (duration / step).powi(3)).sqrt();
+    for i in n + 1..2 * n - 1 {
+        sub.residuals
+            .push([(i - 1, bend), (i, -2.0 * bend), (i + 1, bend)], 0.0);
+    }
+    for (i, needed) in needed.iter().enumerate() {
+        let row = [
+            (i, large_c * motion.velocity[i] / inertia),
+            (n + i, large_k * motion.displacement[i] / inertia),
+        ];
+        sub.equalities.push(row, needed / inertia);
+        sub.bound(
+            [(n + i, 1.0)],
+            wish.least_stiffness / large_k,
+            f64::INFINITY,
+        );
+        if let Some(least) = wish.least_damping {
+            sub.bound([(i, 1.0)], least / large_c, f64::INFINITY);
+        }
+    }
+    let solution = sub.solve();
+    match solution.status {
+        ConicStatus::Solved | ConicStatus::Almost => {
+            let scaled = |part: &[f64], size: f64| part.iter().map(|x| x * size).collect();
+            Ok(Device {
+                mass: mass.to_vec(),
+                coefficients: vec![
+                    scaled(&solution.z[..n], large_c),
+                    scaled(&solution.z[n..], large_k),
+                ],
+            })
+        }
+        status => Err(status),
+    }
+}
+
+/// What the crossings of zero anchor: time (s) and damping (N s/m) for the mass `mass`, between
+/// nodes by linear interpolation; as far from `c` as the square of the step.
+pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
+    let y = &motion.displacement;
+    let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
+    let crossing = |i: usize| {
+        (y[i] * y[i + 1] <= 0.0 && y[i] != y[i + 1] && y[i + 1] != 0.0).then(|| {
+            let share = y[i] / (y[i] - y[i + 1]);
+            let force = at(i, share, &|i| {
+                motion.force[i] - mass[i] * motion.acceleration[i]
+            });
+            let velocity = at(i, share, &|i| motion.velocity[i]);
+            let time = motion.grid.time(i) + share * motion.grid.step();
+            (time, force / velocity)
+        })
+    };
+    (0..y.len() - 1).filter_map(crossing).collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    (squares / values.len() as f64)
+        .sqrt()
+        .max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// How far the equation is from holding along the motion for `device`, N at the nodes.
+pub fn imbalance(device: &Device, motion: &Motion) -> Vec<f64> {
+    let at = |i: usize| {
+        device.mass[i] * motion.acceleration[i]
+            + device.coefficients[0][i] * motion.velocity[i]
+            + device.coefficients[1][i] * motion.displacement[i]
+            - motion.force[i]
+    };
+    (0..motion.grid.nodes()).map(at).collect()
+}

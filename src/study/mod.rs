@@ -1,0 +1,28 @@
+//! What the readings say beyond one fit.
+//!
+//! * [`Linear`]: a number that is linear in the parameters, the thing asked about;
+//! * [`profile()`]: which values of it the readings allow, by fits with it held fixed;
+//! * [`pull_apart`]: the extreme devices among all that explain the readings as well as stated;
+//! * [`equivalent`]: other devices with the very same motion;
+//! * [`multistart`]: fits from many starts, their clusters, and whether two optima share a valley;
+//! * [`variation`]: whether a function varies at all;
+//! * [`bootstrap`]: intervals from fits to simulated readings;
+//! * [`prediction`]: what an optimum says of an unseen run, and how surely.
+//!
+//! What is random is seeded, and what runs on several threads gives the same bits on any number of
+//! them.
+
+pub mod bootstrap;
+pub mod equivalent;
+mod functional;
+pub mod multistart;
+mod parallel;
+pub mod prediction;
+pub mod profile;
+pub mod pull_apart;
+mod refit;
+mod simulate;
+pub mod variation;
+
+pub use functional::{Linear, Target};
+pub use profile::{Profile, ProfileSettings, profile};

@@ -1,0 +1,33 @@
+//! Independent jobs on several threads.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// `work(0), work(1), ...` in this order, computed on up to `threads` threads. Every job depends on its
+/// index alone, so the results are the same bits for any number of threads.
+///
+/// # Panics
+/// If a job does.
+pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let turn = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= count {
+                return done;
+            }
+            done.push((index, work(index)));
+        }
+    };
+    let mut results = std::thread::scope(|scope| {
+        let workers = threads.clamp(1, count.max(1));
+        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(turn)).collect();
+        let joined = handles.into_iter().flat_map(|handle| match handle.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        joined.collect::<Vec<_>>()
+    });
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}

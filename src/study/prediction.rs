@@ -1,0 +1,142 @@
+//! What an optimum says of an unseen run, and how surely.
+//!
+//! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
+//! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
+//! envelope of the motions of given extreme devices ([`super::pull_apart`]): the readings rule
+//! none of them out, however unlikely the linearisation calls them.
+
+use super::pull_apart::Extreme;
+use crate::dynamics::{Breakdown, Excitation, State, Trajectory};
+use crate::objective::{Channel, Weighting};
+use crate::problem::{Experiment, Problem};
+use nalgebra::{DMatrix, DVector};
+
+/// Half width of a 95 % band of a normal number, in standard deviations.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// An unseen run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Its name.
+    pub name: String,
+    /// State at the first node.
+    pub initial: State,
+    /// What drives it, on the problem's grid; `None` for free motion.
+    pub excitation: Option<Excitation>,
+    /// Which device of the problem moves.
+    pub device: usize,
+}
+
+impl Run {
+    /// Free motion of the main device.
+    pub fn free(name: impl Into<String>, initial: State) -> Self {
+        Self {
+            name: name.into(),
+            initial,
+            excitation: None,
+            device: 0,
+        }
+    }
+}
+
+/// The prediction of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Name of the run.
+    pub name: String,
+    /// Times of the nodes, s.
+    pub times: Vec<f64>,
+    /// The optimum's motion.
+    pub motion: Trajectory,
+    /// 95 % band of the displacement at each node, m; `None` without a covariance.
+    pub band: Option<Vec<[f64; 2]>>,
+    /// Envelope of the displacements of the optimum and the extreme devices, m; `None` without
+    /// extreme devices that have a motion.
+    pub worst: Option<Vec<[f64; 2]>>,
+    /// The extreme device that is furthest from the optimum, and the largest distance, m.
+    pub furthest: Option<(String, f64)>,
+    /// Extreme devices without a motion in this run.
+    pub without_motion: Vec<String>,
+}
+
+/// Predicts `run` from the parameters `theta`, with the band of `covariance` and the worst case over
+/// `extremes`.
+///
+/// # Errors
+/// A [`Breakdown`] if the optimum has no motion in the run.
+///
+/// # Panics
+/// If the covariance is not one of the parameters.
+pub fn predict(
+    problem: &Problem,
+    theta: &[f64],
+    run: &Run,
+    covariance: Option<&DMatrix<f64>>,
+    extremes: &[Extreme],
+) -> Result<Prediction, Breakdown> {
+    let seen = with_run(problem, run);
+    let evaluation = seen.evaluate(theta)?;
+    let motion = evaluation.trajectories[0].clone();
+    let y = &motion.displacement;
+    let band = covariance.map(|covariance| {
+        assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
+        let n = theta.len();
+        let mut jacobian = DMatrix::zeros(y.len(), n);
+        let mut unit = vec![0.0; n];
+        for j in 0..n {
+            unit[j] = 1.0;
+            let change = seen.predictions_tangent(&evaluation, &unit);
+            unit[j] = 0.0;
+            jacobian.set_column(j, &DVector::from_column_slice(&change[0][0]));
+        }
+        let spread = &jacobian * covariance;
+        let width = |i: usize| {
+            let variance: f64 = spread.row(i).dot(&jacobian.row(i));
+            Z_95 * variance.max(0.0).sqrt()
+        };
+        (0..y.len())
+            .map(|i| [y[i] - width(i), y[i] + width(i)])
+            .collect()
+    });
+    let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
+    let mut furthest: Option<(String, f64)> = None;
+    let mut without_motion = Vec::new();
+    for extreme in extremes {
+        let Ok(other) = seen.evaluate(&extreme.parameters) else {
+            without_motion.push(extreme.name());
+            continue;
+        };
+        let mut distance = 0.0f64;
+        let others = &other.trajectories[0].displacement;
+        for ((ends, other), y) in envelope.iter_mut().zip(others).zip(y) {
+            *ends = [ends[0].min(*other), ends[1].max(*other)];
+            distance = distance.max((other - y).abs());
+        }
+        if furthest.as_ref().is_none_or(|(_, most)| distance > *most) {
+            furthest = Some((extreme.name(), distance));
+        }
+    }
+    Ok(Prediction {
+        name: run.name.clone(),
+        times: seen.oscillator.grid.times(),
+        band,
+        worst: furthest.is_some().then_some(envelope),
+        furthest,
+        without_motion,
+        motion,
+    })
+}
+
+/// The problem with the run as its only experiment, its displacement read at all nodes.
+fn with_run(problem: &Problem, run: &Run) -> Problem {
+    let mut seen = problem.clone();
+    let grid = problem.oscillator.grid;
+    let nodes = grid.nodes();
+    let zeros = vec![0.0; nodes];
+    let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
+    let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
+    experiment.excitation.clone_from(&run.excitation);
+    experiment.device = run.device;
+    seen.experiments = vec![experiment.with_channel(channel)];
+    seen
+}

@@ -1,0 +1,476 @@
+//! Profile likelihood of one number.
+//!
+//! The profile of `q(theta)` is `P(v) = min J(theta)` subject to `q(theta) = v` and the model's
+//! constraints. With `J` a chi-square, the values with
+//!
+//! ```text
+//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n readings)
+//! ```
+//!
+//! are a confidence interval, 95 % for the quantile 3.841 of chi-square with one degree of freedom.
+//! `J` is the whole cost, penalties and priors included: with penalties the interval is that of the
+//! penalised problem. A profile that never rises is a number that the readings do not see.
+//!
+//! Sources: S. S. Wilks, *Annals of Mathematical Statistics* 9 (1938) 60-62; A. Raue et al.,
+//! "Structural and practical identifiability analysis of partially observed dynamical models by
+//! exploiting the profile likelihood", *Bioinformatics* 25 (2009) 1923-1929.
+
+use super::functional::Linear;
+use super::refit::{nearest, settings, sizes};
+use crate::constraints::RowGroup;
+use crate::dynamics::Breakdown;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::{Point, Status, active_constraints, fit_from};
+
+/// The 95 % quantile of chi-square with one degree of freedom.
+pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
+/// Name of the row that holds the number.
+const HELD: &str = "the profiled number";
+/// A step that raises the cost by less than this share of the quantile was too short: the next is
+/// twice as long.
+const SLOW: f64 = 0.15;
+/// A step that raises it by more than this share was too long for a neighbour: the next is half.
+const FAST: f64 = 0.6;
+/// An end is found when the root of the rise is this near to the quantile's, relative to it.
+const END: f64 = 1e-9;
+/// Most refits for one end.
+const END_FITS: usize = 60;
+/// A cost lower than the optimum's by this share of the quantile is a better optimum.
+const BETTER: f64 = 1e-3;
+/// Without a covariance, the first step as a share of the number's size.
+const FIRST_STEP: f64 = 0.02;
+/// A rise is another constraint's work if without it less than this share of the quantile is left.
+const BLAMED: f64 = 0.5;
+
+/// How far a profile is walked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileSettings {
+    /// The rise at which it ends.
+    pub quantile: f64,
+    /// Values beyond which nobody asks, in the unit of the number.
+    pub limits: [f64; 2],
+    /// First step, in the unit of the number; by default half a standard deviation by the
+    /// covariance, or where there is none a share of the number's size.
+    pub step: Option<f64>,
+    /// Most steps on each side; they double where the profile is flat.
+    pub steps: usize,
+}
+
+impl Default for ProfileSettings {
+    fn default() -> Self {
+        Self {
+            quantile: QUANTILE_95,
+            limits: [f64::NEG_INFINITY, f64::INFINITY],
+            step: None,
+            steps: 40,
+        }
+    }
+}
+
+/// What the readings say of the number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Both ends of its interval are found.
+    Identified,
+    /// One end is found.
+    OneSided,
+    /// None is: the readings do not see it.
+    Flat,
+}
+
+/// Why a profile ends on one side.
+#[derive(Debug, Clone, PartialEq)]
+pub enum End {
+    /// The cost rises by the quantile.
+    Rise,
+    /// It does, but another constraint makes it: without the constraints of these names it would not.
+    RiseBy(Vec<String>),
+    /// The number's own bound, or the stated limit, comes first.
+    Bound,
+    /// The steps ran out.
+    Steps,
+    /// No motion, or no fit, further out.
+    Failed(String),
+}
+
+/// A constraint that becomes active along the profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// The first value at which it is.
+    pub value: f64,
+    /// Its name.
+    pub constraint: String,
+}
+
+/// The profile of one number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// What was profiled.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value at the optimum.
+    pub optimum: f64,
+    /// Cost there.
+    pub optimum_cost: f64,
+    /// The values at which it was held, rising.
+    pub values: Vec<f64>,
+    /// `P(v)` at each.
+    pub costs: Vec<f64>,
+    /// The parameters at each.
+    pub parameters: Vec<Vec<f64>>,
+    /// The ends of the interval; `None` where there is none.
+    pub interval: [Option<f64>; 2],
+    /// Why it ends, below and above.
+    pub ends: [End; 2],
+    /// In one word.
+    pub verdict: Verdict,
+    /// Where other constraints become active.
+    pub marks: Vec<Mark>,
+    /// Parameters of a better optimum, if one was met.
+    pub better_optimum: Option<Vec<f64>>,
+}
+
+impl Profile {
+    /// The verdict in words.
+    pub fn sentence(&self) -> String {
+        let Self { name, unit, .. } = self;
+        let number = |x: f64| format!("{x:.6} {unit}").trim_end().to_owned();
+        let mut words = match self.interval {
+            [Some(low), Some(high)] => format!(
+                "{name} is identified: between {} and {}",
+                number(low),
+                number(high)
+            ),
+            [Some(low), None] => format!("{name} is only known to be at least {}", number(low)),
+            [None, Some(high)] => format!("{name} is only known to be at most {}", number(high)),
+            [None, None] => format!("{name} is not seen by the readings"),
+        };
+        for (side, end) in ["below", "above"].iter().zip(&self.ends) {
+            let why = match end {
+                End::Rise => continue,
+                End::RiseBy(names) => format!(
+                    "the rise {side} is the work of {}, not of the readings alone",
+                    names.join(" and ")
+                ),
+                End::Bound => format!("{side} it runs into its bound or limit"),
+                End::Steps => format!("{side} the steps ran out"),
+                End::Failed(reason) => format!("{side} no fit was found ({reason})"),
+            };
+            words.push_str("; ");
+            words.push_str(&why);
+        }
+        if self.better_optimum.is_some() {
+            words.push_str("; a better optimum was met on the way: fit again from there");
+        }
+        words
+    }
+}
+
+/// The profile of `of` about `optimum`, parameters at which the problem was fitted.
+///
+/// It walks outwards from the optimum, each fit (Gauss–Newton under the constraints) from its
+/// neighbours, until the cost has risen by the quantile or a bound, a limit or the number of steps is
+/// met; the ends are then found by a secant method on the root of the rise, which is a straight line
+/// where the motion is linear in the parameters.
+///
+/// # Errors
+/// A [`Breakdown`] if the optimum has no motion.
+pub fn profile(
+    problem: &Problem,
+    optimum: &[f64],
+    of: &Linear,
+    how: &ProfileSettings,
+) -> Result<Profile, Breakdown> {
+    let start = fit_from(problem, optimum, &settings())?.best;
+    let mut walk = Walk {
+        problem,
+        of,
+        how,
+        sizes: sizes(problem, &start.parameters),
+        base: start.evaluation.cost,
+        readings: problem.reading_count() as f64,
+        sigma: problem.channels().all(|c| c.weighting().is_sigma()),
+        marks: Vec::new(),
+        samples: Vec::new(),
+    };
+    let before: Vec<String> = names(problem, &start);
+    let value = of.of(&start.parameters);
+    walk.samples.push(Sample {
+        value,
+        cost: start.evaluation.cost,
+        point: start.clone(),
+    });
+    let sides = [-1.0, 1.0].map(|side| walk.side(side, &start, &before));
+    Ok(walk.finish(value, sides))
+}
+
+/// Names of the constraints that are active at a point, the profile's own row left out.
+fn names(problem: &Problem, point: &Point) -> Vec<String> {
+    let active = active_constraints(problem, point).into_iter();
+    active
+        .map(|group| group.name)
+        .filter(|name| name != HELD)
+        .collect()
+}
+
+/// The problem with the number held at `value`.
+fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
+    let mut held = problem.clone();
+    let mut group = RowGroup::new(HELD);
+    let right = value - of.constant;
+    let time = of.time.unwrap_or(problem.oscillator.grid.start());
+    group.push(of.entries.iter().copied(), [right, right], [time, time]);
+    held.constraints.groups.push(group);
+    held
+}
+
+#[derive(Clone)]
+struct Sample {
+    value: f64,
+    cost: f64,
+    point: Point,
+}
+
+struct Walk<'a> {
+    problem: &'a Problem,
+    of: &'a Linear,
+    how: &'a ProfileSettings,
+    sizes: Vec<f64>,
+    base: f64,
+    readings: f64,
+    sigma: bool,
+    marks: Vec<Mark>,
+    samples: Vec<Sample>,
+}
+
+impl Walk<'_> {
+    /// What the quantile is compared to.
+    fn rise(&self, cost: f64) -> f64 {
+        match self.sigma {
+            true => cost - self.base,
+            false => self.readings * (cost / self.base.max(f64::MIN_POSITIVE)).ln(),
+        }
+    }
+
+    /// The signed distance to the quantile: the roots' difference.
+    fn distance(&self, cost: f64) -> f64 {
+        self.rise(cost).max(0.0).sqrt() - self.how.quantile.sqrt()
+    }
+
+    /// The best fit with the number at `value`, from `guess`.
+    fn fit(&self, problem: &Problem, value: f64, guess: &[f64]) -> Result<Sample, String> {
+        let held = held(problem, self.of, value);
+        let start = nearest(&held, guess, &self.sizes)
+            .ok_or_else(|| "the constraints do not allow the value".to_owned())?;
+        let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
+        match found.outcome.status {
+            Status::Infeasible | Status::Failed => Err(found.outcome.reason),
+            _ => Ok(Sample {
+                value,
+                cost: found.best.evaluation.cost,
+                point: found.best,
+            }),
+        }
+    }
+
+    /// How far the number can go towards `side` under the constraints and limits.
+    fn reach(&self, side: f64, theta: &[f64]) -> f64 {
+        let here = self.of.of(theta);
+        let limit = self.how.limits[usize::from(side > 0.0)];
+        if self.problem.constraints.is_empty() {
+            return limit;
+        }
+        let size: f64 = (self.of.entries.iter())
+            .map(|(j, a)| (a * self.sizes[*j]).abs())
+            .sum();
+        let far = match limit.is_finite() {
+            true => limit,
+            false => here + side * FAR * size,
+        };
+        // The point of the constraints whose number is nearest to what is far.
+        let unit = (far - here).abs().max(f64::MIN_POSITIVE);
+        let mut sub = Subproblem::new(theta.len());
+        sub.residuals.push(
+            self.of.entries.iter().map(|(j, a)| (*j, a / unit)),
+            (far - here) / unit,
+        );
+        sub.constrain(&self.problem.constraints, theta);
+        for (d, size) in sub.proximal.iter_mut().zip(&self.sizes) {
+            *d = 1e-12 / (size * size);
+        }
+        let solution = sub.solve();
+        if !matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost) {
+            return limit;
+        }
+        let mut moved: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
+        self.problem.constraints.clip(&mut moved);
+        let reached = self.of.of(&moved);
+        match (far - reached).abs() <= 1e-3 * unit {
+            true => limit,
+            false => reached,
+        }
+    }
+
+    fn first_step(&self, start: &Point) -> f64 {
+        let covariance = self.problem.covariance(&start.evaluation);
+        let deviation = covariance.map_or(0.0, |c| 0.5 * self.of.deviation(&c));
+        let size: f64 = (self.of.entries.iter())
+            .map(|(j, a)| (a * self.sizes[*j]).abs())
+            .sum();
+        let usable = deviation > 1e-9 * size && deviation < size;
+        let guess = if usable { deviation } else { FIRST_STEP * size };
+        self.how.step.unwrap_or(guess)
+    }
+
+    fn side(&mut self, side: f64, start: &Point, before: &[String]) -> (Option<f64>, End) {
+        let mut step = self.first_step(start);
+        let limit = self.reach(side, &start.parameters);
+        let mut seen: Vec<String> = before.to_vec();
+        let mut here = self.samples[0].clone();
+        let mut behind: Option<Sample> = None;
+        let mut shortened = 0;
+        for _ in 0..self.how.steps {
+            if (limit - here.value) * side <= 1e-12 * limit.abs() {
+                return (None, End::Bound);
+            }
+            let wanted = here.value + side * step;
+            let value = if (limit - wanted) * side < 0.0 {
+                limit
+            } else {
+                wanted
+            };
+            let guess = extrapolated(behind.as_ref(), &here, value);
+            let fit = self.fit(self.problem, value, &guess);
+            let fit = fit.or_else(|_| self.fit(self.problem, value, &here.point.parameters));
+            let next = match fit {
+                Ok(next) => next,
+                Err(reason) if shortened >= 6 => return (None, End::Failed(reason)),
+                Err(_) => {
+                    shortened += 1;
+                    step *= 0.25;
+                    continue;
+                }
+            };
+            let now = names(&held(self.problem, self.of, value), &next.point);
+            for constraint in now.iter().filter(|name| !seen.contains(name)) {
+                self.marks.push(Mark {
+                    value,
+                    constraint: constraint.clone(),
+                });
+            }
+            seen.extend(now);
+            let rise = self.rise(next.cost) - self.rise(here.cost);
+            self.samples.push(next.clone());
+            if self.distance(next.cost) >= 0.0 {
+                let end = self.end(here, next);
+                let names = names(&held(self.problem, self.of, end.value), &end.point);
+                let new = names.into_iter().filter(|n| !before.contains(n)).collect();
+                return (Some(end.value), self.blame(&end, new));
+            }
+            if rise < SLOW * self.how.quantile {
+                step *= 2.0;
+            } else if rise > FAST * self.how.quantile {
+                step *= 0.5;
+            }
+            behind = Some(std::mem::replace(&mut here, next));
+        }
+        (None, End::Steps)
+    }
+
+    /// Where the rise is the quantile, between a sample inside and one outside: the Illinois variant
+    /// of the secant method (M. Dowell, P. Jarratt, *BIT* 11 (1971) 168-174).
+    fn end(&mut self, inside: Sample, outside: Sample) -> Sample {
+        let (mut inside, mut outside) = (inside, outside);
+        let root = self.how.quantile.sqrt();
+        let (mut low, mut high) = (self.distance(inside.cost), self.distance(outside.cost));
+        let mut was_inside = None;
+        for _ in 0..END_FITS {
+            let share = low / (low - high);
+            let value = inside.value + share * (outside.value - inside.value);
+            let guess = extrapolated(Some(&inside), &outside, value);
+            let Ok(next) = self.fit(self.problem, value, &guess) else {
+                break;
+            };
+            let distance = self.distance(next.cost);
+            self.samples.push(next.clone());
+            let done = distance.abs() <= END * root
+                || (outside.value - inside.value).abs() <= 1e-14 * value.abs();
+            let is_inside = distance < 0.0;
+            let again = was_inside == Some(is_inside);
+            if is_inside {
+                (inside, low) = (next, distance);
+                high *= if again { 0.5 } else { 1.0 };
+            } else {
+                (outside, high) = (next, distance);
+                low *= if again { 0.5 } else { 1.0 };
+            }
+            was_inside = Some(is_inside);
+            if done {
+                return if distance < 0.0 { inside } else { outside };
+            }
+        }
+        outside
+    }
+
+    /// Whether the rise at `end` is the work of the constraints `new`, which are not active at the
+    /// optimum: the fit is made again without them.
+    fn blame(&self, end: &Sample, new: Vec<String>) -> End {
+        if new.is_empty() {
+            return End::Rise;
+        }
+        let mut without = self.problem.clone();
+        let constraints = &mut without.constraints;
+        constraints.groups.retain(|g| !new.contains(&g.name));
+        constraints.cones.retain(|g| !new.contains(&g.name));
+        match self.fit(&without, end.value, &end.point.parameters) {
+            Ok(free) if self.rise(free.cost) < BLAMED * self.how.quantile => End::RiseBy(new),
+            _ => End::Rise,
+        }
+    }
+
+    fn finish(self, optimum: f64, sides: [(Option<f64>, End); 2]) -> Profile {
+        let least = BETTER * self.how.quantile;
+        let better = (self.samples.iter())
+            .filter(|s| self.rise(s.cost) < -least)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .map(|s| s.point.parameters.clone());
+        let mut samples = self.samples;
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let [(low, below), (high, above)] = sides;
+        let verdict = match [low, high] {
+            [Some(_), Some(_)] => Verdict::Identified,
+            [None, None] => Verdict::Flat,
+            _ => Verdict::OneSided,
+        };
+        Profile {
+            name: self.of.name.clone(),
+            unit: self.of.unit.clone(),
+            optimum,
+            optimum_cost: self.base,
+            values: samples.iter().map(|s| s.value).collect(),
+            costs: samples.iter().map(|s| s.cost).collect(),
+            parameters: samples.into_iter().map(|s| s.point.parameters).collect(),
+            interval: [low, high],
+            ends: [below, above],
+            verdict,
+            marks: self.marks,
+            better_optimum: better,
+        }
+    }
+}
+
+/// Without a limit, so many sizes away is far.
+const FAR: f64 = 1e3;
+
+/// The parameters at `value` on the line through two samples; those of the second without a first.
+fn extrapolated(first: Option<&Sample>, second: &Sample, value: f64) -> Vec<f64> {
+    let here = &second.point.parameters;
+    let Some(first) = first.filter(|f| f.value != second.value) else {
+        return here.clone();
+    };
+    let share = (value - second.value) / (second.value - first.value);
+    let pairs = here.iter().zip(&first.point.parameters);
+    pairs.map(|(b, a)| b + share * (b - a)).collect()
+}

@@ -1,0 +1,421 @@
+//! The extreme devices among all that explain the readings as well as stated.
+//!
+//! For a number `q` of the device (a function's value, or `k/m`, at a time)
+//!
+//! ```text
+//! max or min q(theta)   subject to   misfit(theta) <= level,  the model's constraints,
+//!                                    |L_j theta_j - target_j|^2 <= budget_j  (if stated)
+//! ```
+//!
+//! over many times this is the widest tube. `misfit` is that of the readings plus the priors of the
+//! scalars; penalties have no part in it but through the budgets. It is solved by sequential convex
+//! programming: the predictions are linearised, so that the level is one second-order cone
+//! `|W (r + J d)| <= sqrt(level)`, with a box of changing size as trust region; a trial that is
+//! outside the true level is brought back by Gauss–Newton projections, and every accepted point is a
+//! fresh forward solve. With many parameters the states are unknowns beside them, tied by the
+//! linearised steps.
+//!
+//! The result is a device, so the tube is at least as wide as stated; that it is not wider still is
+//! known only as far as the local search goes, and more starts can only widen it.
+//!
+//! Source: the question is that of F. Hornung, C. Tönsing et al. (Data2Dynamics), the method as in
+//! R. Fletcher, S. Leyffer, *Mathematical Programming* 91 (2002) 239-269, with second-order
+//! correction.
+
+use super::functional::{Linear, Target};
+use super::parallel::map;
+use super::refit::sizes;
+use crate::constraints::{self, Cone, Rows};
+use crate::functions::Penalty;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::{add_priors, linear_readings};
+
+/// First size of the trust region, relative to the functions' natural sizes.
+const FIRST_RADIUS: f64 = 0.25;
+/// Largest and smallest.
+const RADII: [f64; 2] = [1e-7, 100.0];
+/// A step whose gain is below this share of the number's size ends the search.
+const SETTLED: f64 = 1e-9;
+/// Trials aim at this share of the level's root, so that rounding does not put them outside.
+const AIM: f64 = 1.0 - 1e-9;
+/// Corrections of one trial.
+const CORRECTIONS: usize = 6;
+/// A step is good if it keeps this share of the predicted gain, poor below the next.
+const GOOD: f64 = 0.7;
+const POOR: f64 = 0.2;
+
+/// What bounds the devices beside the problem's own constraints.
+#[derive(Debug, Clone)]
+pub struct Level {
+    /// Largest misfit, in the unit of the cost: for readings with sigma the best chi-square plus a
+    /// quantile, or a stated J.
+    pub misfit: f64,
+    /// Penalties whose `|L theta - target|^2` must not exceed the number beside it.
+    pub budgets: Vec<(Penalty, f64)>,
+    /// No number is pushed beyond so many times its natural size: free motion has no upper end for a
+    /// mass.
+    pub reach: f64,
+    /// Most convex programs for one extreme.
+    pub programs: usize,
+}
+
+impl Level {
+    /// A misfit, and nothing else; numbers up to ten times their natural sizes.
+    pub fn of(misfit: f64) -> Self {
+        Self {
+            misfit,
+            budgets: Vec::new(),
+            reach: 10.0,
+            programs: 60,
+        }
+    }
+}
+
+/// How the search for an extreme ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// No step of the convex programs gains any more.
+    Settled,
+    /// The stated reach is met: the number has no end before it.
+    Reach,
+    /// No trial could be brought back to the level.
+    Stuck,
+    /// The programs ran out.
+    Programs,
+}
+
+/// An extreme device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extreme {
+    /// The number pushed, as in `mass at 3 s`.
+    pub function: String,
+    /// The time that it speaks of, s.
+    pub time: Option<f64>,
+    /// Whether it is the largest rather than the smallest.
+    pub largest: bool,
+    /// Its value.
+    pub value: f64,
+    /// The device, and the scalars.
+    pub parameters: Vec<f64>,
+    /// Misfit by a fresh forward solve, at most the level.
+    pub misfit: f64,
+    /// How the search ended.
+    pub ended: Ended,
+    /// Convex programs solved.
+    pub programs: usize,
+}
+
+impl Extreme {
+    /// Name of the device, as in `largest mass at 3 s`.
+    pub fn name(&self) -> String {
+        let way = if self.largest { "largest" } else { "smallest" };
+        format!("{way} {}", self.function)
+    }
+}
+
+/// Both ends of one number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// The device with the smallest value.
+    pub low: Extreme,
+    /// The device with the largest.
+    pub high: Extreme,
+}
+
+/// The targets of a tube of function `function` at `times` (s), those on the grid.
+pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Target> {
+    let each = times
+        .iter()
+        .filter_map(|t| Linear::value(problem, function, *t));
+    each.map(Target::Linear).collect()
+}
+
+/// The targets of a tube of the ratio of two functions, the second positive.
+pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) -> Vec<Target> {
+    let each = times.iter().filter_map(|t| {
+        let over = Linear::value(problem, over, *t)?;
+        Some(Target::Ratio(over, Linear::value(problem, under, *t)?))
+    });
+    each.collect()
+}
+
+/// Both extremes of every target, each from all `starts` that are within the level, on up to
+/// `threads` threads; `None` if no start is.
+pub fn tube(
+    problem: &Problem,
+    starts: &[Vec<f64>],
+    targets: &[Target],
+    level: &Level,
+    threads: usize,
+) -> Option<Vec<Band>> {
+    let search = Search { problem, level };
+    let usable: Vec<&Vec<f64>> = starts
+        .iter()
+        .filter(|s| search.point(s).is_some())
+        .collect();
+    if usable.is_empty() {
+        return None;
+    }
+    let job = |index: usize| {
+        let target = &targets[index / 2];
+        let side = if index % 2 == 0 { -1.0 } else { 1.0 };
+        let found = usable
+            .iter()
+            .filter_map(|start| search.extreme(start, target, side));
+        found
+            .max_by(|a, b| (side * a.value).total_cmp(&(side * b.value)))
+            .expect("the start was within the level")
+    };
+    let mut extremes = map(2 * targets.len(), threads, job).into_iter();
+    let mut bands = Vec::with_capacity(targets.len());
+    while let (Some(low), Some(high)) = (extremes.next(), extremes.next()) {
+        bands.push(Band { low, high });
+    }
+    Some(bands)
+}
+
+/// One extreme from one start; `None` unless the start is within the level and the constraints.
+pub fn extreme(
+    problem: &Problem,
+    start: &[f64],
+    target: &Target,
+    largest: bool,
+    level: &Level,
+) -> Option<Extreme> {
+    let side = if largest { 1.0 } else { -1.0 };
+    Search { problem, level }.extreme(start, target, side)
+}
+
+/// The misfit of the readings plus the priors.
+fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
+    let scalars = problem.functions.scalars().iter();
+    let priors = scalars
+        .zip(problem.scalars(theta))
+        .map(|(s, x)| s.price(*x));
+    evaluation.misfit + priors.sum::<f64>()
+}
+
+struct Search<'a> {
+    problem: &'a Problem,
+    level: &'a Level,
+}
+
+/// Parameters within the level, with their forward solve.
+struct Within {
+    parameters: Vec<f64>,
+    evaluation: Evaluation,
+    misfit: f64,
+}
+
+impl Search<'_> {
+    /// The forward solve at `theta`, if it is within level, budgets and constraints.
+    fn point(&self, theta: &[f64]) -> Option<Within> {
+        let evaluation = self.problem.evaluate(theta).ok()?;
+        let misfit = measure(self.problem, theta, &evaluation);
+        let ranges = self.problem.functions.ranges();
+        let rough = |(p, budget): &(Penalty, f64)| {
+            p.roughness(&theta[ranges[p.function].clone()]) <= budget * (1.0 + 1e-6)
+        };
+        let fits = misfit <= self.level.misfit
+            && self.problem.constraints.hold(theta, constraints::TOLERANCE)
+            && self.level.budgets.iter().all(rough);
+        fits.then(|| Within {
+            parameters: theta.to_vec(),
+            evaluation,
+            misfit,
+        })
+    }
+
+    fn extreme(&self, start: &[f64], target: &Target, side: f64) -> Option<Extreme> {
+        let mut here = self.point(start)?;
+        let sizes = sizes(self.problem, start);
+        let mut radius = FIRST_RADIUS;
+        let (mut ended, mut programs) = (Ended::Programs, 0);
+        let size = target_size(target, start, &sizes);
+        let reach = self.level.reach * size;
+        while programs < self.level.programs {
+            let value = target.of(&here.parameters);
+            if side * value >= reach * (1.0 - 1e-6) {
+                ended = Ended::Reach;
+                break;
+            }
+            programs += 1;
+            let proposal = self.push(&here, target, side, radius, reach, &sizes);
+            let gain = proposal.as_ref().map_or(0.0, |(_, gain)| *gain);
+            if proposal.is_some() && gain <= SETTLED * size {
+                ended = Ended::Settled;
+                break;
+            }
+            let next = proposal.and_then(|(trial, _)| self.restored(trial, &sizes));
+            let gained = next
+                .as_ref()
+                .map_or(f64::NAN, |n| side * (target.of(&n.parameters) - value));
+            match next {
+                Some(next) if gained > 1e-3 * gain && gained > 0.0 => {
+                    here = next;
+                    if gained > GOOD * gain {
+                        radius = (2.0 * radius).min(RADII[1]);
+                    } else if gained < POOR * gain {
+                        radius *= 0.5;
+                    }
+                }
+                _ => radius *= 0.25,
+            }
+            if radius < RADII[0] {
+                ended = Ended::Stuck;
+                break;
+            }
+        }
+        Some(Extreme {
+            function: target.name(),
+            time: target.time(),
+            largest: side > 0.0,
+            value: target.of(&here.parameters),
+            parameters: here.parameters,
+            misfit: here.misfit,
+            ended,
+            programs,
+        })
+    }
+
+    /// The linearised problem about `theta`: the level as a cone, constraints and budgets, in
+    /// variables measured by `units`.
+    fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
+        let mut sub = linear_readings(self.problem, evaluation);
+        add_priors(self.problem, theta, &mut sub);
+        let readings = std::mem::take(&mut sub.residuals);
+        sub.residuals = Rows::new();
+        sub.cones
+            .push(ball(&readings, AIM * self.level.misfit.sqrt()));
+        let ranges = self.problem.functions.ranges();
+        for (penalty, budget) in &self.level.budgets {
+            let range = ranges[penalty.function].clone();
+            let mut rows = Rows::new();
+            let residuals = penalty.residuals(&theta[range.clone()]);
+            for (i, r) in residuals.iter().enumerate() {
+                let row = penalty.rows.row(i).map(|(j, a)| (range.start + j, a));
+                rows.push(row, -r);
+            }
+            sub.cones.push(ball(&rows, budget.sqrt()));
+        }
+        sub.constrain(&self.problem.constraints, theta);
+        sub
+    }
+
+    /// Parameters as units by their sizes, states by those of the motions.
+    fn units(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Vec<f64> {
+        let mut units = sizes.to_vec();
+        if sub.variables > sizes.len() {
+            for motion in &evaluation.trajectories {
+                let pair = [rms(&motion.displacement), rms(&motion.velocity)];
+                units.extend((1..motion.nodes()).flat_map(|_| pair));
+            }
+        }
+        units.resize(sub.variables, 1.0);
+        units
+    }
+
+    /// The step that gains most in the linearised problem, and its gain.
+    fn push(
+        &self,
+        here: &Within,
+        target: &Target,
+        side: f64,
+        radius: f64,
+        reach: f64,
+        sizes: &[f64],
+    ) -> Option<(Vec<f64>, f64)> {
+        let theta = &here.parameters;
+        let slopes = target.slopes(theta);
+        let mut sub = self.linearised(theta, &here.evaluation);
+        for (j, size) in sizes.iter().enumerate() {
+            sub.bound([(j, 1.0)], -radius * size, radius * size);
+        }
+        // More than the trust region allows: the distance to it is linear where the step can be.
+        let most: f64 = slopes
+            .iter()
+            .map(|(j, a)| (a * sizes[*j] * radius).abs())
+            .sum();
+        let most = most.max(f64::MIN_POSITIVE);
+        let row: Vec<(usize, f64)> = slopes.iter().map(|(j, a)| (*j, side * a / most)).collect();
+        let left = (reach - side * target.of(theta)) / most;
+        sub.bound(row.iter().copied(), f64::NEG_INFINITY, left.max(0.0));
+        sub.absolute.push(row.iter().copied(), 1.0);
+        sub.absolute_weights.push(1.0);
+        let delta = self.solved(&sub, &here.evaluation, sizes)?;
+        let gain: f64 = row.iter().map(|(j, a)| a * delta[*j]).sum();
+        let trial = self.moved(theta, &delta);
+        Some((trial, gain * most))
+    }
+
+    fn moved(&self, theta: &[f64], delta: &[f64]) -> Vec<f64> {
+        let mut moved: Vec<f64> = theta.iter().zip(delta).map(|(t, d)| t + d).collect();
+        self.problem.constraints.clip(&mut moved);
+        moved
+    }
+
+    fn solved(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Option<Vec<f64>> {
+        let units = self.units(sub, evaluation, sizes);
+        let solution = sub.in_units(&units).solve();
+        matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost).then(|| {
+            let pairs = solution.z.iter().zip(&units).take(sizes.len());
+            pairs.map(|(z, unit)| z * unit).collect()
+        })
+    }
+
+    /// The trial brought back to the level by the smallest changes, each for the linearisation at
+    /// the one before; `None` if that does not succeed.
+    fn restored(&self, trial: Vec<f64>, sizes: &[f64]) -> Option<Within> {
+        let mut theta = trial;
+        let mut before = f64::INFINITY;
+        for _ in 0..CORRECTIONS {
+            if let Some(point) = self.point(&theta) {
+                return Some(point);
+            }
+            let evaluation = self.problem.evaluate(&theta).ok()?;
+            let misfit = measure(self.problem, &theta, &evaluation);
+            if misfit > before {
+                return None;
+            }
+            before = misfit;
+            let mut sub = self.linearised(&theta, &evaluation);
+            for (d, size) in sub.proximal.iter_mut().zip(sizes) {
+                *d = 1.0 / (size * size);
+            }
+            // The proximal term alone is zero at no step, which scales nothing: a constant does.
+            sub.constant = 1.0;
+            let delta = self.solved(&sub, &evaluation, sizes)?;
+            theta = self.moved(&theta, &delta);
+        }
+        self.point(&theta)
+    }
+}
+
+/// `|F z - f| <= radius`, relative to the radius.
+fn ball(rows: &Rows, radius: f64) -> Cone {
+    let mut cone = Rows::new();
+    cone.push([], -1.0);
+    for i in 0..rows.len() {
+        cone.push(
+            rows.row(i).map(|(j, a)| (j, a / radius)),
+            rows.right()[i] / radius,
+        );
+    }
+    Cone { rows: cone }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    (squares / values.len() as f64)
+        .sqrt()
+        .max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// How large the number is, by the sizes of the parameters in it.
+fn target_size(target: &Target, theta: &[f64], sizes: &[f64]) -> f64 {
+    let slopes = target.slopes(theta);
+    let change: f64 = slopes.iter().map(|(j, a)| (a * sizes[*j]).abs()).sum();
+    change.max(target.of(theta).abs()).max(f64::MIN_POSITIVE)
+}

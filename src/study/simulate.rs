@@ -1,0 +1,54 @@
+//! Readings that a device would have given, with seeded noise.
+
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// The random numbers of job `index` under `seed`: a stream of its own, whatever thread runs it.
+pub fn stream(seed: u64, index: usize) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(index as u64);
+    random
+}
+
+/// Standard deviation of every reading, in the order of experiments, channels and readings: the
+/// stated one, or where none is stated the root of the unweighted residuals' mean square, all
+/// channels without sigma together, made unbiased by `n / (n - p)`.
+pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
+    let predictions = evaluation.predictions.iter().flatten();
+    let (mut squares, mut count) = (0.0, 0usize);
+    for (channel, predicted) in problem.channels().zip(predictions) {
+        if !channel.weighting().is_sigma() {
+            squares += channel.residuals(predicted).map(|r| r * r).sum::<f64>();
+            count += channel.len();
+        }
+    }
+    let freedom = count.saturating_sub(problem.parameters()).max(1) as f64;
+    let estimate = (squares / freedom).sqrt();
+    let each = problem
+        .channels()
+        .flat_map(|c| (0..c.len()).map(|i| c.weighting().sigma(i)));
+    each.map(|sigma| sigma.unwrap_or(estimate)).collect()
+}
+
+/// `count` standard normal numbers.
+pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
+    (0..count).map(|_| StandardNormal.sample(random)).collect()
+}
+
+/// The problem with the readings `predictions + noise`, noise in the order of [`sigmas`].
+pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
+    let mut simulated = problem.clone();
+    let mut first = 0;
+    let experiments = simulated.experiments.iter_mut();
+    for (experiment, predictions) in experiments.zip(&evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
+            let part = &noise[first..first + predicted.len()];
+            first += predicted.len();
+            *channel = channel.clone().with_simulated(predicted, part);
+        }
+    }
+    simulated
+}

@@ -1,0 +1,221 @@
+use crate::problems::{
+    Record, bound, constants, device, linear, oscillator, problem, readings, regular, scalar,
+};
+use kmcfit::dynamics::Excitation;
+use kmcfit::functions::Value;
+use kmcfit::objective::Sensor;
+use kmcfit::problem::Problem;
+use kmcfit::solvers::fit_from;
+use kmcfit::study::profile::{End, QUANTILE_95, Verdict};
+use kmcfit::study::{Linear, Profile, ProfileSettings, profile};
+
+fn optimum(problem: &Problem) -> Vec<f64> {
+    let settings = crate::common::synthetic::settings();
+    fit_from(problem, &problem.start(), &settings)
+        .unwrap()
+        .best
+        .parameters
+}
+
+fn of(problem: &Problem, j: usize) -> Profile {
+    profile(
+        problem,
+        &optimum(problem),
+        &Linear::parameter(j),
+        &ProfileSettings::default(),
+    )
+    .unwrap()
+}
+
+/// `q +- sqrt(3.841 C_qq)` where the predictions are linear in the parameters.
+fn is_closed_form(problem: &Problem, q: &Linear) {
+    let best = optimum(problem);
+    let evaluation = problem.evaluate(&best).unwrap();
+    let covariance = problem.covariance(&evaluation).unwrap();
+    let half = (QUANTILE_95 * q.deviation(&covariance).powi(2)).sqrt();
+    let found = profile(problem, &best, q, &ProfileSettings::default()).unwrap();
+    assert_eq!(found.verdict, Verdict::Identified);
+    let [low, high] = found.interval.map(Option::unwrap);
+    let expected = [q.of(&best) - half, q.of(&best) + half];
+    println!(
+        "{}: {low} {high}, {expected:?}, {} fits",
+        q.name,
+        found.values.len()
+    );
+    assert!(
+        (low - expected[0]).abs() < 1e-6 * half,
+        "{low} {expected:?}"
+    );
+    assert!(
+        (high - expected[1]).abs() < 1e-6 * half,
+        "{high} {expected:?}"
+    );
+    assert_eq!(found.ends, [End::Rise, End::Rise]);
+    assert!(found.better_optimum.is_none());
+    // The cost is the parabola at every value on the way.
+    for (value, cost) in found.values.iter().zip(&found.costs) {
+        let parabola = QUANTILE_95 * ((value - q.of(&best)) / half).powi(2);
+        let rise = cost - found.optimum_cost;
+        assert!(
+            (rise - parabola).abs() < 1e-6 * (1.0 + parabola),
+            "{value}: {rise} {parabola}"
+        );
+    }
+}
+
+#[test]
+fn initial_state_and_offset_have_the_intervals_of_linear_regression() {
+    let problem = linear(1);
+    for index in 0..3 {
+        is_closed_form(&problem, &Linear::scalar(&problem, index));
+    }
+}
+
+#[test]
+fn the_gain_of_a_driven_sensor_has_its_closed_form() {
+    let oscillator = oscillator(10.0, 201);
+    let force: Vec<f64> = oscillator
+        .grid
+        .times()
+        .iter()
+        .map(|t| (1.3 * t).sin())
+        .collect();
+    let excitation = Excitation::force_at_nodes(&force);
+    let truth = [1.0, 0.1, 2.0];
+    let values = readings(
+        &oscillator,
+        &device(201, truth),
+        Some(&excitation),
+        4,
+        0.05,
+        2,
+    );
+    let record = Record {
+        sensor: Sensor {
+            gain: Value::Sought(0),
+            offset: Value::Sought(1),
+            ..Sensor::default()
+        },
+        excitation: Some(excitation),
+        ..Record::of(values, 4)
+    };
+    let scalars = vec![scalar("gain", 0.7, None), scalar("offset", 0.1, None)];
+    let problem = problem(
+        oscillator,
+        constants(201, [None; 3], truth),
+        scalars,
+        record,
+    );
+    is_closed_form(&problem, &Linear::scalar(&problem, 0));
+}
+
+#[test]
+fn damping_and_stiffness_of_a_known_mass_are_identified() {
+    let problem = regular(3);
+    for j in 0..2 {
+        let found = of(&problem, j);
+        let evaluation = problem.evaluate(&optimum(&problem)).unwrap();
+        let deviation = Linear::parameter(j).deviation(&problem.covariance(&evaluation).unwrap());
+        let [low, high] = found.interval.map(Option::unwrap);
+        println!("{}", found.sentence());
+        assert_eq!(found.verdict, Verdict::Identified);
+        // 1.96 standard deviations but for the curvature of the model, a few per cent here.
+        let width = (high - low) / (2.0 * 1.96 * deviation);
+        assert!((width - 1.0).abs() < 0.1, "{width}");
+        assert!(found.sentence().contains("identified"));
+    }
+}
+
+/// Free motion shows k/m and c/m: of m, c and k together no number is seen.
+#[test]
+fn the_mass_of_a_free_motion_is_flat() {
+    let oscillator = oscillator(10.0, 101);
+    let values = readings(&oscillator, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
+    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    bound(&mut problem, "mass from 0.5 to 3", 0, [0.5, 3.0]);
+    let found = of(&problem, 0);
+    println!("{}", found.sentence());
+    assert_eq!(found.verdict, Verdict::Flat);
+    assert_eq!(found.ends, [End::Bound, End::Bound]);
+    assert!(
+        (found.values[0] - 0.5).abs() < 1e-6 && (found.values.last().unwrap() - 3.0).abs() < 1e-6
+    );
+    let most = found
+        .costs
+        .iter()
+        .fold(0.0f64, |m, c| m.max(c - found.optimum_cost));
+    assert!(most < 1e-6, "{most}");
+    assert!(found.sentence().contains("not seen"));
+}
+
+/// The noise of the readings leaves room for no damping at all: below it ends at its own bound.
+#[test]
+fn a_damping_near_its_bound_is_one_sided() {
+    let oscillator = oscillator(10.0, 101);
+    let values = readings(
+        &oscillator,
+        &device(101, [1.0, 0.005, 2.0]),
+        None,
+        2,
+        0.1,
+        5,
+    );
+    let list = constants(101, [None, Some(0.02), Some(2.0)], [1.0, 0.0, 0.0]);
+    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    bound(&mut problem, "damping >= 0", 0, [0.0, f64::INFINITY]);
+    let found = of(&problem, 0);
+    println!("{}", found.sentence());
+    assert_eq!(found.verdict, Verdict::OneSided);
+    assert_eq!(found.ends, [End::Bound, End::Rise]);
+    assert!(found.interval[0].is_none() && found.interval[1].is_some());
+    assert!(found.sentence().contains("at most"));
+}
+
+/// The same free motion, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
+/// worse, though the readings do not see the mass.
+#[test]
+fn a_rise_that_another_bound_makes_is_called_so() {
+    let oscillator = oscillator(10.0, 101);
+    let values = readings(&oscillator, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
+    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    bound(&mut problem, "mass from 0.5 to 5", 0, [0.5, 5.0]);
+    bound(&mut problem, "stiffness <= 3", 2, [f64::NEG_INFINITY, 3.0]);
+    let found = of(&problem, 0);
+    println!("{}", found.sentence());
+    assert_eq!(found.verdict, Verdict::OneSided);
+    assert_eq!(found.ends[1], End::RiseBy(vec!["stiffness <= 3".into()]));
+    assert!(found.sentence().contains("stiffness <= 3"));
+    let mark = &found.marks[0];
+    assert_eq!(mark.constraint, "stiffness <= 3");
+    assert!(
+        mark.value > 1.4 && mark.value <= found.interval[1].unwrap() + 1e-9,
+        "{mark:?}"
+    );
+    // k/m is 2 within one per cent or two.
+    assert!((found.interval[1].unwrap() - 1.5).abs() < 0.05);
+}
+
+/// From a false minimum the walk meets the true one and says so.
+#[test]
+fn a_better_optimum_on_the_way_is_reported() {
+    let problem = crate::multistart::aliased(0.0);
+    let false_minimum = crate::multistart::minima(&problem)
+        .into_iter()
+        .find(|k| problem.evaluate(&[*k]).unwrap().cost > 10.0)
+        .unwrap();
+    let how = ProfileSettings {
+        limits: [1.0, 60.0],
+        quantile: 1e6,
+        step: Some(0.2),
+        ..ProfileSettings::default()
+    };
+    let how = ProfileSettings { steps: 400, ..how };
+    let q = Linear::parameter(0);
+    let found = profile(&problem, &[false_minimum], &q, &how).unwrap();
+    assert!(
+        found.better_optimum.is_some()
+            || found.costs.iter().all(|c| *c >= found.optimum_cost - 1e3)
+    );
+}
