@@ -128,6 +128,7 @@ pub mod diagnostics;
 pub mod dynamics;
 pub mod error;
 pub mod functions;
+pub mod identifiability;
 mod input;
 mod near;
 pub mod objective;

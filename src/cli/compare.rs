@@ -35,30 +35,7 @@ enum Entry {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    // Whatever is wrong with the input is said before anything is run or made.
-    let names = names(&arguments.runs, &arguments.out);
-    let entries = (arguments.runs.iter().zip(&names))
-        .map(|(path, name)| entry(path, name))
-        .collect::<Result<Vec<_>, _>>()?;
-    let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(&arguments.out)?;
-    let mut compared = Compared::default();
-    let mut folders = Vec::new();
-    for (entry, name) in entries.iter().zip(&names) {
-        folders.push(match entry {
-            Entry::Model(_) => Some(OutputFolder::prepare(&arguments.out.join(name))?),
-            Entry::Run(_) => None,
-        });
-    }
-    for ((entry, name), folder) in entries.into_iter().zip(&names).zip(&folders) {
-        match (entry, folder) {
-            (Entry::Model(model), Some(folder)) => compared.fit(name, *model, folder, &flag)?,
-            (Entry::Run(run), _) => compared.runs.push(*run),
-            (Entry::Model(_), None) => {}
-        }
-    }
-    let interrupted = compared.interrupted;
-    let comparison = Comparison::new(compared.runs, compared.left_out);
+    let (folder, comparison, interrupted) = side_by_side(&arguments.runs, &arguments.out)?;
     comparison
         .write(&folder)
         .map_err(|error| unwritable(folder.path(), &error))?;
@@ -76,6 +53,39 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         true => INTERRUPTED,
         false => verdict(&comparison),
     })
+}
+
+/// Fits models and reads finished runs; the folder of all, the comparison, and whether it was
+/// interrupted.
+pub(super) fn side_by_side(
+    runs: &[PathBuf],
+    out: &Path,
+) -> Result<(OutputFolder, Comparison, bool), Failure> {
+    // Whatever is wrong with the input is said before anything is run or made.
+    let names = names(runs, out);
+    let entries = (runs.iter().zip(&names))
+        .map(|(path, name)| entry(path, name))
+        .collect::<Result<Vec<_>, _>>()?;
+    let flag = interrupt::flag();
+    let folder = OutputFolder::prepare(out)?;
+    let mut compared = Compared::default();
+    let mut folders = Vec::new();
+    for (entry, name) in entries.iter().zip(&names) {
+        folders.push(match entry {
+            Entry::Model(_) => Some(OutputFolder::prepare(&out.join(name))?),
+            Entry::Run(_) => None,
+        });
+    }
+    for ((entry, name), folder) in entries.into_iter().zip(&names).zip(&folders) {
+        match (entry, folder) {
+            (Entry::Model(model), Some(folder)) => compared.fit(name, *model, folder, &flag)?,
+            (Entry::Run(run), _) => compared.runs.push(*run),
+            (Entry::Model(_), None) => {}
+        }
+    }
+    let interrupted = compared.interrupted;
+    let comparison = Comparison::new(compared.runs, compared.left_out);
+    Ok((folder, comparison, interrupted))
 }
 
 /// The runs so far.
@@ -192,7 +202,7 @@ fn stem(path: &Path) -> String {
 }
 
 /// Whether every run ended as asked for.
-fn verdict(comparison: &Comparison) -> u8 {
+pub(super) fn verdict(comparison: &Comparison) -> u8 {
     let fine = [Status::Converged, Status::Completed].map(Status::name);
     let all = (comparison.measures().iter()).all(|m| fine.contains(&m.status.as_str()));
     match all && comparison.left_out().is_empty() {

@@ -84,7 +84,7 @@ pub(super) fn fit_into(
 
 /// The fit; where a rule chooses the weight of the smoothness also the model with that weight and
 /// the path on which it was chosen.
-fn search(
+pub(super) fn search(
     model: &Model,
     progress: &Progress,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {

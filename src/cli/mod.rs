@@ -7,6 +7,7 @@ mod interrupt;
 mod predict;
 mod progress;
 mod simulate;
+mod study;
 
 use crate::error::{InputError, Place};
 use crate::solvers::Status;
@@ -30,6 +31,8 @@ enum Command {
     Check(check::Arguments),
     Predict(predict::Arguments),
     Compare(compare::Arguments),
+    Study(study::Arguments),
+    Resume(study::ResumeArguments),
 }
 
 /// Everything is as asked for.
@@ -65,6 +68,8 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
+        Command::Resume(arguments) => study::resume(&arguments),
     };
     ExitCode::from(match result {
         Ok(code) => code,

@@ -13,8 +13,11 @@ pub mod locate;
 mod model_file;
 pub mod scalar;
 pub mod spec;
+mod story;
 mod syntax;
 
-pub use build::{ChannelNote, HoldOut, Model, Purpose, WeightSearch, build};
+pub use build::{
+    Candidate, ChannelNote, HoldOut, Model, StudyPlan, StudyTarget, Purpose, WeightSearch, build};
 pub use model_file::ModelFile;
+pub use story::Story;
 pub use scalar::{Number, NumberOrColumn, Text};

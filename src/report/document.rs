@@ -43,6 +43,9 @@ pub struct ResultDocument {
     /// The constraints at the best point.
     #[serde(default)]
     pub constraints: ConstraintSummary,
+    /// What the data can and cannot tell.
+    #[serde(default)]
+    pub identifiability: IdentifiabilitySummary,
     /// How the weight of the smoothness was chosen, if by a rule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<WeightSummary>,
@@ -212,6 +215,19 @@ pub struct ExperimentSummary {
     /// How well each channel is matched.
     #[serde(default)]
     pub channels: Vec<ChannelSummary>,
+}
+
+/// What the data can and cannot tell, as far as it is known before a fit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiabilitySummary {
+    /// Directions of the parameters that the data can show at most.
+    pub seen: usize,
+    /// Number of parameters.
+    pub of: usize,
+    /// What is left open, and what would settle it, in words.
+    pub verdicts: Vec<String>,
+    /// What the model says besides the readings, in words.
+    pub knowledge: Vec<String>,
 }
 
 /// The motion of the found device from one initial state, against the true device's.

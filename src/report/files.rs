@@ -36,7 +36,7 @@ impl OutputFolder {
     }
 
     /// Takes away what an older run left that the new one may not write again: its result, without
-    /// which the folder holds no run, and its figures.
+    /// which the folder holds no run, its figures and its tables of readings.
     ///
     /// # Errors
     /// What the file system says.
@@ -46,12 +46,14 @@ impl OutputFolder {
             _ => Ok(()),
         };
         gone(std::fs::remove_file(self.path.join("result.json")))?;
-        let Ok(figures) = std::fs::read_dir(self.path.join("figures")) else {
-            return Ok(());
-        };
-        for figure in figures.flatten().map(|entry| entry.path()) {
-            if figure.extension().is_some_and(|e| e == "svg") {
-                gone(std::fs::remove_file(figure))?;
+        for (name, kind) in [("figures", "svg"), ("readings", "csv")] {
+            let Ok(files) = std::fs::read_dir(self.path.join(name)) else {
+                continue;
+            };
+            for file in files.flatten().map(|entry| entry.path()) {
+                if file.extension().is_some_and(|e| e == kind) {
+                    gone(std::fs::remove_file(file))?;
+                }
             }
         }
         Ok(())

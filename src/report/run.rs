@@ -4,10 +4,11 @@ use super::cost::{CostKind, cost_definition};
 use super::csv::CsvTable;
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
-    FunctionSummary, GradientSummary, ModelSummary, OutcomeSummary, PathSummary, Prediction,
+    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary, PathSummary, Prediction,
     ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
 use super::figure::Figure;
+use super::knowledge::knowledge;
 use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::OutputFolder;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
@@ -100,6 +101,10 @@ impl Run<'_> {
             seconds: fit.elapsed.as_secs_f64(),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
+            identifiability: IdentifiabilitySummary {
+                knowledge: knowledge(&model.problem),
+                ..IdentifiabilitySummary::default()
+            },
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),

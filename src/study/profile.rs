@@ -332,7 +332,7 @@ impl Walk<'_> {
         let mut behind: Option<Sample> = None;
         let mut shortened = 0;
         for _ in 0..self.how.steps {
-            if (limit - here.value) * side <= 1e-12 * limit.abs() {
+            if limit.is_finite() && (limit - here.value) * side <= 1e-12 * limit.abs() {
                 return (None, End::Bound);
             }
             let wanted = here.value + side * step;

@@ -7,9 +7,11 @@ mod functions;
 mod grid;
 mod on_grid;
 mod penalties;
+mod study;
 
 pub use experiments::{ChannelNote, HoldOut};
 pub use penalties::WeightSearch;
+pub use study::{Candidate, StudyPlan, StudyTarget};
 
 use super::ModelFile;
 use super::scalar::ScalarOr;
@@ -41,6 +43,8 @@ pub struct Model {
     pub held_out: Vec<HoldOut>,
     /// Initial states to predict the motion from.
     pub predictions: Vec<State>,
+    /// What `study` looks into.
+    pub study: StudyPlan,
     /// What the user should know although it is no error.
     pub warnings: Vec<String>,
     /// What was chosen for the user, and why.
@@ -139,7 +143,9 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         displacement: s.displacement.0,
         velocity: s.velocity.0,
     };
+    let study = study::build(file, &problem)?;
     Ok(Model {
+        study,
         title: title(file),
         problem,
         given_start,

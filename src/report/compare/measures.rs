@@ -51,6 +51,10 @@ pub struct Measures {
     pub roughness: Roughness,
     /// The motion from other initial states.
     pub predictions: Vec<Prediction>,
+    /// What the model says besides the readings, in words.
+    pub knowledge: Vec<String>,
+    /// What the data leave open, in words.
+    pub open: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -87,6 +91,8 @@ impl Measures {
             max_violation: run.max_violation,
             roughness: Roughness::of(device, run.finished.oscillator.grid.step()),
             predictions: document.predictions.clone(),
+            knowledge: document.identifiability.knowledge.clone(),
+            open: document.identifiability.verdicts.clone(),
             warnings: document.warnings.clone(),
         }
     }

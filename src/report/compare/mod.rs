@@ -4,6 +4,7 @@
 //! alike and each keeps its own grid. [`Measures`] are the numbers of one run; terminal,
 //! `compare.csv` and `compare.html` show the same ones.
 
+mod conclusions;
 mod figures;
 mod measures;
 mod page;
@@ -41,6 +42,7 @@ pub struct Comparison {
     runs: Vec<ComparedRun>,
     measures: Vec<Measures>,
     left_out: Vec<LeftOut>,
+    story: Option<String>,
 }
 
 /// A run that was asked for and left nothing to compare.
@@ -72,7 +74,22 @@ impl Comparison {
             measures: runs.iter().map(Measures::of).collect(),
             runs,
             left_out,
+            story: None,
         }
+    }
+
+    /// The same as a story with a title: the order of the runs matters, and what each adds to those
+    /// before it is told.
+    #[must_use]
+    pub fn told_as(mut self, title: impl Into<String>) -> Self {
+        self.story = Some(title.into());
+        self
+    }
+
+    /// What the runs come to, in words: what each was told more than those before it, and whether that
+    /// led to the true device.
+    pub fn conclusions(&self) -> Vec<String> {
+        conclusions::conclusions(&self.measures)
     }
 
     /// The numbers of each run.

@@ -1,5 +1,6 @@
 //! The comparison as a page.
 
+use super::conclusions::conclusions;
 use super::figures::{self, style};
 use super::measures::Measures;
 use super::table::{Row, known_rows};
@@ -11,11 +12,19 @@ use crate::report::text::escape;
 
 pub(super) fn page(comparison: &Comparison) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
-    let title = match count {
-        1 => "One run".to_string(),
-        count => format!("Comparison of {count} runs"),
+    let title = match (&comparison.story, count) {
+        (Some(title), _) => title.clone(),
+        (None, 1) => "One run".to_string(),
+        (None, count) => format!("Comparison of {count} runs"),
     };
     let mut body = format!("<p>{}</p>\n", escape(&lead(comparison)));
+    if comparison.story.is_some() {
+        body += "<h2>What it comes to</h2>\n<ul>\n";
+        for conclusion in conclusions(&comparison.measures) {
+            body += &format!("<li>{}</li>\n", escape(&conclusion));
+        }
+        body += "</ul>\n";
+    }
     body += "<h2>What each run means</h2>\n";
     for (i, run) in comparison.measures.iter().enumerate() {
         body += &card(run, style(i));
@@ -85,6 +94,13 @@ fn card(run: &Measures, look: Style) -> String {
         escape(&run.status),
         escape(&run.reason),
     );
+    if !run.knowledge.is_empty() {
+        let known = escape(&run.knowledge.join("; "));
+        text += &format!("<p>What it was told: {known}.</p>\n");
+    }
+    for open in &run.open {
+        text += &format!("<p>{}</p>\n", escape(&capital(open)));
+    }
     for warning in &run.warnings {
         text += &format!("<p class=\"soft\">warning: {}</p>\n", escape(warning));
     }

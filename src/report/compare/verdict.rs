@@ -27,6 +27,11 @@ pub(super) fn verdict(run: &ComparedRun, errors: Option<&Errors>) -> String {
     }
     let off = distances(errors);
     match (matched, errors.within(CLOSE)) {
+        (_, true) if errors.mass_relative >= CLOSE => format!(
+            "close to the true device in k/m and c/m: {off}; m, c and k off by a common factor (m by \
+             {}); {how}",
+            percent(errors.mass_relative)
+        ),
         (_, true) => format!("close to the true device: {off}; {how}"),
         (true, false) => format!("{how} but is another device: {off}"),
         (false, false) => format!("{how}; another device: {off}"),

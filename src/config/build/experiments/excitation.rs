@@ -243,7 +243,7 @@ pub fn place(raw: &RawExcitation, grid: &Grid, nodes: usize, experiment: &mut Ex
 }
 
 /// A force without samples.
-fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, InputError> {
+pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, InputError> {
     let key = format!("{key}.force");
     let Some(shape) = spec.shape else {
         return Err(file

@@ -22,6 +22,7 @@ pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
 
 pub(super) use doubts::unidentifiable;
+pub(super) use excitation::shape;
 
 /// What stands in the files of one experiment, at the times of its readings.
 pub(super) struct Record {

@@ -1,0 +1,304 @@
+//! What `study` looks into.
+
+use super::experiments;
+use crate::config::ModelFile;
+use crate::config::scalar::Number;
+use crate::config::spec::{CandidateSpec, ChannelName, FunctionName, ProfileSpec, StudySpec};
+use crate::dynamics::{ChannelKind, State};
+use crate::error::InputError;
+use crate::functions::Quantity;
+use crate::input::{one_of, quote};
+use crate::near::did_you_mean;
+use crate::objective::{Channel, Weighting};
+use crate::problem::{Drive, Experiment, Problem, Waveform};
+use std::time::Duration;
+
+/// What `study` looks into.
+#[derive(Debug, Clone)]
+pub struct StudyPlan {
+    /// Confidence of bands and intervals, between 0 and 1.
+    pub confidence: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Numbers whose profile is drawn.
+    pub profiles: Vec<StudyTarget>,
+    /// Times at which the widest tubes are sought, s.
+    pub tubes: Vec<f64>,
+    /// Largest J of a device in the tubes; `None` for what the confidence allows.
+    pub level: Option<f64>,
+    /// Number of starts of the search for other optima; 0 for none.
+    pub starts: usize,
+    /// Factor by which the starts may lie off the start values.
+    pub spread: f64,
+    /// Optima whose ratios and motions agree to this are one.
+    pub same: f64,
+    /// Number of replicates of the bootstrap; 0 for none.
+    pub replicates: usize,
+    /// Whether each function is held against a constant.
+    pub varies: bool,
+    /// Experiments that might be made next.
+    pub candidates: Vec<Candidate>,
+    /// Wall-clock limit of one fit on the way.
+    pub limit: Option<Duration>,
+}
+
+/// A number that a study asks about.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StudyTarget {
+    /// A function of the list at a time.
+    Value {
+        /// Index of the function.
+        function: usize,
+        /// Time, s.
+        time: f64,
+    },
+    /// The mean of a function of the list.
+    Mean {
+        /// Index of the function.
+        function: usize,
+    },
+    /// A scalar.
+    Scalar {
+        /// Index of the scalar.
+        index: usize,
+    },
+}
+
+/// An experiment that might be made: its readings are zeros, only their noise counts.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Name for reports.
+    pub name: String,
+    /// The experiment, with one channel read at every node.
+    pub experiment: Experiment,
+}
+
+const CONFIDENCE: f64 = 0.95;
+const SEED: u64 = 1;
+const SPREAD: f64 = 3.0;
+/// Ratios and motions that differ by less are those of one optimum.
+const SAME: f64 = 1e-3;
+/// Tubes are sought at so many times unless the model names some.
+const TUBES: usize = 5;
+
+pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
+    let none = StudySpec::default();
+    let spec = file.spec.study.as_ref().unwrap_or(&none);
+    let confidence = within(file, "study.confidence", spec.confidence, CONFIDENCE, |x| {
+        x > 0.0 && x < 1.0
+    })?;
+    let spread = within(file, "study.spread", spec.spread, SPREAD, |x| x > 1.0)?;
+    let same = within(file, "study.same", spec.same, SAME, |x| x > 0.0)?;
+    if let Some(level) = spec.level.filter(|l| l.0 <= 0.0) {
+        return Err(file
+            .error_at("study.level", "the largest J of a tube must be positive")
+            .found(level.0)
+            .expected("a number greater than 0, in the unit of J"));
+    }
+    if spec.starts.is_some_and(|count| count.0 == 0) {
+        return Err(file
+            .error_at("study.starts", "a search needs starts")
+            .found(0)
+            .expected("an integer, 1 or more, or no `starts`"));
+    }
+    let profiles = spec.profiles.iter().flatten().enumerate();
+    let profiles = profiles
+        .map(|(i, spec)| target(file, problem, &format!("study.profiles[{i}]"), spec))
+        .collect::<Result<_, _>>()?;
+    let candidates = spec.candidates.iter().flatten().enumerate();
+    let candidates = candidates
+        .map(|(i, spec)| candidate(file, problem, &format!("study.candidates[{i}]"), spec))
+        .collect::<Result<_, _>>()?;
+    Ok(StudyPlan {
+        confidence,
+        seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
+        profiles,
+        tubes: tubes(file, problem, spec)?,
+        level: spec.level.map(|level| level.0),
+        starts: spec.starts.map_or(0, |count| count.0),
+        spread,
+        same,
+        replicates: spec.bootstrap.map_or(0, |count| count.0),
+        varies: spec.varies == Some(true),
+        candidates,
+        limit: None,
+    })
+}
+
+fn within(
+    file: &ModelFile,
+    key: &str,
+    given: Option<Number>,
+    usual: f64,
+    fits: fn(f64) -> bool,
+) -> Result<f64, InputError> {
+    match given {
+        Some(number) if !fits(number.0) => Err(file
+            .error_at(key, "this number cannot be used")
+            .found(number.0)
+            .expected(match key {
+                "study.confidence" => "a number between 0 and 1, for instance 0.95",
+                "study.spread" => "a factor greater than 1",
+                _ => "a number greater than 0",
+            })),
+        given => Ok(given.map_or(usual, |number| number.0)),
+    }
+}
+
+/// Times on the grid; evenly spread where none are given.
+fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
+    let grid = &problem.oscillator.grid;
+    let Some(given) = &spec.tubes else {
+        let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
+        return Ok((0..TUBES).map(time).collect());
+    };
+    for (i, time) in given.values().iter().enumerate() {
+        on_grid(file, problem, &format!("study.tubes{}", given.place(i)), time.0)?;
+    }
+    Ok(given.values().iter().map(|t| t.0).collect())
+}
+
+fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<(), InputError> {
+    let grid = &problem.oscillator.grid;
+    match crate::dynamics::Place::of(grid, time) {
+        Some(_) => Ok(()),
+        None => Err(file
+            .error_at(key, "this time is outside the record")
+            .found(time)
+            .expected(format!(
+                "{} s to {} s",
+                grid.start(),
+                grid.start() + grid.duration()
+            ))),
+    }
+}
+
+fn target(
+    file: &ModelFile,
+    problem: &Problem,
+    key: &str,
+    spec: &ProfileSpec,
+) -> Result<StudyTarget, InputError> {
+    let mean = spec.mean == Some(true);
+    match (spec.function, &spec.scalar) {
+        (Some(name), None) => {
+            let function = function(file, problem, key, name)?;
+            match (spec.at, mean) {
+                (Some(time), false) => {
+                    on_grid(file, problem, &format!("{key}.at"), time.0)?;
+                    Ok(StudyTarget::Value {
+                        function,
+                        time: time.0,
+                    })
+                }
+                (None, true) => Ok(StudyTarget::Mean { function }),
+                (None, false) if problem.functions.get(function).parameters() == 1 => {
+                    Ok(StudyTarget::Mean { function })
+                }
+                _ => Err(file
+                    .error_at(key, "a profile is of one number")
+                    .expected("`at: TIME` or `mean: true`")),
+            }
+        }
+        (None, Some(name)) => {
+            let scalars = problem.functions.scalars();
+            let found = scalars.iter().position(|s| s.name == name.0);
+            found
+                .map(|index| StudyTarget::Scalar { index })
+                .ok_or_else(|| {
+                    let names = || scalars.iter().map(|s| s.name.as_str());
+                    let error = file
+                        .error_at(&format!("{key}.scalar"), "no such number is estimated")
+                        .found(quote(&name.0))
+                        .expected(match scalars.is_empty() {
+                            true => "a model that estimates initial states or sensors".to_owned(),
+                            false => one_of(names()),
+                        });
+                    match did_you_mean(&name.0, names()) {
+                        Some(hint) => error.hint(hint),
+                        None => error,
+                    }
+                })
+        }
+        _ => Err(file
+            .error_at(key, "a profile is of one number")
+            .expected("either `function` or `scalar`")),
+    }
+}
+
+/// The index of a function of the main device that is fitted.
+fn function(
+    file: &ModelFile,
+    problem: &Problem,
+    key: &str,
+    name: FunctionName,
+) -> Result<usize, InputError> {
+    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name.name());
+    let main = problem.functions.assembly(0);
+    let of = |f: &&usize| Some(problem.functions.get(**f).quantity) == quantity;
+    let key = format!("{key}.function");
+    match main.iter().find(of) {
+        Some(&f) if problem.functions.get(f).parameters() > 0 => Ok(f),
+        Some(_) => Err(file
+            .error_at(&key, format!("the {name} is fixed, so it has no profile"))
+            .found(format!("`{name}`"))
+            .expected("a function that is fitted")),
+        None => Err(file
+            .error_at(&key, format!("the device has no {name}"))
+            .found(format!("`{name}`"))
+            .expected("a function of the model")),
+    }
+}
+
+fn candidate(
+    file: &ModelFile,
+    problem: &Problem,
+    key: &str,
+    spec: &CandidateSpec,
+) -> Result<Candidate, InputError> {
+    let grid = &problem.oscillator.grid;
+    let nodes = grid.nodes();
+    let initial = State {
+        displacement: spec.initial.displacement.0,
+        velocity: spec.initial.velocity.0,
+    };
+    let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
+    if let Some(force) = &spec.force {
+        let force = Some(Waveform::Shape(experiments::shape(file, key, force)?));
+        experiment.drive = Drive { force, base: None };
+        experiment.excitation = Some(experiment.drive.on(grid, nodes));
+    }
+    let kind = match spec.channel {
+        None | Some(ChannelName::Displacement) => ChannelKind::Displacement,
+        Some(ChannelName::Velocity) => ChannelKind::Velocity,
+        Some(ChannelName::Acceleration) => ChannelKind::Acceleration,
+    };
+    let weighting = match (spec.sigma, problem.channels().next()) {
+        (Some(sigma), _) if sigma.0 <= 0.0 => {
+            return Err(file
+                .error_at(&format!("{key}.sigma"), "a standard deviation must be positive")
+                .found(sigma.0)
+                .expected("a number greater than 0, in SI units"));
+        }
+        (Some(sigma), _) => Weighting::Sigma(sigma.0),
+        (None, Some(channel)) => match channel.weighting() {
+            Weighting::Sigmas(sigmas) => Weighting::Sigma(sigmas[0]),
+            Weighting::Trapezoid(_) => Weighting::Integral {
+                spacing: grid.step(),
+            },
+            Weighting::Integral { .. } => Weighting::Integral {
+                spacing: grid.step(),
+            },
+            other => other.clone(),
+        },
+        (None, None) => Weighting::Integral {
+            spacing: grid.step(),
+        },
+    };
+    let channel = Channel::new(kind, grid.times(), vec![0.0; nodes], weighting, grid, nodes);
+    experiment.channels.extend(channel);
+    Ok(Candidate {
+        name: spec.name.0.clone(),
+        experiment,
+    })
+}

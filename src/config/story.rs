@@ -1,0 +1,62 @@
+//! A story: models that are run one after the other and told on one page.
+
+use super::failure;
+use super::guard::{self, LONGEST_MODEL};
+use super::scalar::{Format, Text};
+use crate::error::InputError;
+use crate::input::read_text;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// What a file that tells a story says.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map with the keys format, title, story"
+)]
+struct StorySpec {
+    /// Version of the file format.
+    #[allow(dead_code, reason = "checked when it is read")]
+    format: Format,
+    /// What the page is called.
+    title: Option<Text>,
+    /// The models, relative to this file.
+    story: Vec<Text>,
+}
+
+/// A story: its title and the model files, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Story {
+    /// Title of the page.
+    pub title: String,
+    /// The model files.
+    pub models: Vec<PathBuf>,
+}
+
+impl Story {
+    /// Reads a story; `None` if the file does not have the key `story`, so that it is a model.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is a story that is not well written.
+    pub fn read(path: &Path) -> Result<Option<Self>, InputError> {
+        let text = read_text(path, "a model file or a story (YAML)", LONGEST_MODEL)?;
+        if !text.lines().any(|line| line.starts_with("story:")) {
+            return Ok(None);
+        }
+        guard::check(path, &text)?;
+        let spec: StorySpec = serde_yaml::from_str(&text)
+            .map_err(|error| failure::input_error(path, &text, &error))?;
+        if spec.story.is_empty() {
+            return Err(InputError::file(path, "the story has no model")
+                .key("story")
+                .found("an empty list")
+                .expected("a list of model files"));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        Ok(Some(Self {
+            title: spec.title.map_or_else(|| name.into_owned(), |t| t.0),
+            models: spec.story.iter().map(|m| folder.join(&m.0)).collect(),
+        }))
+    }
+}

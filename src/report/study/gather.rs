@@ -1,0 +1,602 @@
+//! From a fitted problem to the pieces of a study.
+
+use super::pieces::*;
+use crate::config::{Candidate, Model, StudyPlan, StudyTarget};
+use crate::dynamics::{Device, State};
+use crate::functions::{Functions, Quantity, Ratios};
+use crate::identifiability::{
+    self, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, Spectrum, Verdict, anchors,
+    rank_experiments, verdicts,
+};
+use crate::objective::{Evaluation, Weighting};
+use crate::problem::Problem;
+use crate::solvers::Fit;
+use crate::study::bootstrap::{Noise, bootstrap};
+use crate::study::equivalent::{Motion, Wish, equivalent};
+use crate::study::multistart::{self, Multistart, Ranges, between};
+use crate::study::profile::{ProfileSettings, Verdict as ProfileVerdict};
+use crate::study::pull_apart::{Ended, Extreme, Level, ratios_at, tube, values_at};
+use crate::study::variation::{Asking, variation};
+use crate::study::profile::profile;
+use crate::study::{Linear, prediction};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// Directions that are drawn of each end of the spectrum.
+const DIRECTIONS: usize = 3;
+/// Unseen directions that are named one by one.
+const NAMED: usize = 400;
+/// Draws of the simultaneous bands.
+const DRAWS: usize = 10_000;
+/// Roughness that the devices in a tube may have, as a multiple of the optimum's.
+const BUDGET: f64 = 2.0;
+/// Steps of the paths between two optima.
+const PATH: usize = 40;
+/// A path that rises by less than this share of the higher end's cost joins two ends of one valley.
+const RISE: f64 = 0.05;
+
+fn known(values: &[f64]) -> Numbers {
+    let finite = |x: &f64| x.is_finite().then_some(*x);
+    values.iter().map(finite).collect()
+}
+
+/// The fit that is studied.
+pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
+    let sigma = |c: &crate::objective::Channel| match c.weighting() {
+        Weighting::Estimated { sigma } => Some(*sigma),
+        _ => None,
+    };
+    FitPiece {
+        status: fit.outcome.status.name().into(),
+        reason: fit.outcome.reason.clone(),
+        cost: fit.best.evaluation.cost,
+        misfit: fit.best.evaluation.misfit,
+        parameters: fit.best.parameters.clone(),
+        weights: problem.penalties.iter().map(|p| p.weight).collect(),
+        sigmas: problem.channels().map(sigma).collect(),
+    }
+}
+
+/// The problem with the sigmas that the fit estimated and the weights that it chose.
+pub fn as_fitted(problem: &Problem, fit: &FitPiece) -> Problem {
+    let mut problem = problem.clone();
+    for (penalty, weight) in problem.penalties.iter_mut().zip(&fit.weights) {
+        penalty.weight = *weight;
+    }
+    let channels = problem.experiments.iter_mut().flat_map(|e| &mut e.channels);
+    for (channel, sigma) in channels.zip(&fit.sigmas) {
+        if let Some(sigma) = *sigma {
+            *channel = channel
+                .clone()
+                .with_weighting(Weighting::Estimated { sigma });
+        }
+    }
+    problem
+}
+
+/// What the readings see.
+pub fn spectrum(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> SpectrumPiece {
+    let spectrum: Spectrum = Sensitivity::of(problem, evaluation).spectrum();
+    let gauge = Gauge::at(problem, theta);
+    let mut unseen = gauge.unseen(&spectrum);
+    unseen.truncate(NAMED);
+    let record = |seen: identifiability::Seen| DirectionRecord {
+        singular_value: seen.singular_value,
+        functions: seen.functions,
+    };
+    SpectrumPiece {
+        sentence: spectrum.sentence(),
+        rank: spectrum.rank,
+        of: spectrum.of(),
+        unseen: (unseen.into_iter())
+            .map(|named| NamedRecord {
+                name: named.name,
+                share: named.share,
+            })
+            .collect(),
+        times: problem.oscillator.grid.times(),
+        best: (spectrum.best(problem, DIRECTIONS).into_iter())
+            .map(record)
+            .collect(),
+        worst: (spectrum.worst(problem, DIRECTIONS).into_iter())
+            .map(record)
+            .collect(),
+        singular_values: spectrum.singular_values,
+    }
+}
+
+/// Bands, verdicts and anchors.
+pub fn bands(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    plan: &StudyPlan,
+    truth: Option<&Device>,
+) -> BandsPiece {
+    let settings = BandSettings {
+        draws: DRAWS,
+        seed: plan.seed,
+    };
+    let bands = Bands::at(problem, theta, evaluation, &settings);
+    let factor = standard_errors(plan.confidence);
+    let judged = verdicts(problem, evaluation, &bands);
+    let ratios = truth.map(Ratios::of);
+    let list = bands.functions.iter().chain(&bands.ratios);
+    let records = list.enumerate().map(|(i, band)| {
+        let ends = |factor: f64| -> [Numbers; 2] {
+            let each: Vec<[f64; 2]> = (0..band.values.len())
+                .map(|t| band.ends(t, factor))
+                .collect();
+            [0, 1].map(|side| known(&each.iter().map(|e| e[side]).collect::<Vec<f64>>()))
+        };
+        let [low, high] = ends(factor);
+        let [simultaneous_low, simultaneous_high] = match band.simultaneous {
+            Some(factor) => ends(factor),
+            None => [Vec::new(), Vec::new()],
+        };
+        let true_values: Option<&[f64]> = match band.name.as_str() {
+            "k/m" => ratios.as_ref().map(|r| r.k_over_m.as_slice()),
+            "c/m" => ratios.as_ref().map(|r| r.c_over_m.as_slice()),
+            "natural frequency" => ratios.as_ref().map(|r| r.frequency.as_slice()),
+            "damping ratio" => ratios.as_ref().map(|r| r.damping_ratio.as_slice()),
+            _ => truth.and_then(|t| t.functions().nth(i)),
+        };
+        BandRecord {
+            name: band.name.clone(),
+            unit: band.unit.clone(),
+            values: known(&band.values),
+            low,
+            high,
+            simultaneous_low,
+            simultaneous_high,
+            truth: true_values.map(known).unwrap_or_default(),
+            notes: band.notes.clone(),
+        }
+    });
+    let word = |verdict: &Verdict| match verdict {
+        Verdict::Identified { .. } => "identified",
+        Verdict::OnlyRatio(_) => "only-ratio",
+        Verdict::OnlyOn(_) => "only-on",
+        Verdict::NotSeen => "not-seen",
+        Verdict::Fixed => "fixed",
+    };
+    let grid = &problem.oscillator.grid;
+    let fixed = evaluation.trajectories.first().map(|m| anchors(grid, m));
+    BandsPiece {
+        times: bands.times.clone(),
+        bands: records.collect(),
+        notes: bands.notes.clone(),
+        verdicts: (judged.into_iter())
+            .map(|j| JudgementRecord {
+                verdict: word(&j.verdict).into(),
+                name: j.name,
+                sentence: j.sentence,
+            })
+            .collect(),
+        turning_points: fixed.as_ref().map_or(Vec::new(), |a| a.turning_points.clone()),
+        zero_crossings: fixed.map_or(Vec::new(), |a| a.zero_crossings),
+    }
+}
+
+/// Half-width of a two-sided interval of this confidence, in standard errors.
+fn standard_errors(confidence: f64) -> f64 {
+    Normal::standard().inverse_cdf(0.5 + 0.5 * confidence)
+}
+
+/// The rise of a chi-square of one degree of freedom at this confidence.
+fn rise(confidence: f64) -> f64 {
+    ChiSquared::new(1.0).map_or(f64::NAN, |chi| chi.inverse_cdf(confidence))
+}
+
+/// The number that a target asks about.
+pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
+    match target {
+        StudyTarget::Value { function, time } => Linear::value(problem, *function, *time),
+        StudyTarget::Mean { function } => Some(Linear::mean(problem, *function)),
+        StudyTarget::Scalar { index } => Some(Linear::scalar(problem, *index)),
+    }
+}
+
+/// One profile.
+///
+/// # Errors
+/// Why there is none.
+pub fn profile_of(
+    problem: &Problem,
+    theta: &[f64],
+    of: &Linear,
+    plan: &StudyPlan,
+) -> Result<ProfilePiece, String> {
+    let how = ProfileSettings {
+        quantile: rise(plan.confidence),
+        ..ProfileSettings::default()
+    };
+    let found = profile(problem, theta, of, &how).map_err(|breakdown| breakdown.to_string())?;
+    Ok(ProfilePiece {
+        sentence: found.sentence(),
+        verdict: match found.verdict {
+            ProfileVerdict::Identified => "identified",
+            ProfileVerdict::OneSided => "one-sided",
+            ProfileVerdict::Flat => "flat",
+        }
+        .into(),
+        marks: (found.marks.iter())
+            .map(|mark| (mark.value, mark.constraint.clone()))
+            .collect(),
+        name: found.name,
+        unit: found.unit,
+        optimum: found.optimum,
+        values: found.values,
+        costs: found.costs,
+        interval: found.interval,
+    })
+}
+
+/// The misfit that devices in the tubes may have.
+pub fn level(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    plan: &StudyPlan,
+) -> Level {
+    let n = problem.reading_count() as f64;
+    let sigma = problem.channels().all(|c| c.weighting().is_sigma());
+    let allowed = match (plan.level, sigma) {
+        (Some(level), _) => level,
+        (None, true) => evaluation.misfit + rise(plan.confidence),
+        // n ln J rises by the quantile.
+        (None, false) => evaluation.misfit * (rise(plan.confidence) / n).exp(),
+    };
+    let mut level = Level::of(allowed);
+    // A budget of roughness, where the fit paid for it.
+    level.budgets = (problem.penalties.iter())
+        .map(|penalty| {
+            let range = problem.functions.ranges()[penalty.function].clone();
+            let now = penalty.roughness(&theta[range]);
+            (penalty.clone(), BUDGET * now.max(f64::MIN_POSITIVE))
+        })
+        .collect();
+    level
+}
+
+/// The tubes of all functions that are fitted and of k/m and c/m, and the extreme devices.
+pub fn tubes(
+    problem: &Problem,
+    theta: &[f64],
+    level: &Level,
+    plan: &StudyPlan,
+    threads: usize,
+) -> (Vec<TubeRecord>, Vec<Extreme>) {
+    let main = problem.functions.assembly(0);
+    let mut jobs = Vec::new();
+    for &f in main {
+        let function = problem.functions.get(f);
+        if function.parameters() > 0 {
+            let unit = function.quantity.unit().to_owned();
+            jobs.push((function.name(), unit, values_at(problem, f, &plan.tubes)));
+        }
+    }
+    let of = |q: Quantity| main.iter().find(|f| problem.functions.get(**f).quantity == q);
+    let ratios = [("k/m", Quantity::Stiffness, "1/s^2"), ("c/m", Quantity::Damping, "1/s")];
+    for (name, over, unit) in ratios {
+        if let (Some(&over), Some(&mass)) = (of(over), of(Quantity::Mass)) {
+            let targets = ratios_at(problem, over, mass, &plan.tubes);
+            jobs.push((name.to_owned(), unit.to_owned(), targets));
+        }
+    }
+    let mut records = Vec::new();
+    let mut extremes = Vec::new();
+    for (name, unit, targets) in jobs {
+        let starts = [theta.to_vec()];
+        let Some(bands) = tube(problem, &starts, &targets, level, threads) else {
+            continue;
+        };
+        let ends = bands.iter().flat_map(|band| [&band.low, &band.high]);
+        records.push(TubeRecord {
+            name,
+            unit,
+            times: plan.tubes.clone(),
+            low: bands.iter().map(|band| band.low.value).collect(),
+            high: bands.iter().map(|band| band.high.value).collect(),
+            level: level.misfit,
+            devices: ends
+                .map(|e| (e.name(), e.misfit, ended(e.ended).to_owned()))
+                .collect(),
+        });
+        extremes.extend(bands.into_iter().flat_map(|band| [band.low, band.high]));
+    }
+    (records, extremes)
+}
+
+fn ended(how: Ended) -> &'static str {
+    match how {
+        Ended::Settled => "no further",
+        Ended::Reach => "at the reach that was stated: no end was met",
+        Ended::Stuck => "no trial could be brought back to the level",
+        Ended::Programs => "the programs ran out",
+    }
+}
+
+/// Devices with the same motion as the fit's: other masses, and the stiffness that goes with them.
+pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<EquivalentRecord> {
+    let grid = &problem.oscillator.grid;
+    let Some(experiment) = problem.experiments.first() else {
+        return Vec::new();
+    };
+    let linear = problem.oscillator.terms.iter().all(|t| t.is_linear());
+    if !linear || experiment.nodes != grid.nodes() {
+        return Vec::new();
+    }
+    let motion = Motion::of(problem, evaluation, 0);
+    let device = evaluation.device_of(experiment.device);
+    let share = |t: f64| (t - grid.start()) / grid.duration();
+    type Factor<'a> = &'a dyn Fn(f64) -> f64;
+    let choices: [(&str, Factor); 3] = [
+        ("mass that grows by a half", &|x| 1.0 + 0.5 * x),
+        ("mass that falls by a third", &|x| 1.0 - x / 3.0),
+        ("mass that swings by a fifth", &|x| 1.0 + 0.2 * (12.0 * x).sin()),
+    ];
+    let times = grid.times();
+    let mut records = vec![EquivalentRecord {
+        name: "the fit".into(),
+        times: times.clone(),
+        mass: device.mass.clone(),
+        damping: device.coefficients[0].clone(),
+        stiffness: device.coefficients[1].clone(),
+        motion_error: 0.0,
+    }];
+    for (name, factor) in choices {
+        let pairs = device.mass.iter().zip(&times);
+        let mass: Vec<f64> = pairs.map(|(m, t)| m * factor(share(*t))).collect();
+        let least = 1e-3 * device.coefficients[1].iter().copied().fold(0.0, f64::max);
+        let wish = Wish::near(device.coefficients[0].clone(), least);
+        let Ok(found) = equivalent(&mass, &motion, &wish) else {
+            continue;
+        };
+        let initial = State {
+            displacement: motion.displacement[0],
+            velocity: motion.velocity[0],
+        };
+        let moved = problem
+            .oscillator
+            .forward(&found, initial, experiment.excitation.as_ref());
+        let Ok(moved) = moved else { continue };
+        let largest = motion.displacement.iter().fold(0.0f64, |m, y| m.max(y.abs()));
+        let pairs = moved.displacement.iter().zip(&motion.displacement);
+        let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        records.push(EquivalentRecord {
+            name: name.into(),
+            times: times.clone(),
+            mass: found.mass.clone(),
+            damping: found.coefficients[0].clone(),
+            stiffness: found.coefficients[1].clone(),
+            motion_error: off / largest,
+        });
+    }
+    match records.len() {
+        1 => Vec::new(),
+        _ => records,
+    }
+}
+
+/// Fits from many starts.
+pub fn multistart(
+    model: &Model,
+    problem: &Problem,
+    theta: &[f64],
+    plan: &StudyPlan,
+    threads: usize,
+) -> MultistartPiece {
+    let how = Multistart {
+        ranges: Ranges::Constants(ranges(&problem.functions, plan.spread)),
+        starts: plan.starts,
+        seed: plan.seed,
+        threads,
+        ladder: false,
+        settings: model.settings.clone(),
+    };
+    let waterfall = multistart::multistart(problem, &how);
+    let tolerance = multistart::Distance {
+        ratios: plan.same,
+        motions: plan.same,
+    };
+    let clusters = waterfall.clusters(problem, tolerance);
+    let mut sentences = vec![format!(
+        "{} of {} starts led to {} different optima; the lowest cost is {:.6e}",
+        waterfall.order.len(),
+        plan.starts,
+        clusters.len(),
+        waterfall.costs().first().copied().unwrap_or(f64::NAN)
+    )];
+    let of = |cluster: &multistart::Cluster| {
+        let found = waterfall.runs[cluster.members[0]].found.as_ref();
+        found.map(|f| f.parameters.clone())
+    };
+    if let (Some(first), Some(second)) = (clusters.first(), clusters.get(1))
+        && let (Some(a), Some(b)) = (of(first), of(second))
+    {
+        let paths = between(problem, &a, &b, PATH);
+        let rise = RISE * second.cost.max(first.cost);
+        sentences.push(match paths.one_valley(rise) {
+            true => "the two lowest are ends of one valley: a path between them hardly rises".into(),
+            false => {
+                "between the two lowest the cost rises on the straight path and along the gauge: no \
+                 path without a rise was found"
+                    .into()
+            }
+        });
+    }
+    if let Ok(here) = problem.evaluate(theta)
+        && let Some(best) = waterfall.costs().first()
+        && *best < here.cost * (1.0 - 1e-6)
+    {
+        sentences.push(format!(
+            "a start led lower than the fit: {best:.6e} instead of {:.6e}",
+            here.cost
+        ));
+    }
+    MultistartPiece {
+        costs: waterfall.costs(),
+        failures: (waterfall.runs.iter())
+            .filter(|run| run.found.is_none())
+            .map(|run| run.reason.clone())
+            .collect(),
+        clusters: (clusters.iter())
+            .map(|c| ClusterRecord {
+                starts: c.members.len(),
+                cost: c.cost,
+            })
+            .collect(),
+        sentences,
+    }
+}
+
+/// Between the start divided and multiplied by `spread`; about zero where the start is zero.
+fn ranges(functions: &Functions, spread: f64) -> Vec<[f64; 2]> {
+    let around = |start: f64, size: f64| match start == 0.0 {
+        true => [-size, size],
+        false => {
+            let (a, b) = (start / spread, start * spread);
+            [a.min(b), a.max(b)]
+        }
+    };
+    let of_functions = functions.iter().map(|f| {
+        let mut values = vec![0.0; functions.nodes()];
+        f.values_into(&f.start, &mut values);
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        around(mean, 1.0)
+    });
+    let of_scalars = functions.scalars().iter().map(|s| around(s.start, s.size));
+    of_functions.chain(of_scalars).collect()
+}
+
+/// Whether each function varies.
+///
+/// # Errors
+/// Why it cannot be said.
+pub fn varies(
+    problem: &Problem,
+    theta: &[f64],
+    plan: &StudyPlan,
+    threads: usize,
+) -> Result<Vec<VariesRecord>, String> {
+    let asking = Asking {
+        level: 1.0 - plan.confidence,
+        seed: plan.seed,
+        threads,
+        ..Asking::default()
+    };
+    let found = variation(problem, theta, &asking).map_err(|breakdown| breakdown.to_string())?;
+    let record = |v: crate::study::variation::Varies| VariesRecord {
+        sentence: v.sentence(),
+        p_value: v.p_value,
+        name: v.function,
+    };
+    Ok(found.into_iter().map(record).collect())
+}
+
+/// Intervals of the profiled numbers and of all constants and scalars from refits.
+///
+/// # Errors
+/// Why there are none.
+pub fn refits(
+    problem: &Problem,
+    theta: &[f64],
+    plan: &StudyPlan,
+    threads: usize,
+) -> Result<Vec<BootstrapRecord>, String> {
+    let found = bootstrap(
+        problem,
+        theta,
+        Noise::Parametric,
+        plan.replicates,
+        plan.seed,
+        threads,
+    );
+    let found = found.map_err(|breakdown| breakdown.to_string())?;
+    let constants = problem.functions.iter().enumerate();
+    let constants = constants
+        .filter(|(_, f)| f.parameters() == 1)
+        .map(|(f, _)| Linear::mean(problem, f));
+    let scalars = 0..problem.functions.scalars().len();
+    let scalars = scalars.map(|i| Linear::scalar(problem, i));
+    let asked = plan.profiles.iter().filter_map(|t| linear(problem, t));
+    let mut records: Vec<BootstrapRecord> = Vec::new();
+    for of in constants.chain(scalars).chain(asked) {
+        if records.iter().all(|r| r.name != of.name) {
+            records.push(BootstrapRecord {
+                interval: found.interval(&of, plan.confidence),
+                name: of.name,
+                unit: of.unit,
+            });
+        }
+    }
+    Ok(records)
+}
+
+/// The candidates, best first.
+pub fn candidates(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    list: &[Candidate],
+) -> Vec<CandidateRecord> {
+    let spread = residual_spread(problem, evaluation);
+    let channel = |c: &Candidate| {
+        let channel = c.experiment.channels.first();
+        channel.map(|channel| CandidateChannel {
+            kind: channel.kind(),
+            sigma: channel.weighting().sigma(0).unwrap_or(spread),
+        })
+    };
+    let described: Vec<identifiability::Candidate> = (list.iter())
+        .map(|c| identifiability::Candidate {
+            name: c.name.clone(),
+            initial: c.experiment.initial,
+            excitation: c.experiment.excitation.clone(),
+            channels: channel(c).into_iter().collect(),
+        })
+        .collect();
+    let ranked = rank_experiments(problem, theta, evaluation, &described, false);
+    let record = |r: identifiability::Ranked| CandidateRecord {
+        sentence: r.sentence(),
+        new_directions: r.gain.as_ref().ok().map(|g| g.new_directions),
+        volume: (r.gain.as_ref().ok()).and_then(|g| g.volume.is_finite().then_some(g.volume)),
+        name: r.name,
+    };
+    ranked.into_iter().map(record).collect()
+}
+
+/// Root-mean-square residual of the first channel: the noise, where nobody gave any.
+fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let pairs = problem.channels().zip(evaluation.predictions.iter().flatten());
+    let mut spreads = pairs.map(|(channel, predicted)| {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        crate::diagnostics::rms(&residuals)
+    });
+    spreads.next().unwrap_or(1.0).max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// The motions from the initial states that the model asks for.
+pub fn predictions(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    states: &[State],
+    extremes: &[Extreme],
+) -> Vec<PredictionRecord> {
+    let covariance = problem.covariance(evaluation);
+    let each = states.iter().filter_map(|state| {
+        let name = format!("from y = {} m, v = {} m/s", state.displacement, state.velocity);
+        let run = prediction::Run::free(name, *state);
+        let found = prediction::predict(problem, theta, &run, covariance.as_ref(), extremes).ok()?;
+        Some(PredictionRecord {
+            name: found.name,
+            times: found.times,
+            displacement: found.motion.displacement,
+            band: found.band,
+            worst: found.worst,
+            furthest: found.furthest,
+        })
+    });
+    each.collect()
+}

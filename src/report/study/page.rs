@@ -1,0 +1,31 @@
+//! A study as a page.
+
+use super::StudyDocument;
+use super::figures;
+use super::text::sections;
+use crate::report::html;
+use crate::report::text::escape;
+
+/// One file, nothing to load.
+pub fn page(study: &StudyDocument) -> String {
+    let mut body = String::new();
+    for (heading, sentences) in sections(study) {
+        body += &format!("<h2>{}</h2>\n<ul>\n", escape(heading));
+        for sentence in sentences {
+            body += &format!("<li>{}</li>\n", escape(&sentence));
+        }
+        body += "</ul>\n";
+    }
+    body += "<h2>In pictures</h2>\n";
+    for figure in figures::all(study) {
+        body += &html::figure(&figure);
+    }
+    body += &format!(
+        "<p class=\"soft\">Made by kmcfit {}; seed {}, confidence {}; the study is {}.</p>\n",
+        escape(&study.version),
+        study.seed,
+        study.confidence,
+        escape(&study.status)
+    );
+    html::page(&format!("What the data tell: {}", study.title), &body)
+}

@@ -1,0 +1,102 @@
+//! A study for a terminal: its sentences.
+
+use super::StudyDocument;
+
+/// What was found, a paragraph for each piece.
+pub fn text(study: &StudyDocument) -> String {
+    let mut text = format!("{}\n", study.title);
+    for (heading, sentences) in sections(study) {
+        text += &format!("\n{heading}\n");
+        for sentence in sentences {
+            text += &format!("  {sentence}\n");
+        }
+    }
+    text
+}
+
+/// The headings and their sentences.
+pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
+    let mut sections = vec![("Before the fit", study.before.clone())];
+    if let Some(fit) = &study.fit {
+        let line = format!("{}: {}; J = {:.6e}", fit.status, fit.reason, fit.cost);
+        sections.push(("The fit", vec![line]));
+    }
+    if let Some(spectrum) = &study.spectrum {
+        let mut lines = vec![spectrum.sentence.clone()];
+        let mut names: Vec<&str> = spectrum.unseen.iter().map(|n| n.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        for name in names {
+            let count = spectrum.unseen.iter().filter(|n| n.name == name).count();
+            lines.push(match count {
+                1 => format!("one unseen direction is the {name}"),
+                _ => format!("{count} unseen directions are the {name}"),
+            });
+        }
+        sections.push(("What the readings see", lines));
+    }
+    if let Some(bands) = &study.bands {
+        let verdicts = bands.verdicts.iter().map(|v| v.sentence.clone());
+        let notes = bands.notes.iter().cloned();
+        sections.push(("What is known of each function", verdicts.chain(notes).collect()));
+    }
+    let mut add = |heading, lines: Vec<String>| {
+        if !lines.is_empty() {
+            sections.push((heading, lines));
+        }
+    };
+    add(
+        "Profiles",
+        study.profiles.iter().map(|p| p.sentence.clone()).collect(),
+    );
+    let tube = |t: &super::TubeRecord| {
+        let ends = |f: &[f64], pick: fn(f64, f64) -> f64| f.iter().copied().reduce(pick);
+        format!(
+            "{}: from {:.4} to {:.4} {} among devices with a misfit of at most {:.4e}",
+            t.name,
+            ends(&t.low, f64::min).unwrap_or(f64::NAN),
+            ends(&t.high, f64::max).unwrap_or(f64::NAN),
+            t.unit,
+            t.level
+        )
+    };
+    add("The widest tubes", study.tubes.iter().map(tube).collect());
+    let equivalent = |e: &super::EquivalentRecord| {
+        format!(
+            "{}: moves like the fit to {:.1e} of the largest displacement",
+            e.name, e.motion_error
+        )
+    };
+    add(
+        "Other devices with the same motion",
+        study.equivalents.iter().map(equivalent).collect(),
+    );
+    if let Some(multistart) = &study.multistart {
+        add("Fits from many starts", multistart.sentences.clone());
+    }
+    add(
+        "Does it vary?",
+        study.varies.iter().map(|v| v.sentence.clone()).collect(),
+    );
+    let interval = |b: &super::BootstrapRecord| match b.interval {
+        Some([low, high]) => format!("{}: {low:.6} to {high:.6} {}", b.name, b.unit),
+        None => format!("{}: too few refits ended well", b.name),
+    };
+    add("Refits", study.bootstrap.iter().map(interval).collect());
+    add(
+        "Which experiment next",
+        study.candidates.iter().map(|c| c.sentence.clone()).collect(),
+    );
+    let prediction = |p: &super::PredictionRecord| match &p.furthest {
+        Some((name, distance)) => {
+            format!("{}: the device `{name}` moves up to {distance:.4} m away", p.name)
+        }
+        None => format!("{}: no other device to compare with", p.name),
+    };
+    add(
+        "Motions from elsewhere",
+        study.predictions.iter().map(prediction).collect(),
+    );
+    add("Not done", study.failures.clone());
+    sections
+}
