@@ -207,6 +207,7 @@ fn models_are_valid_and_their_gradients_exact() {
         "2000 nodes over 25 s (midpoint), 2001 parameters, lbfgs",
         "2000 nodes over 25 s (midpoint), 16 parameters, gauss-newton",
         "4801 nodes over 8 s (rk4), 7 parameters, gauss-newton",
+        "2000 nodes over 25 s (midpoint), 3 parameters, gauss-newton",
     ];
     assert_eq!(models.len(), expected.len());
     for (model, expected) in models.iter().zip(expected) {

@@ -10,7 +10,7 @@ use crate::identifiability::count;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::report::study::{StudyDocument, gather};
-use crate::report::{Heading, Journal, OutputFolder, json};
+use crate::report::{FinishedRun, Heading, Journal, OutputFolder, json};
 use crate::solvers::Status;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// What the data can and cannot tell: of a model, or a story of several models on one page.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Model file or story (YAML).
+    /// Model file or story (YAML), or the folder of a finished run, whose model is fitted again.
     model: PathBuf,
     /// Folder for the results [default: runs/NAME-study].
     #[arg(long)]
@@ -47,10 +47,27 @@ pub struct ResumeArguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    if arguments.threads == Some(0) {
+        return Err(InputError::new(
+            crate::error::Place::Argument("--threads".into()),
+            "a study needs a thread",
+        )
+        .found(0)
+        .expected("1 or more")
+        .into());
+    }
     let name = arguments.model.file_stem().unwrap_or_default();
-    let out = arguments.out.clone().unwrap_or_else(|| {
-        PathBuf::from("runs").join(format!("{}-study", name.to_string_lossy()))
-    });
+    let out = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", name.to_string_lossy())));
+    if arguments.model.is_dir() {
+        // A run of another format, or one that failed, is refused here.
+        let run = FinishedRun::open(&arguments.model)?;
+        let model = PathBuf::from(&run.document.model.file);
+        let threads = threads(arguments.threads);
+        return study(&model, &out, arguments.json, threads, false);
+    }
     match Story::read(&arguments.model)? {
         Some(story) => tell(&story, &out, arguments.json),
         None => {
@@ -63,7 +80,13 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 pub fn resume(arguments: &ResumeArguments) -> Result<u8, Failure> {
     let heading = Journal::heading(&arguments.study)?;
     let threads = threads(arguments.threads);
-    study(&heading.model, &arguments.study, arguments.json, threads, true)
+    study(
+        &heading.model,
+        &arguments.study,
+        arguments.json,
+        threads,
+        true,
+    )
 }
 
 fn threads(asked: Option<usize>) -> usize {
@@ -174,11 +197,17 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     use crate::solvers::Solver;
     match model.settings.solver {
         Solver::EquationError => Err(file
-            .error_at("fit.method", "a fit of the equation error cannot be studied")
+            .error_at(
+                "fit.method",
+                "a fit of the equation error cannot be studied",
+            )
             .found("`equation-error`, which simulates no motion")
             .expected("another method")),
         _ if model.problem.parameters() == 0 => Err(file
-            .error_at("functions", "there is nothing to study: every function is fixed")
+            .error_at(
+                "functions",
+                "there is nothing to study: every function is fixed",
+            )
             .expected("at least one function with a basis")),
         _ => Ok(()),
     }
@@ -251,7 +280,8 @@ impl Work<'_> {
                 gather::candidates(&problem, &theta, &evaluation, &plan.candidates)
             );
         }
-        self.document.equivalents = piece!("equivalents", gather::equivalents(&problem, &evaluation));
+        self.document.equivalents =
+            piece!("equivalents", gather::equivalents(&problem, &evaluation));
         if plan.starts > 0 {
             let found = piece!(
                 "starts",
@@ -275,11 +305,11 @@ impl Work<'_> {
         let (tubes, predictions) = piece!("tubes", {
             let level = gather::level(&problem, &theta, &evaluation, plan);
             let (tubes, extremes) = gather::tubes(&problem, &theta, &level, plan, threads);
-            let predictions =
-                gather::predictions(&problem, &theta, &evaluation, states, &extremes);
+            let predictions = gather::predictions(&problem, &theta, &evaluation, states, &extremes);
             (tubes, predictions)
         });
         self.document.tubes = tubes;
+        self.document.budgeted = !problem.penalties.is_empty();
         self.document.predictions = predictions;
         Ok(true)
     }

@@ -17,7 +17,8 @@ mod story;
 mod syntax;
 
 pub use build::{
-    Candidate, ChannelNote, HoldOut, Model, StudyPlan, StudyTarget, Purpose, WeightSearch, build};
+    Candidate, ChannelNote, HoldOut, Model, Purpose, StudyPlan, StudyTarget, WeightSearch, build,
+};
 pub use model_file::ModelFile;
-pub use story::Story;
 pub use scalar::{Number, NumberOrColumn, Text};
+pub use story::Story;

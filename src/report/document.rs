@@ -80,6 +80,9 @@ pub struct ResultDocument {
 /// What was run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelSummary {
+    /// The model file, as it was given.
+    #[serde(default)]
+    pub file: String,
     /// Number of nodes.
     pub nodes: usize,
     /// First time, s.

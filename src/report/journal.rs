@@ -84,9 +84,11 @@ impl Journal {
         })?;
         match heading.format {
             FORMAT => Ok(heading),
-            other => Err(InputError::file(&path, "the journal has another format version")
-                .found(other)
-                .expected(FORMAT.to_string())),
+            other => Err(
+                InputError::file(&path, "the journal has another format version")
+                    .found(other)
+                    .expected(FORMAT.to_string()),
+            ),
         }
     }
 
@@ -118,10 +120,16 @@ impl Journal {
             kept.push('\n');
         }
         let unwritable = |error: io::Error| {
-            InputError::file(&path, format!("the journal cannot be gone on with: {error}"))
+            InputError::file(
+                &path,
+                format!("the journal cannot be gone on with: {error}"),
+            )
         };
         super::write_whole(&path, &kept).map_err(unwritable)?;
-        let file = OpenOptions::new().append(true).open(&path).map_err(unwritable)?;
+        let file = OpenOptions::new()
+            .append(true)
+            .open(&path)
+            .map_err(unwritable)?;
         Ok(Self { file, done })
     }
 

@@ -32,7 +32,12 @@ pub fn knowledge(problem: &Problem) -> Vec<String> {
         let name = problem.functions.get(variation.function).name();
         known.push(format!("{name} with few jumps"));
     }
-    known.extend(problem.soft.iter().map(|g| format!("{} if possible", g.name)));
+    known.extend(
+        problem
+            .soft
+            .iter()
+            .map(|g| format!("{} if possible", g.name)),
+    );
     known
 }
 

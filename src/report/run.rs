@@ -4,13 +4,13 @@ use super::cost::{CostKind, cost_definition};
 use super::csv::CsvTable;
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
-    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary, PathSummary, Prediction,
-    ResultDocument, RungSummary, SlackSummary, WeightSummary,
+    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary,
+    PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
 use super::figure::Figure;
-use super::knowledge::knowledge;
 use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::OutputFolder;
+use super::knowledge::knowledge;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
 use super::render;
 use crate::config::{ChannelNote, Model};
@@ -18,6 +18,7 @@ use crate::diagnostics::rms;
 use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction, Ratios};
+use crate::identifiability::count;
 use crate::objective::Channel;
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
@@ -101,10 +102,7 @@ impl Run<'_> {
             seconds: fit.elapsed.as_secs_f64(),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
-            identifiability: IdentifiabilitySummary {
-                knowledge: knowledge(&model.problem),
-                ..IdentifiabilitySummary::default()
-            },
+            identifiability: self.identifiability(),
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
@@ -132,10 +130,31 @@ impl Run<'_> {
         self.model.settings.solver != Solver::EquationError
     }
 
+    /// What was known before the fit; the equation error has no simulated motion to count about.
+    fn identifiability(&self) -> IdentifiabilitySummary {
+        let problem = &self.model.problem;
+        let knowledge = knowledge(problem);
+        if !self.is_simulated() {
+            return IdentifiabilitySummary {
+                of: problem.parameters(),
+                knowledge,
+                ..IdentifiabilitySummary::default()
+            };
+        }
+        let count = count(problem);
+        IdentifiabilitySummary {
+            seen: count.seen_at_most,
+            of: count.of,
+            verdicts: count.sentences,
+            knowledge,
+        }
+    }
+
     fn model_summary(&self) -> ModelSummary {
         let problem = &self.model.problem;
         let grid = &problem.oscillator.grid;
         ModelSummary {
+            file: self.model.file.display().to_string(),
             nodes: grid.nodes(),
             start: grid.start(),
             duration: grid.duration(),

@@ -46,6 +46,9 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         }
     }
     write_statistics(text, document)?;
+    for sentence in &document.identifiability.verdicts {
+        writeln!(text, "{sentence}")?;
+    }
     writeln!(text)?;
     write_functions(text, document)?;
     write_scalars(text, document)?;

@@ -51,7 +51,7 @@ fn keys() {
     assert_snapshot!(changed("title:", "titel:"), @"
     error: model.yaml:2:1: unknown key
       found: `titel`
-      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
       hint: did you mean `title`?
     ");
     assert_snapshot!(changed("start: 2.0", "strat: 2.0"), @"

@@ -12,4 +12,5 @@ mod regressions;
 mod results;
 mod simulate;
 mod story;
+mod study;
 mod workbench;

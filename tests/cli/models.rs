@@ -42,6 +42,7 @@ fn every_shipped_model_is_run_here() {
         "paper-experiments.yaml",
         "paper-two-records.yaml",
         "paper-forced.yaml",
+        "paper-story.yaml",
         "accelerometer.yaml",
         "hammer-and-shaker.yaml",
         "duffing.yaml",

@@ -21,10 +21,13 @@ use crate::error::{InputError, Place};
 use crate::functions::Functions;
 use crate::problem::Problem;
 use crate::solvers::{self, FitSettings};
+use std::path::PathBuf;
 
 /// Everything that a model file means.
 #[derive(Debug, Clone)]
 pub struct Model {
+    /// The model file, as it was given.
+    pub file: PathBuf,
     /// Title for reports.
     pub title: String,
     /// What is fitted.
@@ -145,6 +148,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     };
     let study = study::build(file, &problem)?;
     Ok(Model {
+        file: file.path.clone(),
         study,
         title: title(file),
         problem,

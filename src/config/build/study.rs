@@ -153,7 +153,12 @@ fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f6
         return Ok((0..TUBES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
-        on_grid(file, problem, &format!("study.tubes{}", given.place(i)), time.0)?;
+        on_grid(
+            file,
+            problem,
+            &format!("study.tubes{}", given.place(i)),
+            time.0,
+        )?;
     }
     Ok(given.values().iter().map(|t| t.0).collect())
 }
@@ -276,7 +281,10 @@ fn candidate(
     let weighting = match (spec.sigma, problem.channels().next()) {
         (Some(sigma), _) if sigma.0 <= 0.0 => {
             return Err(file
-                .error_at(&format!("{key}.sigma"), "a standard deviation must be positive")
+                .error_at(
+                    &format!("{key}.sigma"),
+                    "a standard deviation must be positive",
+                )
                 .found(sigma.0)
                 .expected("a number greater than 0, in SI units"));
         }

@@ -32,7 +32,10 @@ fn outcome(run: &Measures) -> String {
         };
     };
     let worst = errors.k_over_m_relative.max(errors.c_over_m_relative);
-    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let percent = |share: f64| match share < 1e-4 {
+        true => format!("{share:.0e} of their size"),
+        false => format!("{:.2} %", 100.0 * share),
+    };
     let scale = errors.mass_relative >= CLOSE;
     match (worst < RECOVERED || worst < CLOSE, scale, matched) {
         (true, false, _) => format!(
@@ -67,9 +70,10 @@ fn turning_point(runs: &[Measures]) -> Vec<String> {
     let mut sentences = Vec::new();
     let known: Vec<&Measures> = runs.iter().filter(|r| r.errors.is_some()).collect();
     let wrong = |r: &&&Measures| distance(r).is_some_and(|d| d >= CLOSE);
-    let best_wrong = known.iter().filter(wrong).min_by(|a, b| {
-        a.cost_ratio.total_cmp(&b.cost_ratio)
-    });
+    let best_wrong = known
+        .iter()
+        .filter(wrong)
+        .min_by(|a, b| a.cost_ratio.total_cmp(&b.cost_ratio));
     if let Some(run) = best_wrong {
         sentences.push(format!(
             "A small misfit does not show the device: {} leaves J/J0 = {:.1e} and is another one.",
@@ -77,9 +81,7 @@ fn turning_point(runs: &[Measures]) -> Vec<String> {
         ));
     }
     let found = known.iter().filter(|r| !wrong(r));
-    let with_scale = |r: &&&&Measures| {
-        r.errors.as_ref().is_some_and(|e| e.mass_relative < CLOSE)
-    };
+    let with_scale = |r: &&&&Measures| r.errors.as_ref().is_some_and(|e| e.mass_relative < CLOSE);
     let found: Vec<&&Measures> = found.collect();
     match (found.is_empty(), found.iter().find(with_scale)) {
         (true, _) if !known.is_empty() => {

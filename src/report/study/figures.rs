@@ -44,7 +44,10 @@ fn bands(study: &StudyDocument) -> Option<Figure> {
 fn band_panel(times: &[f64], band: &BandRecord, all: &super::BandsPiece) -> Panel {
     let values = gaps(&band.values);
     let known = |low: &Numbers, high: &Numbers| {
-        let pairs = low.iter().zip(high).filter(|(l, h)| l.is_some() && h.is_some());
+        let pairs = low
+            .iter()
+            .zip(high)
+            .filter(|(l, h)| l.is_some() && h.is_some());
         pairs.count() > 1
     };
     // Where a band has no end it is not drawn: its note says so.
@@ -103,17 +106,17 @@ fn spectrum(study: &StudyDocument) -> Option<Figure> {
     let index: Vec<f64> = (1..=values.len()).map(|i| i as f64).collect();
     let relative: Vec<f64> = values.iter().map(|s| (s / largest).max(1e-20)).collect();
     Some(
-        Figure::new("spectrum", "What the readings see", spectrum.sentence.clone()).panel(
+        Figure::new(
+            "spectrum",
+            "What the readings see",
+            spectrum.sentence.clone(),
+        )
+        .panel(
             Panel::new(
                 Axis::linear("direction, best first", ""),
                 Axis::log("singular value relative to the largest", ""),
             )
-            .mark(Mark::line(
-                "",
-                &index,
-                &relative,
-                Style::new(Colour::Blue),
-            ))
+            .mark(Mark::line("", &index, &relative, Style::new(Colour::Blue)))
             .mark(Mark::vertical(
                 "last direction that is seen",
                 spectrum.rank as f64,
@@ -129,7 +132,11 @@ fn directions(study: &StudyDocument) -> Vec<Figure> {
     };
     let sets = [
         ("best", "The directions that are seen best", &spectrum.best),
-        ("worst", "The directions that are seen worst", &spectrum.worst),
+        (
+            "worst",
+            "The directions that are seen worst",
+            &spectrum.worst,
+        ),
     ];
     let drawn = sets.into_iter().filter(|(_, _, set)| !set.is_empty());
     drawn
@@ -197,7 +204,13 @@ fn tubes(study: &StudyDocument) -> Option<Figure> {
     );
     let figure = study.tubes.iter().fold(figure.columns(2), |figure, tube| {
         let panel = Panel::new(time(), Axis::linear(&tube.name, &tube.unit))
-            .mark(Mark::band("", &tube.times, &tube.low, &tube.high, Colour::Sky))
+            .mark(Mark::band(
+                "",
+                &tube.times,
+                &tube.low,
+                &tube.high,
+                Colour::Sky,
+            ))
             .mark(Mark::points(
                 "smallest",
                 &tube.times,
@@ -230,13 +243,15 @@ fn equivalents(study: &StudyDocument) -> Option<Figure> {
         ("damping c", "N s/m", |e| &e.damping),
         ("stiffness k", "N/m", |e| &e.stiffness),
     ];
-    let figure = parts.into_iter().fold(figure, |figure, (label, unit, pick)| {
-        let panel = Panel::new(time(), Axis::linear(label, unit));
-        let devices = study.equivalents.iter().enumerate();
-        figure.panel(devices.fold(panel, |panel, (k, e)| {
-            panel.mark(Mark::line(&e.name, &e.times, pick(e), Style::nth(k)))
-        }))
-    });
+    let figure = parts
+        .into_iter()
+        .fold(figure, |figure, (label, unit, pick)| {
+            let panel = Panel::new(time(), Axis::linear(label, unit));
+            let devices = study.equivalents.iter().enumerate();
+            figure.panel(devices.fold(panel, |panel, (k, e)| {
+                panel.mark(Mark::line(&e.name, &e.times, pick(e), Style::nth(k)))
+            }))
+        });
     Some(figure)
 }
 
@@ -276,7 +291,11 @@ fn predictions(study: &StudyDocument) -> Option<Figure> {
         figure.panel(
             Panel::new(time(), Axis::linear("displacement y", "m"))
                 .title(p.name.clone())
-                .maybe(p.worst.as_ref().map(|e| area(e, "worst case", Colour::Orange)))
+                .maybe(
+                    p.worst
+                        .as_ref()
+                        .map(|e| area(e, "worst case", Colour::Orange)),
+                )
                 .maybe(p.band.as_ref().map(|e| area(e, "band", Colour::Sky)))
                 .mark(Mark::line(
                     "found",

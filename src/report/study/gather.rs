@@ -14,10 +14,10 @@ use crate::solvers::Fit;
 use crate::study::bootstrap::{Noise, bootstrap};
 use crate::study::equivalent::{Motion, Wish, equivalent};
 use crate::study::multistart::{self, Multistart, Ranges, between};
+use crate::study::profile::profile;
 use crate::study::profile::{ProfileSettings, Verdict as ProfileVerdict};
 use crate::study::pull_apart::{Ended, Extreme, Level, ratios_at, tube, values_at};
 use crate::study::variation::{Asking, variation};
-use crate::study::profile::profile;
 use crate::study::{Linear, prediction};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -172,7 +172,9 @@ pub fn bands(
                 sentence: j.sentence,
             })
             .collect(),
-        turning_points: fixed.as_ref().map_or(Vec::new(), |a| a.turning_points.clone()),
+        turning_points: fixed
+            .as_ref()
+            .map_or(Vec::new(), |a| a.turning_points.clone()),
         zero_crossings: fixed.map_or(Vec::new(), |a| a.zero_crossings),
     }
 }
@@ -232,12 +234,7 @@ pub fn profile_of(
 }
 
 /// The misfit that devices in the tubes may have.
-pub fn level(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-    plan: &StudyPlan,
-) -> Level {
+pub fn level(problem: &Problem, theta: &[f64], evaluation: &Evaluation, plan: &StudyPlan) -> Level {
     let n = problem.reading_count() as f64;
     let sigma = problem.channels().all(|c| c.weighting().is_sigma());
     let allowed = match (plan.level, sigma) {
@@ -275,8 +272,14 @@ pub fn tubes(
             jobs.push((function.name(), unit, values_at(problem, f, &plan.tubes)));
         }
     }
-    let of = |q: Quantity| main.iter().find(|f| problem.functions.get(**f).quantity == q);
-    let ratios = [("k/m", Quantity::Stiffness, "1/s^2"), ("c/m", Quantity::Damping, "1/s")];
+    let of = |q: Quantity| {
+        main.iter()
+            .find(|f| problem.functions.get(**f).quantity == q)
+    };
+    let ratios = [
+        ("k/m", Quantity::Stiffness, "1/s^2"),
+        ("c/m", Quantity::Damping, "1/s"),
+    ];
     for (name, over, unit) in ratios {
         if let (Some(&over), Some(&mass)) = (of(over), of(Quantity::Mass)) {
             let targets = ratios_at(problem, over, mass, &plan.tubes);
@@ -309,7 +312,7 @@ pub fn tubes(
 
 fn ended(how: Ended) -> &'static str {
     match how {
-        Ended::Settled => "no further",
+        Ended::Settled => super::text::ENDED,
         Ended::Reach => "at the reach that was stated: no end was met",
         Ended::Stuck => "no trial could be brought back to the level",
         Ended::Programs => "the programs ran out",
@@ -333,7 +336,9 @@ pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<Equivalent
     let choices: [(&str, Factor); 3] = [
         ("mass that grows by a half", &|x| 1.0 + 0.5 * x),
         ("mass that falls by a third", &|x| 1.0 - x / 3.0),
-        ("mass that swings by a fifth", &|x| 1.0 + 0.2 * (12.0 * x).sin()),
+        ("mass that swings by a fifth", &|x| {
+            1.0 + 0.2 * (12.0 * x).sin()
+        }),
     ];
     let times = grid.times();
     let mut records = vec![EquivalentRecord {
@@ -360,7 +365,10 @@ pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<Equivalent
             .oscillator
             .forward(&found, initial, experiment.excitation.as_ref());
         let Ok(moved) = moved else { continue };
-        let largest = motion.displacement.iter().fold(0.0f64, |m, y| m.max(y.abs()));
+        let largest = motion
+            .displacement
+            .iter()
+            .fold(0.0f64, |m, y| m.max(y.abs()));
         let pairs = moved.displacement.iter().zip(&motion.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         records.push(EquivalentRecord {
@@ -568,7 +576,9 @@ pub fn candidates(
 
 /// Root-mean-square residual of the first channel: the noise, where nobody gave any.
 fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
-    let pairs = problem.channels().zip(evaluation.predictions.iter().flatten());
+    let pairs = problem
+        .channels()
+        .zip(evaluation.predictions.iter().flatten());
     let mut spreads = pairs.map(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         crate::diagnostics::rms(&residuals)
@@ -586,9 +596,13 @@ pub fn predictions(
 ) -> Vec<PredictionRecord> {
     let covariance = problem.covariance(evaluation);
     let each = states.iter().filter_map(|state| {
-        let name = format!("from y = {} m, v = {} m/s", state.displacement, state.velocity);
+        let name = format!(
+            "from y = {} m, v = {} m/s",
+            state.displacement, state.velocity
+        );
         let run = prediction::Run::free(name, *state);
-        let found = prediction::predict(problem, theta, &run, covariance.as_ref(), extremes).ok()?;
+        let found =
+            prediction::predict(problem, theta, &run, covariance.as_ref(), extremes).ok()?;
         Some(PredictionRecord {
             name: found.name,
             times: found.times,

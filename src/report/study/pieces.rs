@@ -33,6 +33,8 @@ pub struct StudyDocument {
     pub profiles: Vec<ProfilePiece>,
     /// The widest tubes.
     pub tubes: Vec<TubeRecord>,
+    /// Whether the roughness of the devices in the tubes was bounded.
+    pub budgeted: bool,
     /// Other devices with the same motion.
     pub equivalents: Vec<EquivalentRecord>,
     /// Fits from many starts.

@@ -2,6 +2,11 @@
 
 use super::StudyDocument;
 
+/// How the search for an extreme device ends when it has found it.
+pub const ENDED: &str = "no further";
+/// Most extreme devices of which it is told how their search ended otherwise.
+const MOST_LISTED: usize = 6;
+
 /// What was found, a paragraph for each piece.
 pub fn text(study: &StudyDocument) -> String {
     let mut text = format!("{}\n", study.title);
@@ -38,7 +43,10 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
     if let Some(bands) = &study.bands {
         let verdicts = bands.verdicts.iter().map(|v| v.sentence.clone());
         let notes = bands.notes.iter().cloned();
-        sections.push(("What is known of each function", verdicts.chain(notes).collect()));
+        sections.push((
+            "What is known of each function",
+            verdicts.chain(notes).collect(),
+        ));
     }
     let mut add = |heading, lines: Vec<String>| {
         if !lines.is_empty() {
@@ -60,7 +68,20 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             t.level
         )
     };
-    add("The widest tubes", study.tubes.iter().map(tube).collect());
+    let mut lines: Vec<String> = study.tubes.iter().map(tube).collect();
+    let open = study.tubes.iter().flat_map(|t| &t.devices);
+    let open = open
+        .filter(|(_, _, ended)| ended != ENDED)
+        .take(MOST_LISTED);
+    lines.extend(open.map(|(name, _, ended)| format!("{name}: {ended}")));
+    if !study.tubes.is_empty() && !study.budgeted {
+        lines.push(
+            "no smoothness bounds these devices: where constraints do not either, the tubes are the \
+             bounds"
+                .into(),
+        );
+    }
+    add("The widest tubes", lines);
     let equivalent = |e: &super::EquivalentRecord| {
         format!(
             "{}: moves like the fit to {:.1e} of the largest displacement",
@@ -85,11 +106,18 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
     add("Refits", study.bootstrap.iter().map(interval).collect());
     add(
         "Which experiment next",
-        study.candidates.iter().map(|c| c.sentence.clone()).collect(),
+        study
+            .candidates
+            .iter()
+            .map(|c| c.sentence.clone())
+            .collect(),
     );
     let prediction = |p: &super::PredictionRecord| match &p.furthest {
         Some((name, distance)) => {
-            format!("{}: the device `{name}` moves up to {distance:.4} m away", p.name)
+            format!(
+                "{}: the device `{name}` moves up to {distance:.4} m away",
+                p.name
+            )
         }
         None => format!("{}: no other device to compare with", p.name),
     };

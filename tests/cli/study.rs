@@ -1,0 +1,190 @@
+//! `kmcfit study` and `kmcfit resume`.
+
+use crate::workbench::Workbench;
+use insta::assert_snapshot;
+use serde_json::Value;
+
+/// A damped device read with noise; everything that a study can do.
+const MODEL: &str = "\
+format: 1
+title: Studied
+experiments:
+  - name: free decay
+    data: readings.csv
+    sigma: {displacement: 0.02}
+    initial: {displacement: 1.0, velocity: estimate}
+functions:
+  mass:      {fixed: 1.0}
+  damping:   {basis: constant, start: 0.1}
+  stiffness: {basis: piecewise-linear, knots: 3, start: 4.0}
+predict:
+  - {displacement: 0.0, velocity: 1.0}
+study:
+  seed: 3
+  profiles:
+    - {function: stiffness, at: 5.0}
+    - {function: damping}
+    - {scalar: initial velocity of free decay}
+  starts: 4
+  spread: 1.5
+  bootstrap: 20
+  varies: true
+  candidates:
+    - {name: the same again, initial: {displacement: 1.0, velocity: 0.0}}
+    - {name: a blow, initial: {displacement: 0.0, velocity: 3.0}, channel: acceleration, sigma: 0.1}
+";
+
+fn bench() -> Workbench {
+    let bench = Workbench::empty();
+    bench.write("model.yaml", MODEL);
+    let mut text = String::from("t_s,y_m\n");
+    for i in 0..201 {
+        let t = 0.05 * f64::from(i);
+        // Noise without a generator: a sum of tones that no device of the model has.
+        let noise = 0.01 * ((37.0 * t).sin() + (53.0 * t + 1.0).cos() + (71.0 * t).sin());
+        let y = (-0.1 * t).exp() * (1.99 * t).cos() + noise;
+        text += &format!("{t},{y}\n");
+    }
+    bench.write("readings.csv", &text);
+    bench
+}
+
+fn document(bench: &Workbench, folder: &str) -> Value {
+    serde_json::from_str(&bench.read(&format!("{folder}/study.json"))).expect("JSON")
+}
+
+#[test]
+fn a_study_tells_what_the_data_tell() {
+    let bench = bench();
+    let stdout = bench.run_to(0, &["study", "model.yaml"]);
+    assert!(stdout.contains("damping is identified"), "{stdout}");
+    let study = document(&bench, "runs/model-study");
+    assert_eq!(study["status"], "complete");
+    assert_eq!(study["spectrum"]["rank"], 5);
+    let verdicts = study["bands"]["verdicts"].as_array().expect("verdicts");
+    assert!(
+        verdicts.iter().any(|v| v["verdict"] == "fixed"),
+        "{verdicts:?}"
+    );
+    for profile in study["profiles"].as_array().expect("profiles") {
+        assert_eq!(profile["verdict"], "identified", "{profile}");
+    }
+    let tubes = study["tubes"].as_array().expect("tubes");
+    assert!(tubes.len() >= 3, "{tubes:?}");
+    assert_eq!(
+        study["multistart"]["clusters"]
+            .as_array()
+            .expect("clusters")
+            .len(),
+        1
+    );
+    assert_eq!(study["candidates"].as_array().expect("candidates").len(), 2);
+    assert_eq!(study["failures"].as_array().expect("failures").len(), 0);
+    let page = bench.read("runs/model-study/study.html");
+    roxmltree::Document::parse(page.trim_start_matches("<!DOCTYPE html>\n")).expect("well-formed");
+    for figure in ["bands", "spectrum", "profiles", "tubes", "waterfall"] {
+        let svg = bench.read(&format!("runs/model-study/figures/{figure}.svg"));
+        roxmltree::Document::parse(&svg).expect("XML");
+    }
+}
+
+/// Whatever was finished is kept, and what is gone on with ends with the same bits; on any number of
+/// threads.
+#[test]
+fn a_study_goes_on_where_it_was() {
+    let bench = bench();
+    bench.run_to(
+        0,
+        &["study", "model.yaml", "--out", "whole", "--threads", "1"],
+    );
+    let journal = bench.read("whole/study.journal");
+    let lines: Vec<&str> = journal.lines().collect();
+    assert!(lines.len() > 8, "{}", lines.len());
+    // Cut off after some pieces, in the middle of a line.
+    for kept in [1, 3, 6] {
+        let half = &lines[kept][..lines[kept].len() / 2];
+        let part = lines[..kept].join("\n") + "\n" + half;
+        bench.write("part/study.journal", &part);
+        bench.run_to(0, &["resume", "part", "--threads", "2"]);
+        for file in ["study.json", "study.html", "study.journal"] {
+            let (a, b) = (
+                bench.read(&format!("whole/{file}")),
+                bench.read(&format!("part/{file}")),
+            );
+            assert!(a == b, "{file} after {kept} lines");
+        }
+    }
+}
+
+fn refused(bench: &Workbench, arguments: &[&str]) -> String {
+    let before = bench.contents();
+    let (code, stdout, stderr) = bench.run(arguments);
+    assert_eq!(code, 2, "{arguments:?}\n{stdout}\n{stderr}");
+    assert_eq!(bench.contents(), before, "{arguments:?} left something");
+    stderr
+}
+
+fn changed(from: &str, to: &str) -> String {
+    let bench = bench();
+    assert!(MODEL.contains(from), "{from}");
+    bench.write("model.yaml", &MODEL.replacen(from, to, 1));
+    refused(&bench, &["study", "model.yaml"])
+}
+
+#[test]
+fn mistakes() {
+    let bench = bench();
+    bench.run_to(0, &["study", "model.yaml", "--out", "done"]);
+    bench.write("model.yaml", &MODEL.replacen("seed: 3", "seed: 4", 1));
+    let other_model = refused(&bench, &["resume", "done"]);
+    bench.write(
+        "done/study.journal",
+        "{\"format\": 9, \"model\": \"m\", \"fingerprint\": \"\"}\n",
+    );
+    let other_format = refused(&bench, &["resume", "done"]);
+    bench.write("old/result.json", "{\"format\": 0}\n");
+    let all = [
+        changed("seed: 3", "confidence: 1.0"),
+        changed("seed: 3", "confidence: 95"),
+        changed("spread: 1.5", "spread: 1.0"),
+        changed("starts: 4", "starts: 0"),
+        changed("at: 5.0", "at: 50.0"),
+        changed("{function: damping}", "{function: mass}"),
+        changed("{function: damping}", "{function: offset}"),
+        changed("{function: damping}", "{function: stiffness}"),
+        changed("{scalar: initial velocity", "{scalar: initial velocty"),
+        changed("sigma: 0.1", "sigma: 0"),
+        changed("seed: 3", "level: -1"),
+        other_model,
+        other_format,
+        refused(&bench, &["resume", "nowhere"]),
+        refused(&bench, &["study", "old"]),
+        refused(&bench, &["study", "model.yaml", "--threads", "0"]),
+    ];
+    assert_snapshot!(all.join("\n"));
+}
+
+/// A story is told from the numbers of its runs.
+#[test]
+fn a_story() {
+    let bench = Workbench::with_shipped_models();
+    bench.write(
+        "models/short.yaml",
+        "format: 1\ntitle: Two runs\nstory: [paper-positive.yaml, linear-mass.yaml]\n",
+    );
+    let stdout = bench.run_to(0, &["study", "models/short.yaml"]);
+    assert!(stdout.contains("paper-positive leaves J/J0"), "{stdout}");
+    assert!(
+        stdout
+            .contains("The first of these runs to find the device with its scale is linear-mass."),
+        "{stdout}"
+    );
+    assert!(
+        bench
+            .read("runs/short-study/compare.html")
+            .contains("What it comes to")
+    );
+    bench.write("models/short.yaml", "format: 1\nstory: []\n");
+    let before = refused(&bench, &["study", "models/short.yaml"]);
+    assert!(before.contains("the story has no model"), "{before}");
+}
