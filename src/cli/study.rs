@@ -280,8 +280,10 @@ impl Work<'_> {
                 gather::candidates(&problem, &theta, &evaluation, &plan.candidates)
             );
         }
-        self.document.equivalents =
-            piece!("equivalents", gather::equivalents(&problem, &evaluation));
+        self.document.equivalents = piece!(
+            "equivalents",
+            gather::equivalents(&problem, &evaluation, plan)
+        );
         if plan.starts > 0 {
             let found = piece!(
                 "starts",

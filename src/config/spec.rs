@@ -66,6 +66,10 @@ pub struct StudySpec {
     pub same: Option<Number>,
     /// Number of replicates of the bootstrap.
     pub bootstrap: Option<Count>,
+    /// Where the noise of the replicates comes from.
+    pub noise: Option<NoiseName>,
+    /// Masses for which devices with the same motion are sought.
+    pub equivalents: Option<Vec<EquivalentSpec>>,
     /// Whether each function is held against a constant.
     pub varies: Option<bool>,
     /// Experiments that might be made next.
@@ -87,6 +91,31 @@ pub struct ProfileSpec {
     pub mean: Option<bool>,
     /// Name of an estimated number, as the report calls it.
     pub scalar: Option<Text>,
+}
+
+choice! {
+    /// Noise of the replicates of a bootstrap.
+    pub enum NoiseName {
+        /// Gaussian, of the readings' sigma.
+        Parametric = "parametric",
+        /// The residuals of the fit, drawn with replacement.
+        Residual = "residual",
+    }
+}
+
+/// A device to be sought with the motion of the fit.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {name: constant mass, mass: 1.0}"
+)]
+pub struct EquivalentSpec {
+    /// What the report calls it.
+    pub name: Text,
+    /// Its mass, in kg.
+    pub mass: NumberOrColumn,
+    /// The damping that it should be near to, in N s/m; that of the fit unless given.
+    pub damping: Option<NumberOrColumn>,
 }
 
 /// An experiment that might be made.

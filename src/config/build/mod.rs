@@ -11,7 +11,7 @@ mod study;
 
 pub use experiments::{ChannelNote, HoldOut};
 pub use penalties::WeightSearch;
-pub use study::{Candidate, StudyPlan, StudyTarget};
+pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
 use super::ModelFile;
 use super::scalar::ScalarOr;

@@ -1,9 +1,12 @@
 //! What `study` looks into.
 
 use super::experiments;
+use super::functions::values;
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
-use crate::config::spec::{CandidateSpec, ChannelName, FunctionName, ProfileSpec, StudySpec};
+use crate::config::spec::{
+    CandidateSpec, ChannelName, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
+};
 use crate::dynamics::{ChannelKind, State};
 use crate::error::InputError;
 use crate::functions::Quantity;
@@ -34,6 +37,10 @@ pub struct StudyPlan {
     pub same: f64,
     /// Number of replicates of the bootstrap; 0 for none.
     pub replicates: usize,
+    /// Whether their noise is drawn from the residuals.
+    pub residual_noise: bool,
+    /// Masses, and dampings to be near to, of devices that are to have the fit's motion.
+    pub equivalents: Vec<Equivalent>,
     /// Whether each function is held against a constant.
     pub varies: bool,
     /// Experiments that might be made next.
@@ -62,6 +69,17 @@ pub enum StudyTarget {
         /// Index of the scalar.
         index: usize,
     },
+}
+
+/// A device that is to have the motion of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equivalent {
+    /// Name for reports.
+    pub name: String,
+    /// Its mass at the nodes, kg.
+    pub mass: Vec<f64>,
+    /// Damping that it should be near to, N s/m at the nodes; `None` for that of the fit.
+    pub damping: Option<Vec<f64>>,
 }
 
 /// An experiment that might be made: its readings are zeros, only their noise counts.
@@ -109,7 +127,13 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let candidates = candidates
         .map(|(i, spec)| candidate(file, problem, &format!("study.candidates[{i}]"), spec))
         .collect::<Result<_, _>>()?;
+    let equivalents = spec.equivalents.iter().flatten().enumerate();
+    let equivalents = equivalents
+        .map(|(i, spec)| equivalent(file, problem, &format!("study.equivalents[{i}]"), spec))
+        .collect::<Result<_, _>>()?;
     Ok(StudyPlan {
+        equivalents,
+        residual_noise: spec.noise == Some(NoiseName::Residual),
         confidence,
         seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
         profiles,
@@ -122,6 +146,30 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         varies: spec.varies == Some(true),
         candidates,
         limit: None,
+    })
+}
+
+fn equivalent(
+    file: &ModelFile,
+    problem: &Problem,
+    key: &str,
+    spec: &EquivalentSpec,
+) -> Result<Equivalent, InputError> {
+    let grid = &problem.oscillator.grid;
+    let mass_key = format!("{key}.mass");
+    let mass = values(file, grid, &mass_key, &spec.mass)?;
+    if let Some(least) = mass.iter().find(|m| **m <= 0.0) {
+        return Err(file
+            .error_at(&mass_key, "the mass must be positive at all times")
+            .found(least)
+            .expected("a number greater than 0, in kg"));
+    }
+    let damping = spec.damping.as_ref();
+    let damping = damping.map(|d| values(file, grid, &format!("{key}.damping"), d));
+    Ok(Equivalent {
+        name: spec.name.0.clone(),
+        mass,
+        damping: damping.transpose()?,
     })
 }
 

@@ -1,8 +1,8 @@
 //! From a fitted problem to the pieces of a study.
 
 use super::pieces::*;
-use crate::config::{Candidate, Model, StudyPlan, StudyTarget};
-use crate::dynamics::{Device, State};
+use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
+use crate::dynamics::{Device, Grid, State};
 use crate::functions::{Functions, Quantity, Ratios};
 use crate::identifiability::{
     self, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, Spectrum, Verdict, anchors,
@@ -29,6 +29,8 @@ const NAMED: usize = 400;
 const DRAWS: usize = 10_000;
 /// Roughness that the devices in a tube may have, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
+/// Least stiffness of an equivalent device, as a share of the fit's largest.
+const LEAST_STIFFNESS: f64 = 1e-3;
 /// Steps of the paths between two optima.
 const PATH: usize = 40;
 /// A path that rises by less than this share of the higher end's cost joins two ends of one valley.
@@ -319,8 +321,13 @@ fn ended(how: Ended) -> &'static str {
     }
 }
 
-/// Devices with the same motion as the fit's: other masses, and the stiffness that goes with them.
-pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<EquivalentRecord> {
+/// Devices with the same motion as the fit's: those that the plan asks for, or some whose mass is the
+/// fit's times a factor over time.
+pub fn equivalents(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    plan: &StudyPlan,
+) -> Vec<EquivalentRecord> {
     let grid = &problem.oscillator.grid;
     let Some(experiment) = problem.experiments.first() else {
         return Vec::new();
@@ -331,7 +338,47 @@ pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<Equivalent
     }
     let motion = Motion::of(problem, evaluation, 0);
     let device = evaluation.device_of(experiment.device);
-    let share = |t: f64| (t - grid.start()) / grid.duration();
+    let asked = match plan.equivalents.is_empty() {
+        true => factors(&device.mass),
+        false => plan.equivalents.clone(),
+    };
+    let mut records = vec![record(grid, "the fit", device, 0.0)];
+    for Equivalent {
+        name,
+        mass,
+        damping,
+    } in asked
+    {
+        let least = LEAST_STIFFNESS * device.coefficients[1].iter().copied().fold(0.0, f64::max);
+        let damping = damping.unwrap_or_else(|| device.coefficients[0].clone());
+        let Ok(found) = equivalent(&mass, &motion, &Wish::near(damping, least)) else {
+            continue;
+        };
+        let initial = State {
+            displacement: motion.displacement[0],
+            velocity: motion.velocity[0],
+        };
+        let excitation = experiment.excitation.as_ref();
+        let Ok(moved) = problem.oscillator.forward(&found, initial, excitation) else {
+            continue;
+        };
+        let largest = motion
+            .displacement
+            .iter()
+            .fold(0.0f64, |m, y| m.max(y.abs()));
+        let pairs = moved.displacement.iter().zip(&motion.displacement);
+        let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        records.push(record(grid, &name, &found, off / largest));
+    }
+    match records.len() {
+        1 => Vec::new(),
+        _ => records,
+    }
+}
+
+/// Masses that grow, fall and swing away from the fit's.
+fn factors(mass: &[f64]) -> Vec<Equivalent> {
+    let last = (mass.len() - 1) as f64;
     type Factor<'a> = &'a dyn Fn(f64) -> f64;
     let choices: [(&str, Factor); 3] = [
         ("mass that grows by a half", &|x| 1.0 + 0.5 * x),
@@ -340,49 +387,24 @@ pub fn equivalents(problem: &Problem, evaluation: &Evaluation) -> Vec<Equivalent
             1.0 + 0.2 * (12.0 * x).sin()
         }),
     ];
-    let times = grid.times();
-    let mut records = vec![EquivalentRecord {
-        name: "the fit".into(),
-        times: times.clone(),
+    let each = choices.into_iter().map(|(name, factor)| Equivalent {
+        name: name.into(),
+        mass: (mass.iter().enumerate())
+            .map(|(i, m)| m * factor(i as f64 / last))
+            .collect(),
+        damping: None,
+    });
+    each.collect()
+}
+
+fn record(grid: &Grid, name: &str, device: &Device, motion_error: f64) -> EquivalentRecord {
+    EquivalentRecord {
+        name: name.into(),
+        times: grid.times(),
         mass: device.mass.clone(),
         damping: device.coefficients[0].clone(),
         stiffness: device.coefficients[1].clone(),
-        motion_error: 0.0,
-    }];
-    for (name, factor) in choices {
-        let pairs = device.mass.iter().zip(&times);
-        let mass: Vec<f64> = pairs.map(|(m, t)| m * factor(share(*t))).collect();
-        let least = 1e-3 * device.coefficients[1].iter().copied().fold(0.0, f64::max);
-        let wish = Wish::near(device.coefficients[0].clone(), least);
-        let Ok(found) = equivalent(&mass, &motion, &wish) else {
-            continue;
-        };
-        let initial = State {
-            displacement: motion.displacement[0],
-            velocity: motion.velocity[0],
-        };
-        let moved = problem
-            .oscillator
-            .forward(&found, initial, experiment.excitation.as_ref());
-        let Ok(moved) = moved else { continue };
-        let largest = motion
-            .displacement
-            .iter()
-            .fold(0.0f64, |m, y| m.max(y.abs()));
-        let pairs = moved.displacement.iter().zip(&motion.displacement);
-        let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-        records.push(EquivalentRecord {
-            name: name.into(),
-            times: times.clone(),
-            mass: found.mass.clone(),
-            damping: found.coefficients[0].clone(),
-            stiffness: found.coefficients[1].clone(),
-            motion_error: off / largest,
-        });
-    }
-    match records.len() {
-        1 => Vec::new(),
-        _ => records,
+        motion_error,
     }
 }
 
@@ -515,7 +537,10 @@ pub fn refits(
     let found = bootstrap(
         problem,
         theta,
-        Noise::Parametric,
+        match plan.residual_noise {
+            true => Noise::Residual,
+            false => Noise::Parametric,
+        },
         plan.replicates,
         plan.seed,
         threads,
