@@ -25,6 +25,30 @@ pub enum Ranges {
     Constants(Vec<[f64; 2]>),
 }
 
+impl Ranges {
+    /// The parameters' own bounds, by the constraints about one parameter alone; `None` unless every
+    /// parameter has two.
+    pub fn of_bounds(problem: &Problem) -> Option<Self> {
+        let mut ranges = vec![[f64::NEG_INFINITY, f64::INFINITY]; problem.parameters()];
+        for group in &problem.constraints.groups {
+            for i in 0..group.rows.len() {
+                let Some((j, a)) = group.single(i) else {
+                    continue;
+                };
+                let [lower, upper] = group.bounds(i).map(|b| b / a);
+                let [low, high] = if a > 0.0 {
+                    [lower, upper]
+                } else {
+                    [upper, lower]
+                };
+                ranges[j] = [ranges[j][0].max(low), ranges[j][1].min(high)];
+            }
+        }
+        let bounded = ranges.iter().flatten().all(|b| b.is_finite());
+        bounded.then_some(Self::Parameters(ranges))
+    }
+}
+
 /// How the fits are run.
 #[derive(Debug, Clone)]
 pub struct Multistart {

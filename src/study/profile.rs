@@ -16,6 +16,7 @@
 //! exploiting the profile likelihood", *Bioinformatics* 25 (2009) 1923-1929.
 
 use super::functional::Linear;
+use super::parallel::map;
 use super::refit::{nearest, settings, sizes};
 use crate::constraints::RowGroup;
 use crate::dynamics::Breakdown;
@@ -40,6 +41,10 @@ const END_FITS: usize = 60;
 const BETTER: f64 = 1e-3;
 /// Without a covariance, the first step as a share of the number's size.
 const FIRST_STEP: f64 = 0.02;
+/// Without a limit, so many sizes away is far.
+const FAR: f64 = 1e3;
+/// A bound that a program finds is kept away from by this share of the number's size.
+const SPARE: f64 = 1e-6;
 /// A rise is another constraint's work if without it less than this share of the quantile is left.
 const BLAMED: f64 = 0.5;
 
@@ -88,6 +93,8 @@ pub enum End {
     RiseBy(Vec<String>),
     /// The number's own bound, or the stated limit, comes first.
     Bound,
+    /// There is none within a thousand times the number's size.
+    Far,
     /// The steps ran out.
     Steps,
     /// No motion, or no fit, further out.
@@ -155,6 +162,7 @@ impl Profile {
                     names.join(" and ")
                 ),
                 End::Bound => format!("{side} it runs into its bound or limit"),
+                End::Far => format!("{side} there is no end within {FAR} times its size"),
                 End::Steps => format!("{side} the steps ran out"),
                 End::Failed(reason) => format!("{side} no fit was found ({reason})"),
             };
@@ -204,6 +212,23 @@ pub fn profile(
     });
     let sides = [-1.0, 1.0].map(|side| walk.side(side, &start, &before));
     Ok(walk.finish(value, sides))
+}
+
+/// The profiles of several numbers, on up to `threads` threads; the same bits for any number of them.
+///
+/// # Errors
+/// As [`profile()`].
+pub fn profiles(
+    problem: &Problem,
+    optimum: &[f64],
+    of: &[Linear],
+    how: &ProfileSettings,
+    threads: usize,
+) -> Result<Vec<Profile>, Breakdown> {
+    let each = map(of.len(), threads, |i| {
+        profile(problem, optimum, &of[i], how)
+    });
+    each.into_iter().collect()
 }
 
 /// Names of the constraints that are active at a point, the profile's own row left out.
@@ -275,20 +300,20 @@ impl Walk<'_> {
         }
     }
 
-    /// How far the number can go towards `side` under the constraints and limits.
-    fn reach(&self, side: f64, theta: &[f64]) -> f64 {
+    /// How far the number can go towards `side` under the constraints and limits, and what is there.
+    fn reach(&self, side: f64, theta: &[f64]) -> (f64, End) {
         let here = self.of.of(theta);
         let limit = self.how.limits[usize::from(side > 0.0)];
-        if self.problem.constraints.is_empty() {
-            return limit;
-        }
         let size: f64 = (self.of.entries.iter())
             .map(|(j, a)| (a * self.sizes[*j]).abs())
             .sum();
-        let far = match limit.is_finite() {
-            true => limit,
-            false => here + side * FAR * size,
+        let (far, what) = match limit.is_finite() {
+            true => (limit, End::Bound),
+            false => (here + side * FAR * size, End::Far),
         };
+        if self.problem.constraints.is_empty() || far == here {
+            return (far, what);
+        }
         // The point of the constraints whose number is nearest to what is far.
         let unit = (far - here).abs().max(f64::MIN_POSITIVE);
         let mut sub = Subproblem::new(theta.len());
@@ -302,15 +327,20 @@ impl Walk<'_> {
         }
         let solution = sub.solve();
         if !matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost) {
-            return limit;
+            return (far, what);
         }
         let mut moved: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
         self.problem.constraints.clip(&mut moved);
         let reached = self.of.of(&moved);
-        match (far - reached).abs() <= 1e-3 * unit {
-            true => limit,
-            false => reached,
+        if (far - reached).abs() <= 1e-3 * unit {
+            return (far, what);
         }
+        // A program meets rows about several parameters to its accuracy only.
+        let spare = match self.problem.constraints.are_simple() {
+            true => 0.0,
+            false => SPARE * size.min((reached - here).abs()),
+        };
+        (reached - side * spare, End::Bound)
     }
 
     fn first_step(&self, start: &Point) -> f64 {
@@ -326,14 +356,14 @@ impl Walk<'_> {
 
     fn side(&mut self, side: f64, start: &Point, before: &[String]) -> (Option<f64>, End) {
         let mut step = self.first_step(start);
-        let limit = self.reach(side, &start.parameters);
+        let (limit, what) = self.reach(side, &start.parameters);
         let mut seen: Vec<String> = before.to_vec();
         let mut here = self.samples[0].clone();
         let mut behind: Option<Sample> = None;
         let mut shortened = 0;
         for _ in 0..self.how.steps {
             if (limit - here.value) * side <= 1e-12 * limit.abs() {
-                return (None, End::Bound);
+                return (None, what);
             }
             let wanted = here.value + side * step;
             let value = if (limit - wanted) * side < 0.0 {
@@ -460,9 +490,6 @@ impl Walk<'_> {
         }
     }
 }
-
-/// Without a limit, so many sizes away is far.
-const FAR: f64 = 1e3;
 
 /// The parameters at `value` on the line through two samples; those of the second without a first.
 fn extrapolated(first: Option<&Sample>, second: &Sample, value: f64) -> Vec<f64> {

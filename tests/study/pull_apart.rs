@@ -1,6 +1,7 @@
 use crate::common::{INITIAL, csv, paper_device, paper_problem, shared};
 use crate::problems::{linear, regular};
 use kmcfit::constraints::RowGroup;
+use kmcfit::functions::{Basis, Penalty};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::fit_from;
 use kmcfit::study::profile::QUANTILE_95;
@@ -170,4 +171,81 @@ fn ratios_have_tubes_of_their_own() {
     let tolerance = 1e-5 * (high - low);
     assert!((bands[0].low.value - low).abs() < tolerance);
     assert!((bands[0].high.value - high).abs() < tolerance);
+}
+
+/// With the scale fixed by k(0) = 1 and smooth functions the tubes have ends, and a smaller budget
+/// makes them narrower.
+#[test]
+fn roughness_budgets_bound_the_tubes() {
+    let mut problem = positive();
+    let k0 = problem.functions.ranges()[2].start;
+    crate::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);
+    let device = paper_device(NODES);
+    let truth = [
+        &device.mass[..],
+        &device.coefficients[0],
+        &device.coefficients[1],
+    ]
+    .concat();
+    let grid = problem.oscillator.grid;
+    let mut before: Option<[f64; 2]> = None;
+    for budget in [1e-3, 1e-5] {
+        let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
+        let level = Level {
+            budgets: (0..3).map(|f| (rows(f), budget)).collect(),
+            ..Level::of(0.0114)
+        };
+        let targets = values_at(&problem, 0, &[15.0]);
+        let clock = std::time::Instant::now();
+        let band = &tube(&problem, &[truth.clone()], &targets, &level, 2).unwrap()[0];
+        let ends = [&band.low, &band.high];
+        println!(
+            "budget {budget:e}: {:?} in {:.1} s",
+            ends.map(|e| (e.value, e.ended, e.programs)),
+            clock.elapsed().as_secs_f64()
+        );
+        let exact = device.mass[(15.0 / grid.step()) as usize];
+        assert!(band.low.value < exact && exact < band.high.value);
+        for end in ends {
+            assert!(end.misfit <= 0.0114);
+            for f in 0..3 {
+                let range = problem.functions.ranges()[f].clone();
+                assert!(rows(f).roughness(&end.parameters[range]) <= budget * 1.0001);
+            }
+        }
+        let found = ends.map(|e| e.value);
+        if let Some(wider) = before {
+            assert!(wider[0] < found[0] && found[1] < wider[1]);
+        }
+        before = Some(found);
+    }
+}
+
+/// On the paper's own grid its own optimum is within the level, and the search starts there.
+#[test]
+fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
+    let Some(folder) = shared("reference") else {
+        return;
+    };
+    let rows = csv(&folder.join("paper_optimum.csv"));
+    let n = rows.len();
+    let problem = paper_problem(n, [2.0, 1.0, 1.0]);
+    let column = |c: usize| rows.iter().map(|r| r[c]).collect::<Vec<f64>>();
+    let optimum = [column(1), column(3), column(2)].concat();
+    let level = Level {
+        programs: 4,
+        ..Level::of(0.0114)
+    };
+    let clock = std::time::Instant::now();
+    let q = values_at(&problem, 0, &[12.5]).remove(0);
+    let found = extreme(&problem, &optimum, &q, false, &level).unwrap();
+    println!(
+        "{}: {} from {}, {:?}, {:.1} s",
+        found.name(),
+        found.value,
+        q.of(&optimum),
+        found.ended,
+        clock.elapsed().as_secs_f64()
+    );
+    assert!(found.misfit <= 0.0114 && found.value < q.of(&optimum));
 }
