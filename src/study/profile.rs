@@ -41,6 +41,8 @@ const END_FITS: usize = 60;
 const BETTER: f64 = 1e-3;
 /// Without a covariance, the first step as a share of the number's size.
 const FIRST_STEP: f64 = 0.02;
+/// Bisections for the value at which a constraint becomes active: to a thousandth of a step.
+const MARK_FITS: usize = 10;
 /// Without a limit, so many sizes away is far.
 const FAR: f64 = 1e3;
 /// A bound that a program finds is kept away from by this share of the number's size.
@@ -104,7 +106,7 @@ pub enum End {
 /// A constraint that becomes active along the profile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
-    /// The first value at which it is.
+    /// The value from which on it is, outwards from the optimum.
     pub value: f64,
     /// Its name.
     pub constraint: String,
@@ -203,14 +205,18 @@ pub fn profile(
         marks: Vec::new(),
         samples: Vec::new(),
     };
-    let before: Vec<String> = names(problem, &start);
     let value = of.of(&start.parameters);
-    walk.samples.push(Sample {
+    let first = Sample {
         value,
         cost: start.evaluation.cost,
-        point: start.clone(),
-    });
-    let sides = [-1.0, 1.0].map(|side| walk.side(side, &start, &before));
+        active: names(problem, &start),
+        point: start,
+    };
+    walk.samples.push(first.clone());
+    let sides = [-1.0, 1.0].map(|side| walk.side(side, &first));
+    for side in [-1.0, 1.0] {
+        walk.mark(side, &first);
+    }
     Ok(walk.finish(value, sides))
 }
 
@@ -256,6 +262,8 @@ struct Sample {
     value: f64,
     cost: f64,
     point: Point,
+    /// Names of the constraints that are active there.
+    active: Vec<String>,
 }
 
 struct Walk<'a> {
@@ -295,6 +303,7 @@ impl Walk<'_> {
             _ => Ok(Sample {
                 value,
                 cost: found.best.evaluation.cost,
+                active: names(&held, &found.best),
                 point: found.best,
             }),
         }
@@ -354,11 +363,10 @@ impl Walk<'_> {
         self.how.step.unwrap_or(guess)
     }
 
-    fn side(&mut self, side: f64, start: &Point, before: &[String]) -> (Option<f64>, End) {
-        let mut step = self.first_step(start);
-        let (limit, what) = self.reach(side, &start.parameters);
-        let mut seen: Vec<String> = before.to_vec();
-        let mut here = self.samples[0].clone();
+    fn side(&mut self, side: f64, start: &Sample) -> (Option<f64>, End) {
+        let mut step = self.first_step(&start.point);
+        let (limit, what) = self.reach(side, &start.point.parameters);
+        let mut here = start.clone();
         let mut behind: Option<Sample> = None;
         let mut shortened = 0;
         for _ in 0..self.how.steps {
@@ -383,20 +391,15 @@ impl Walk<'_> {
                     continue;
                 }
             };
-            let now = names(&held(self.problem, self.of, value), &next.point);
-            for constraint in now.iter().filter(|name| !seen.contains(name)) {
-                self.marks.push(Mark {
-                    value,
-                    constraint: constraint.clone(),
-                });
-            }
-            seen.extend(now);
             let rise = self.rise(next.cost) - self.rise(here.cost);
             self.samples.push(next.clone());
             if self.distance(next.cost) >= 0.0 {
                 let end = self.end(here, next);
-                let names = names(&held(self.problem, self.of, end.value), &end.point);
-                let new = names.into_iter().filter(|n| !before.contains(n)).collect();
+                let active = end.active.iter();
+                let new = active
+                    .filter(|n| !start.active.contains(n))
+                    .cloned()
+                    .collect();
                 return (Some(end.value), self.blame(&end, new));
             }
             if rise < SLOW * self.how.quantile {
@@ -442,6 +445,37 @@ impl Walk<'_> {
             }
         }
         outside
+    }
+
+    /// Marks the constraints that become active on one side, each where it does, by bisection between
+    /// the last sample without it and the first one with it.
+    fn mark(&mut self, side: f64, start: &Sample) {
+        let beyond = |s: &&Sample| (s.value - start.value) * side >= 0.0;
+        let mut samples: Vec<Sample> = self.samples.iter().filter(beyond).cloned().collect();
+        samples.sort_by(|a, b| (side * a.value).total_cmp(&(side * b.value)));
+        let mut seen = start.active.clone();
+        for pair in samples.windows(2) {
+            for constraint in &pair[1].active {
+                if seen.contains(constraint) {
+                    continue;
+                }
+                seen.push(constraint.clone());
+                let (mut without, mut with) = (pair[0].clone(), pair[1].clone());
+                for _ in 0..MARK_FITS {
+                    let middle = 0.5 * (without.value + with.value);
+                    let guess = extrapolated(Some(&without), &with, middle);
+                    match self.fit(self.problem, middle, &guess) {
+                        Ok(next) if next.active.contains(constraint) => with = next,
+                        Ok(next) => without = next,
+                        Err(_) => break,
+                    }
+                }
+                self.marks.push(Mark {
+                    value: with.value,
+                    constraint: constraint.clone(),
+                });
+            }
+        }
     }
 
     /// Whether the rise at `end` is the work of the constraints `new`, which are not active at the

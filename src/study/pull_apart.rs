@@ -18,9 +18,9 @@
 //! The result is a device, so the tube is at least as wide as stated; that it is not wider still is
 //! known only as far as the local search goes, and more starts can only widen it.
 //!
-//! Source: the question is that of F. Hornung, C. Tönsing et al. (Data2Dynamics), the method as in
-//! R. Fletcher, S. Leyffer, *Mathematical Programming* 91 (2002) 239-269, with second-order
-//! correction.
+//! The question is that of the pull-apart search of Data2Dynamics. Source of the method: A. R. Conn,
+//! N. I. M. Gould, P. L. Toint, *Trust-Region Methods*, SIAM 2000, chapter 15, second-order
+//! corrections included.
 
 use super::functional::{Linear, Target};
 use super::parallel::map;

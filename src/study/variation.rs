@@ -11,9 +11,9 @@
 //! on whole costs, penalties and priors included. Its distribution when the function is constant is
 //! not a chi-square once there are penalties, so it is simulated: readings of the constant model
 //! with seeded normal noise, both models refitted to their linearisation at the constant optimum,
-//! penalties and priors included, inequality constraints left out (a model held at its bounds fits
-//! less well than its linearisation without them: the test then errs towards constant). The p-value
-//! is `(1 + how many simulated LR are at least the observed) / (1 + simulations)`.
+//! penalties and priors included, inequality constraints left out: bounds that hold the varying model
+//! alone make the test err towards constant, one that holds the constant itself towards varying. The
+//! p-value is `(1 + how many simulated LR are at least the observed) / (1 + simulations)`.
 //!
 //! Source: A. C. Davison, D. V. Hinkley, *Bootstrap Methods and their Application*, Cambridge 1997,
 //! section 4.2.

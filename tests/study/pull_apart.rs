@@ -60,6 +60,9 @@ fn the_extremes_are_the_ends_of_the_profile() {
         let bands = tube(&problem, &[best.clone()], &[Target::Linear(q)], &level, 2).unwrap();
         let found = [bands[0].low.value, bands[0].high.value];
         println!("{found:?} {low} {high}");
+        let q = Target::Linear(Linear::parameter(j));
+        let one = tube(&problem, &[best.clone()], &[q], &level, 1).unwrap();
+        assert_eq!(one, bands, "the threads change no bit");
         let tolerance = 1e-6 * (high - low);
         assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
     }
