@@ -160,7 +160,7 @@ pub fn tube(
     }
     let job = |index: usize| {
         let target = &targets[index / 2];
-        let side = if index % 2 == 0 { -1.0 } else { 1.0 };
+        let side = if index.is_multiple_of(2) { -1.0 } else { 1.0 };
         let found = usable
             .iter()
             .filter_map(|start| search.extreme(start, target, side));

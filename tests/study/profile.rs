@@ -299,7 +299,7 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     assert_eq!(found, again, "the threads change no bit");
     let targets = list.map(Target::Linear);
     let level = Level::of(misfit + QUANTILE_95);
-    let bands = tube(&problem, &[best.clone()], &targets, &level, 1).unwrap();
+    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
     for (profile, band) in found.iter().zip(&bands) {
         let [low, high] = profile.interval.map(Option::unwrap);
         println!(

@@ -57,11 +57,18 @@ fn the_extremes_are_the_ends_of_the_profile() {
         let q = Linear::parameter(j);
         let profile = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
         let [low, high] = profile.interval.map(Option::unwrap);
-        let bands = tube(&problem, &[best.clone()], &[Target::Linear(q)], &level, 2).unwrap();
+        let bands = tube(
+            &problem,
+            std::slice::from_ref(&best),
+            &[Target::Linear(q)],
+            &level,
+            2,
+        )
+        .unwrap();
         let found = [bands[0].low.value, bands[0].high.value];
         println!("{found:?} {low} {high}");
         let q = Target::Linear(Linear::parameter(j));
-        let one = tube(&problem, &[best.clone()], &[q], &level, 1).unwrap();
+        let one = tube(&problem, std::slice::from_ref(&best), &[q], &level, 1).unwrap();
         assert_eq!(one, bands, "the threads change no bit");
         let tolerance = 1e-6 * (high - low);
         assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
@@ -106,7 +113,7 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     for f in 0..3 {
         let targets = values_at(&problem, f, &times);
         let clock = std::time::Instant::now();
-        let bands = tube(&problem, &[truth.clone()], &targets, &level, 2).unwrap();
+        let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
         for (band, time) in bands.iter().zip(times) {
             let [low, high] = [&band.low, &band.high];
             println!(
@@ -155,7 +162,7 @@ fn ratios_have_tubes_of_their_own() {
     let (best, misfit) = optimum(&problem);
     let level = Level::of(misfit + QUANTILE_95);
     let targets = ratios_at(&problem, 2, 0, &[3.0]);
-    let bands = tube(&problem, &[best.clone()], &targets, &level, 2).unwrap();
+    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let (known, start) = (regular(3), best[2] / best[0]);
     let (fixed, _) = optimum(&known);
     let profile = profile(
@@ -200,7 +207,7 @@ fn roughness_budgets_bound_the_tubes() {
         };
         let targets = values_at(&problem, 0, &[15.0]);
         let clock = std::time::Instant::now();
-        let band = &tube(&problem, &[truth.clone()], &targets, &level, 2).unwrap()[0];
+        let band = &tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap()[0];
         let ends = [&band.low, &band.high];
         println!(
             "budget {budget:e}: {:?} in {:.1} s",
