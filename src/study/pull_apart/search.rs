@@ -3,7 +3,7 @@
 use super::{Ended, Extreme, Level};
 use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
-use crate::objective::Evaluation;
+use crate::objective::{Channel, Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::{add_priors, linear_readings};
@@ -122,11 +122,12 @@ impl Search<'_> {
     /// variables measured by `units`.
     fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
         let mut sub = linear_readings(self.problem, evaluation);
+        let surplus = self.surplus(&sub, evaluation);
         add_priors(self.problem, theta, &mut sub);
         let readings = std::mem::take(&mut sub.residuals);
         sub.residuals = Rows::new();
-        sub.cones
-            .push(ball(&readings, AIM * self.level.misfit.sqrt()));
+        let left = (self.level.misfit - surplus).max(f64::MIN_POSITIVE.sqrt());
+        sub.cones.push(ball(&readings, AIM * left.sqrt()));
         let ranges = self.problem.functions.ranges();
         for (penalty, budget) in &self.level.budgets {
             let range = ranges[penalty.function].clone();
@@ -140,6 +141,17 @@ impl Search<'_> {
         }
         sub.constrain(&self.problem.constraints, theta);
         sub
+    }
+
+    /// The misfit less the weighted squares that stand for it, none for least squares. The squares of
+    /// a robust loss lie above it and touch it here, so a step that they allow is within the level.
+    fn surplus(&self, readings: &Subproblem, evaluation: &Evaluation) -> f64 {
+        let plain = |c: &Channel| c.loss() == Loss::Squares;
+        if self.problem.channels().all(plain) {
+            return 0.0;
+        }
+        let squares: f64 = readings.residuals.right().iter().map(|r| r * r).sum();
+        evaluation.misfit - squares
     }
 
     /// Parameters as units by their sizes, states by those of the motions.

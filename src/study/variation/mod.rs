@@ -15,6 +15,8 @@
 //! alone make the test err towards constant, one that holds the constant itself towards varying. The
 //! p-value is `(1 + how many simulated LR are at least the observed) / (1 + simulations)`.
 //!
+//! The noise is normal: with a robust loss the p-value is only as good as that.
+//!
 //! Source: A. C. Davison, D. V. Hinkley, *Bootstrap Methods and their Application*, Cambridge 1997,
 //! section 4.2.
 
