@@ -25,4 +25,4 @@ mod simulate;
 pub mod variation;
 
 pub use functional::{Linear, Target};
-pub use profile::{Profile, ProfileSettings, profile};
+pub use profile::{Profile, ProfileSettings, profile, profiles};

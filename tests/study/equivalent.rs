@@ -60,7 +60,7 @@ fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
         .map(|_| {
             [
                 random.random_range(-0.1..0.1),
-                random.random_range(0.0..6.28),
+                random.random_range(0.0..std::f64::consts::TAU),
             ]
         })
         .collect();

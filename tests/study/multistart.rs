@@ -43,7 +43,7 @@ pub fn minima(problem: &Problem) -> Vec<f64> {
 
 fn how(threads: usize) -> Multistart {
     Multistart {
-        ranges: Ranges::Parameters(vec![[1.0, 65.0]]),
+        ranges: Ranges::of_bounds(&aliased(0.0)).unwrap(),
         starts: 80,
         seed: 4,
         threads,

@@ -1,6 +1,8 @@
 use crate::common::{INITIAL, csv, paper_device, paper_problem, shared};
 use crate::problems::{linear, regular};
 use kmcfit::constraints::RowGroup;
+use kmcfit::functions::{Basis, Penalty};
+use kmcfit::objective::Loss;
 use kmcfit::problem::Problem;
 use kmcfit::solvers::fit_from;
 use kmcfit::study::profile::QUANTILE_95;
@@ -56,12 +58,48 @@ fn the_extremes_are_the_ends_of_the_profile() {
         let q = Linear::parameter(j);
         let profile = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
         let [low, high] = profile.interval.map(Option::unwrap);
-        let bands = tube(&problem, &[best.clone()], &[Target::Linear(q)], &level, 2).unwrap();
+        let bands = tube(
+            &problem,
+            std::slice::from_ref(&best),
+            &[Target::Linear(q)],
+            &level,
+            2,
+        )
+        .unwrap();
         let found = [bands[0].low.value, bands[0].high.value];
         println!("{found:?} {low} {high}");
+        let q = Target::Linear(Linear::parameter(j));
+        let one = tube(&problem, std::slice::from_ref(&best), &[q], &level, 1).unwrap();
+        assert_eq!(one, bands, "the threads change no bit");
         let tolerance = 1e-6 * (high - low);
         assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
     }
+}
+
+/// A robust loss, with readings that are far off: still the same question.
+#[test]
+fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
+    let mut problem = regular(3);
+    let experiment = &mut problem.experiments[0];
+    let channel = experiment.channels[0].clone();
+    let far = |i: usize| if i % 10 == 3 { 1.0 } else { 0.0 };
+    let noise: Vec<f64> = (0..channel.len()).map(far).collect();
+    let observed = channel.observed().to_vec();
+    let channel = channel.with_simulated(&observed, &noise);
+    experiment.channels[0] = channel.with_loss(Loss::Huber { threshold: 1.345 });
+    let (best, misfit) = optimum(&problem);
+    let level = Level::of(misfit + QUANTILE_95);
+    let q = Linear::parameter(1);
+    let how = ProfileSettings::default();
+    let profile = profile(&problem, &best, &q, &how).unwrap();
+    let [low, high] = profile.interval.map(Option::unwrap);
+    let targets = [Target::Linear(q)];
+    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
+    let found = [bands[0].low.value, bands[0].high.value];
+    println!("{found:?} {low} {high}");
+    // Few readings change sides of the threshold near the level, so reweighting loses little: 1e-7.
+    let tolerance = 1e-5 * (high - low);
+    assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
 }
 
 const NODES: usize = 200;
@@ -102,7 +140,7 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     for f in 0..3 {
         let targets = values_at(&problem, f, &times);
         let clock = std::time::Instant::now();
-        let bands = tube(&problem, &[truth.clone()], &targets, &level, 2).unwrap();
+        let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
         for (band, time) in bands.iter().zip(times) {
             let [low, high] = [&band.low, &band.high];
             println!(
@@ -151,7 +189,7 @@ fn ratios_have_tubes_of_their_own() {
     let (best, misfit) = optimum(&problem);
     let level = Level::of(misfit + QUANTILE_95);
     let targets = ratios_at(&problem, 2, 0, &[3.0]);
-    let bands = tube(&problem, &[best.clone()], &targets, &level, 2).unwrap();
+    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let (known, start) = (regular(3), best[2] / best[0]);
     let (fixed, _) = optimum(&known);
     let profile = profile(
@@ -170,4 +208,81 @@ fn ratios_have_tubes_of_their_own() {
     let tolerance = 1e-5 * (high - low);
     assert!((bands[0].low.value - low).abs() < tolerance);
     assert!((bands[0].high.value - high).abs() < tolerance);
+}
+
+/// With the scale fixed by k(0) = 1 and smooth functions the tubes have ends, and a smaller budget
+/// makes them narrower.
+#[test]
+fn roughness_budgets_bound_the_tubes() {
+    let mut problem = positive();
+    let k0 = problem.functions.ranges()[2].start;
+    crate::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);
+    let device = paper_device(NODES);
+    let truth = [
+        &device.mass[..],
+        &device.coefficients[0],
+        &device.coefficients[1],
+    ]
+    .concat();
+    let grid = problem.oscillator.grid;
+    let mut before: Option<[f64; 2]> = None;
+    for budget in [1e-3, 1e-5] {
+        let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
+        let level = Level {
+            budgets: (0..3).map(|f| (rows(f), budget)).collect(),
+            ..Level::of(0.0114)
+        };
+        let targets = values_at(&problem, 0, &[15.0]);
+        let clock = std::time::Instant::now();
+        let band = &tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap()[0];
+        let ends = [&band.low, &band.high];
+        println!(
+            "budget {budget:e}: {:?} in {:.1} s",
+            ends.map(|e| (e.value, e.ended, e.programs)),
+            clock.elapsed().as_secs_f64()
+        );
+        let exact = device.mass[(15.0 / grid.step()) as usize];
+        assert!(band.low.value < exact && exact < band.high.value);
+        for end in ends {
+            assert!(end.misfit <= 0.0114);
+            for f in 0..3 {
+                let range = problem.functions.ranges()[f].clone();
+                assert!(rows(f).roughness(&end.parameters[range]) <= budget * 1.0001);
+            }
+        }
+        let found = ends.map(|e| e.value);
+        if let Some(wider) = before {
+            assert!(wider[0] < found[0] && found[1] < wider[1]);
+        }
+        before = Some(found);
+    }
+}
+
+/// On the paper's own grid its own optimum is within the level, and the search starts there.
+#[test]
+fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
+    let Some(folder) = shared("reference") else {
+        return;
+    };
+    let rows = csv(&folder.join("paper_optimum.csv"));
+    let n = rows.len();
+    let problem = paper_problem(n, [2.0, 1.0, 1.0]);
+    let column = |c: usize| rows.iter().map(|r| r[c]).collect::<Vec<f64>>();
+    let optimum = [column(1), column(3), column(2)].concat();
+    let level = Level {
+        programs: 4,
+        ..Level::of(0.0114)
+    };
+    let clock = std::time::Instant::now();
+    let q = values_at(&problem, 0, &[12.5]).remove(0);
+    let found = extreme(&problem, &optimum, &q, false, &level).unwrap();
+    println!(
+        "{}: {} from {}, {:?}, {:.1} s",
+        found.name(),
+        found.value,
+        q.of(&optimum),
+        found.ended,
+        clock.elapsed().as_secs_f64()
+    );
+    assert!(found.misfit <= 0.0114 && found.value < q.of(&optimum));
 }

@@ -1,5 +1,6 @@
 use crate::problems::knots;
 use kmcfit::functions::{Basis, Penalty};
+use kmcfit::objective::{Channel, Weighting};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::fit_from;
 use kmcfit::study::variation::{Asking, Varies, variation};
@@ -48,6 +49,17 @@ fn a_stiffness_that_varies_is_found() {
     let knots = (0..11).map(|i| i as f64).collect();
     let rows = Basis::PiecewiseLinear { knots }.roughness(&grid, 1);
     problem.penalties.push(Penalty::new(2, 1, 10.0, rows));
+    let found = asked(&problem);
+    println!("{}", found.sentence());
+    assert!(found.varies(), "{found:?}");
+    for experiment in &mut problem.experiments {
+        let plain = |c: &Channel| {
+            let weights = vec![1.0; c.len()];
+            c.clone().with_weighting(Weighting::Trapezoid(weights))
+        };
+        experiment.channels = experiment.channels.iter().map(plain).collect();
+    }
+    problem.penalties[0].weight *= 0.05 * 0.05;
     let found = asked(&problem);
     println!("{}", found.sentence());
     assert!(found.varies(), "{found:?}");

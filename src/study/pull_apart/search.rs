@@ -1,36 +1,14 @@
-//! The extreme devices among all that explain the readings as well as stated.
-//!
-//! For a number `q` of the device (a function's value, or `k/m`, at a time)
-//!
-//! ```text
-//! max or min q(theta)   subject to   misfit(theta) <= level,  the model's constraints,
-//!                                    |L_j theta_j - target_j|^2 <= budget_j  (if stated)
-//! ```
-//!
-//! over many times this is the widest tube. `misfit` is that of the readings plus the priors of the
-//! scalars; penalties have no part in it but through the budgets. It is solved by sequential convex
-//! programming: the predictions are linearised, so that the level is one second-order cone
-//! `|W (r + J d)| <= sqrt(level)`, with a box of changing size as trust region; a trial that is
-//! outside the true level is brought back by Gauss–Newton projections, and every accepted point is a
-//! fresh forward solve. With many parameters the states are unknowns beside them, tied by the
-//! linearised steps.
-//!
-//! The result is a device, so the tube is at least as wide as stated; that it is not wider still is
-//! known only as far as the local search goes, and more starts can only widen it.
-//!
-//! Source: the question is that of F. Hornung, C. Tönsing et al. (Data2Dynamics), the method as in
-//! R. Fletcher, S. Leyffer, *Mathematical Programming* 91 (2002) 239-269, with second-order
-//! correction.
+//! Sequential convex programming for one extreme.
 
-use super::functional::{Linear, Target};
-use super::parallel::map;
-use super::refit::sizes;
+use super::{Ended, Extreme, Level};
 use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
-use crate::objective::Evaluation;
+use crate::objective::{Channel, Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::{add_priors, linear_readings};
+use crate::study::functional::Target;
+use crate::study::refit::sizes;
 
 /// First size of the trust region, relative to the functions' natural sizes.
 const FIRST_RADIUS: f64 = 0.25;
@@ -46,148 +24,6 @@ const CORRECTIONS: usize = 6;
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.2;
 
-/// What bounds the devices beside the problem's own constraints.
-#[derive(Debug, Clone)]
-pub struct Level {
-    /// Largest misfit, in the unit of the cost: for readings with sigma the best chi-square plus a
-    /// quantile, or a stated J.
-    pub misfit: f64,
-    /// Penalties whose `|L theta - target|^2` must not exceed the number beside it.
-    pub budgets: Vec<(Penalty, f64)>,
-    /// No number is pushed beyond so many times its natural size: free motion has no upper end for a
-    /// mass.
-    pub reach: f64,
-    /// Most convex programs for one extreme.
-    pub programs: usize,
-}
-
-impl Level {
-    /// A misfit, and nothing else; numbers up to ten times their natural sizes.
-    pub fn of(misfit: f64) -> Self {
-        Self {
-            misfit,
-            budgets: Vec::new(),
-            reach: 10.0,
-            programs: 60,
-        }
-    }
-}
-
-/// How the search for an extreme ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
-    /// No step of the convex programs gains any more.
-    Settled,
-    /// The stated reach is met: the number has no end before it.
-    Reach,
-    /// No trial could be brought back to the level.
-    Stuck,
-    /// The programs ran out.
-    Programs,
-}
-
-/// An extreme device.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Extreme {
-    /// The number pushed, as in `mass at 3 s`.
-    pub function: String,
-    /// The time that it speaks of, s.
-    pub time: Option<f64>,
-    /// Whether it is the largest rather than the smallest.
-    pub largest: bool,
-    /// Its value.
-    pub value: f64,
-    /// The device, and the scalars.
-    pub parameters: Vec<f64>,
-    /// Misfit by a fresh forward solve, at most the level.
-    pub misfit: f64,
-    /// How the search ended.
-    pub ended: Ended,
-    /// Convex programs solved.
-    pub programs: usize,
-}
-
-impl Extreme {
-    /// Name of the device, as in `largest mass at 3 s`.
-    pub fn name(&self) -> String {
-        let way = if self.largest { "largest" } else { "smallest" };
-        format!("{way} {}", self.function)
-    }
-}
-
-/// Both ends of one number.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Band {
-    /// The device with the smallest value.
-    pub low: Extreme,
-    /// The device with the largest.
-    pub high: Extreme,
-}
-
-/// The targets of a tube of function `function` at `times` (s), those on the grid.
-pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Target> {
-    let each = times
-        .iter()
-        .filter_map(|t| Linear::value(problem, function, *t));
-    each.map(Target::Linear).collect()
-}
-
-/// The targets of a tube of the ratio of two functions, the second positive.
-pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) -> Vec<Target> {
-    let each = times.iter().filter_map(|t| {
-        let over = Linear::value(problem, over, *t)?;
-        Some(Target::Ratio(over, Linear::value(problem, under, *t)?))
-    });
-    each.collect()
-}
-
-/// Both extremes of every target, each from all `starts` that are within the level, on up to
-/// `threads` threads; `None` if no start is.
-pub fn tube(
-    problem: &Problem,
-    starts: &[Vec<f64>],
-    targets: &[Target],
-    level: &Level,
-    threads: usize,
-) -> Option<Vec<Band>> {
-    let search = Search { problem, level };
-    let usable: Vec<&Vec<f64>> = starts
-        .iter()
-        .filter(|s| search.point(s).is_some())
-        .collect();
-    if usable.is_empty() {
-        return None;
-    }
-    let job = |index: usize| {
-        let target = &targets[index / 2];
-        let side = if index % 2 == 0 { -1.0 } else { 1.0 };
-        let found = usable
-            .iter()
-            .filter_map(|start| search.extreme(start, target, side));
-        found
-            .max_by(|a, b| (side * a.value).total_cmp(&(side * b.value)))
-            .expect("the start was within the level")
-    };
-    let mut extremes = map(2 * targets.len(), threads, job).into_iter();
-    let mut bands = Vec::with_capacity(targets.len());
-    while let (Some(low), Some(high)) = (extremes.next(), extremes.next()) {
-        bands.push(Band { low, high });
-    }
-    Some(bands)
-}
-
-/// One extreme from one start; `None` unless the start is within the level and the constraints.
-pub fn extreme(
-    problem: &Problem,
-    start: &[f64],
-    target: &Target,
-    largest: bool,
-    level: &Level,
-) -> Option<Extreme> {
-    let side = if largest { 1.0 } else { -1.0 };
-    Search { problem, level }.extreme(start, target, side)
-}
-
 /// The misfit of the readings plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     let scalars = problem.functions.scalars().iter();
@@ -197,13 +33,14 @@ fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     evaluation.misfit + priors.sum::<f64>()
 }
 
-struct Search<'a> {
-    problem: &'a Problem,
-    level: &'a Level,
+/// One problem and one level.
+pub struct Search<'a> {
+    pub problem: &'a Problem,
+    pub level: &'a Level,
 }
 
 /// Parameters within the level, with their forward solve.
-struct Within {
+pub struct Within {
     parameters: Vec<f64>,
     evaluation: Evaluation,
     misfit: f64,
@@ -211,7 +48,7 @@ struct Within {
 
 impl Search<'_> {
     /// The forward solve at `theta`, if it is within level, budgets and constraints.
-    fn point(&self, theta: &[f64]) -> Option<Within> {
+    pub fn point(&self, theta: &[f64]) -> Option<Within> {
         let evaluation = self.problem.evaluate(theta).ok()?;
         let misfit = measure(self.problem, theta, &evaluation);
         let ranges = self.problem.functions.ranges();
@@ -228,7 +65,8 @@ impl Search<'_> {
         })
     }
 
-    fn extreme(&self, start: &[f64], target: &Target, side: f64) -> Option<Extreme> {
+    /// The extreme of `target` towards `side` from `start`; `None` unless that is within the level.
+    pub fn extreme(&self, start: &[f64], target: &Target, side: f64) -> Option<Extreme> {
         let mut here = self.point(start)?;
         let sizes = sizes(self.problem, start);
         let mut radius = FIRST_RADIUS;
@@ -284,11 +122,12 @@ impl Search<'_> {
     /// variables measured by `units`.
     fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
         let mut sub = linear_readings(self.problem, evaluation);
+        let surplus = self.surplus(&sub, evaluation);
         add_priors(self.problem, theta, &mut sub);
         let readings = std::mem::take(&mut sub.residuals);
         sub.residuals = Rows::new();
-        sub.cones
-            .push(ball(&readings, AIM * self.level.misfit.sqrt()));
+        let left = (self.level.misfit - surplus).max(f64::MIN_POSITIVE.sqrt());
+        sub.cones.push(ball(&readings, AIM * left.sqrt()));
         let ranges = self.problem.functions.ranges();
         for (penalty, budget) in &self.level.budgets {
             let range = ranges[penalty.function].clone();
@@ -302,6 +141,17 @@ impl Search<'_> {
         }
         sub.constrain(&self.problem.constraints, theta);
         sub
+    }
+
+    /// The misfit less the weighted squares that stand for it, none for least squares. The squares of
+    /// a robust loss lie above it and touch it here, so a step that they allow is within the level.
+    fn surplus(&self, readings: &Subproblem, evaluation: &Evaluation) -> f64 {
+        let plain = |c: &Channel| c.loss() == Loss::Squares;
+        if self.problem.channels().all(plain) {
+            return 0.0;
+        }
+        let squares: f64 = readings.residuals.right().iter().map(|r| r * r).sum();
+        evaluation.misfit - squares
     }
 
     /// Parameters as units by their sizes, states by those of the motions.

@@ -1,30 +1,14 @@
-//! Profile likelihood of one number.
-//!
-//! The profile of `q(theta)` is `P(v) = min J(theta)` subject to `q(theta) = v` and the model's
-//! constraints. With `J` a chi-square, the values with
-//!
-//! ```text
-//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n readings)
-//! ```
-//!
-//! are a confidence interval, 95 % for the quantile 3.841 of chi-square with one degree of freedom.
-//! `J` is the whole cost, penalties and priors included: with penalties the interval is that of the
-//! penalised problem. A profile that never rises is a number that the readings do not see.
-//!
-//! Sources: S. S. Wilks, *Annals of Mathematical Statistics* 9 (1938) 60-62; A. Raue et al.,
-//! "Structural and practical identifiability analysis of partially observed dynamical models by
-//! exploiting the profile likelihood", *Bioinformatics* 25 (2009) 1923-1929.
+//! The walk along a profile.
 
-use super::functional::Linear;
-use super::refit::{nearest, settings, sizes};
+use super::{End, FAR, Mark, Profile, ProfileSettings, Verdict};
 use crate::constraints::RowGroup;
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::{Point, Status, active_constraints, fit_from};
+use crate::study::functional::Linear;
+use crate::study::refit::{nearest, settings, sizes};
 
-/// The 95 % quantile of chi-square with one degree of freedom.
-pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
 /// Name of the row that holds the number.
 const HELD: &str = "the profiled number";
 /// A step that raises the cost by less than this share of the quantile was too short: the next is
@@ -40,171 +24,12 @@ const END_FITS: usize = 60;
 const BETTER: f64 = 1e-3;
 /// Without a covariance, the first step as a share of the number's size.
 const FIRST_STEP: f64 = 0.02;
+/// Bisections for the value at which a constraint becomes active: to a thousandth of a step.
+const MARK_FITS: usize = 10;
+/// A bound that a program finds is kept away from by this share of the number's size.
+const SPARE: f64 = 1e-6;
 /// A rise is another constraint's work if without it less than this share of the quantile is left.
 const BLAMED: f64 = 0.5;
-
-/// How far a profile is walked.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ProfileSettings {
-    /// The rise at which it ends.
-    pub quantile: f64,
-    /// Values beyond which nobody asks, in the unit of the number.
-    pub limits: [f64; 2],
-    /// First step, in the unit of the number; by default half a standard deviation by the
-    /// covariance, or where there is none a share of the number's size.
-    pub step: Option<f64>,
-    /// Most steps on each side; they double where the profile is flat.
-    pub steps: usize,
-}
-
-impl Default for ProfileSettings {
-    fn default() -> Self {
-        Self {
-            quantile: QUANTILE_95,
-            limits: [f64::NEG_INFINITY, f64::INFINITY],
-            step: None,
-            steps: 40,
-        }
-    }
-}
-
-/// What the readings say of the number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// Both ends of its interval are found.
-    Identified,
-    /// One end is found.
-    OneSided,
-    /// None is: the readings do not see it.
-    Flat,
-}
-
-/// Why a profile ends on one side.
-#[derive(Debug, Clone, PartialEq)]
-pub enum End {
-    /// The cost rises by the quantile.
-    Rise,
-    /// It does, but another constraint makes it: without the constraints of these names it would not.
-    RiseBy(Vec<String>),
-    /// The number's own bound, or the stated limit, comes first.
-    Bound,
-    /// The steps ran out.
-    Steps,
-    /// No motion, or no fit, further out.
-    Failed(String),
-}
-
-/// A constraint that becomes active along the profile.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
-    /// The first value at which it is.
-    pub value: f64,
-    /// Its name.
-    pub constraint: String,
-}
-
-/// The profile of one number.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Profile {
-    /// What was profiled.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Its value at the optimum.
-    pub optimum: f64,
-    /// Cost there.
-    pub optimum_cost: f64,
-    /// The values at which it was held, rising.
-    pub values: Vec<f64>,
-    /// `P(v)` at each.
-    pub costs: Vec<f64>,
-    /// The parameters at each.
-    pub parameters: Vec<Vec<f64>>,
-    /// The ends of the interval; `None` where there is none.
-    pub interval: [Option<f64>; 2],
-    /// Why it ends, below and above.
-    pub ends: [End; 2],
-    /// In one word.
-    pub verdict: Verdict,
-    /// Where other constraints become active.
-    pub marks: Vec<Mark>,
-    /// Parameters of a better optimum, if one was met.
-    pub better_optimum: Option<Vec<f64>>,
-}
-
-impl Profile {
-    /// The verdict in words.
-    pub fn sentence(&self) -> String {
-        let Self { name, unit, .. } = self;
-        let number = |x: f64| format!("{x:.6} {unit}").trim_end().to_owned();
-        let mut words = match self.interval {
-            [Some(low), Some(high)] => format!(
-                "{name} is identified: between {} and {}",
-                number(low),
-                number(high)
-            ),
-            [Some(low), None] => format!("{name} is only known to be at least {}", number(low)),
-            [None, Some(high)] => format!("{name} is only known to be at most {}", number(high)),
-            [None, None] => format!("{name} is not seen by the readings"),
-        };
-        for (side, end) in ["below", "above"].iter().zip(&self.ends) {
-            let why = match end {
-                End::Rise => continue,
-                End::RiseBy(names) => format!(
-                    "the rise {side} is the work of {}, not of the readings alone",
-                    names.join(" and ")
-                ),
-                End::Bound => format!("{side} it runs into its bound or limit"),
-                End::Steps => format!("{side} the steps ran out"),
-                End::Failed(reason) => format!("{side} no fit was found ({reason})"),
-            };
-            words.push_str("; ");
-            words.push_str(&why);
-        }
-        if self.better_optimum.is_some() {
-            words.push_str("; a better optimum was met on the way: fit again from there");
-        }
-        words
-    }
-}
-
-/// The profile of `of` about `optimum`, parameters at which the problem was fitted.
-///
-/// It walks outwards from the optimum, each fit (Gauss–Newton under the constraints) from its
-/// neighbours, until the cost has risen by the quantile or a bound, a limit or the number of steps is
-/// met; the ends are then found by a secant method on the root of the rise, which is a straight line
-/// where the motion is linear in the parameters.
-///
-/// # Errors
-/// A [`Breakdown`] if the optimum has no motion.
-pub fn profile(
-    problem: &Problem,
-    optimum: &[f64],
-    of: &Linear,
-    how: &ProfileSettings,
-) -> Result<Profile, Breakdown> {
-    let start = fit_from(problem, optimum, &settings())?.best;
-    let mut walk = Walk {
-        problem,
-        of,
-        how,
-        sizes: sizes(problem, &start.parameters),
-        base: start.evaluation.cost,
-        readings: problem.reading_count() as f64,
-        sigma: problem.channels().all(|c| c.weighting().is_sigma()),
-        marks: Vec::new(),
-        samples: Vec::new(),
-    };
-    let before: Vec<String> = names(problem, &start);
-    let value = of.of(&start.parameters);
-    walk.samples.push(Sample {
-        value,
-        cost: start.evaluation.cost,
-        point: start.clone(),
-    });
-    let sides = [-1.0, 1.0].map(|side| walk.side(side, &start, &before));
-    Ok(walk.finish(value, sides))
-}
 
 /// Names of the constraints that are active at a point, the profile's own row left out.
 fn names(problem: &Problem, point: &Point) -> Vec<String> {
@@ -226,14 +51,18 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
     held
 }
 
+/// One refit.
 #[derive(Clone)]
 struct Sample {
     value: f64,
     cost: f64,
     point: Point,
+    /// Names of the constraints that are active there.
+    active: Vec<String>,
 }
 
-struct Walk<'a> {
+/// A walk along one profile.
+pub struct Walk<'a> {
     problem: &'a Problem,
     of: &'a Linear,
     how: &'a ProfileSettings,
@@ -245,7 +74,44 @@ struct Walk<'a> {
     samples: Vec<Sample>,
 }
 
-impl Walk<'_> {
+impl<'a> Walk<'a> {
+    /// At the optimum, which is polished first.
+    pub fn new(
+        problem: &'a Problem,
+        optimum: &[f64],
+        of: &'a Linear,
+        how: &'a ProfileSettings,
+    ) -> Result<Self, Breakdown> {
+        let start = fit_from(problem, optimum, &settings())?.best;
+        let cost = start.evaluation.cost;
+        Ok(Self {
+            problem,
+            of,
+            how,
+            sizes: sizes(problem, &start.parameters),
+            base: cost,
+            readings: problem.reading_count() as f64,
+            sigma: problem.channels().all(|c| c.weighting().is_sigma()),
+            marks: Vec::new(),
+            samples: vec![Sample {
+                value: of.of(&start.parameters),
+                cost,
+                active: names(problem, &start),
+                point: start,
+            }],
+        })
+    }
+
+    /// To both sides.
+    pub fn run(mut self) -> Profile {
+        let first = self.samples[0].clone();
+        let sides = [-1.0, 1.0].map(|side| self.side(side, &first));
+        for side in [-1.0, 1.0] {
+            self.mark(side, &first);
+        }
+        self.finish(first.value, sides)
+    }
+
     /// What the quantile is compared to.
     fn rise(&self, cost: f64) -> f64 {
         match self.sigma {
@@ -270,25 +136,26 @@ impl Walk<'_> {
             _ => Ok(Sample {
                 value,
                 cost: found.best.evaluation.cost,
+                active: names(&held, &found.best),
                 point: found.best,
             }),
         }
     }
 
-    /// How far the number can go towards `side` under the constraints and limits.
-    fn reach(&self, side: f64, theta: &[f64]) -> f64 {
+    /// How far the number can go towards `side` under the constraints and limits, and what is there.
+    fn reach(&self, side: f64, theta: &[f64]) -> (f64, End) {
         let here = self.of.of(theta);
         let limit = self.how.limits[usize::from(side > 0.0)];
-        if self.problem.constraints.is_empty() {
-            return limit;
-        }
         let size: f64 = (self.of.entries.iter())
             .map(|(j, a)| (a * self.sizes[*j]).abs())
             .sum();
-        let far = match limit.is_finite() {
-            true => limit,
-            false => here + side * FAR * size,
+        let (far, what) = match limit.is_finite() {
+            true => (limit, End::Bound),
+            false => (here + side * FAR * size, End::Far),
         };
+        if self.problem.constraints.is_empty() || far == here {
+            return (far, what);
+        }
         // The point of the constraints whose number is nearest to what is far.
         let unit = (far - here).abs().max(f64::MIN_POSITIVE);
         let mut sub = Subproblem::new(theta.len());
@@ -302,15 +169,20 @@ impl Walk<'_> {
         }
         let solution = sub.solve();
         if !matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost) {
-            return limit;
+            return (far, what);
         }
         let mut moved: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
         self.problem.constraints.clip(&mut moved);
         let reached = self.of.of(&moved);
-        match (far - reached).abs() <= 1e-3 * unit {
-            true => limit,
-            false => reached,
+        if (far - reached).abs() <= 1e-3 * unit {
+            return (far, what);
         }
+        // A program meets rows about several parameters to its accuracy only.
+        let spare = match self.problem.constraints.are_simple() {
+            true => 0.0,
+            false => SPARE * size.min((reached - here).abs()),
+        };
+        (reached - side * spare, End::Bound)
     }
 
     fn first_step(&self, start: &Point) -> f64 {
@@ -324,16 +196,15 @@ impl Walk<'_> {
         self.how.step.unwrap_or(guess)
     }
 
-    fn side(&mut self, side: f64, start: &Point, before: &[String]) -> (Option<f64>, End) {
-        let mut step = self.first_step(start);
-        let limit = self.reach(side, &start.parameters);
-        let mut seen: Vec<String> = before.to_vec();
-        let mut here = self.samples[0].clone();
+    fn side(&mut self, side: f64, start: &Sample) -> (Option<f64>, End) {
+        let mut step = self.first_step(&start.point);
+        let (limit, what) = self.reach(side, &start.point.parameters);
+        let mut here = start.clone();
         let mut behind: Option<Sample> = None;
         let mut shortened = 0;
         for _ in 0..self.how.steps {
-            if limit.is_finite() && (limit - here.value) * side <= 1e-12 * limit.abs() {
-                return (None, End::Bound);
+            if (limit - here.value) * side <= 1e-12 * limit.abs() {
+                return (None, what);
             }
             let wanted = here.value + side * step;
             let value = if (limit - wanted) * side < 0.0 {
@@ -353,20 +224,15 @@ impl Walk<'_> {
                     continue;
                 }
             };
-            let now = names(&held(self.problem, self.of, value), &next.point);
-            for constraint in now.iter().filter(|name| !seen.contains(name)) {
-                self.marks.push(Mark {
-                    value,
-                    constraint: constraint.clone(),
-                });
-            }
-            seen.extend(now);
             let rise = self.rise(next.cost) - self.rise(here.cost);
             self.samples.push(next.clone());
             if self.distance(next.cost) >= 0.0 {
                 let end = self.end(here, next);
-                let names = names(&held(self.problem, self.of, end.value), &end.point);
-                let new = names.into_iter().filter(|n| !before.contains(n)).collect();
+                let active = end.active.iter();
+                let new = active
+                    .filter(|n| !start.active.contains(n))
+                    .cloned()
+                    .collect();
                 return (Some(end.value), self.blame(&end, new));
             }
             if rise < SLOW * self.how.quantile {
@@ -412,6 +278,37 @@ impl Walk<'_> {
             }
         }
         outside
+    }
+
+    /// Marks the constraints that become active on one side, each where it does, by bisection between
+    /// the last sample without it and the first one with it.
+    fn mark(&mut self, side: f64, start: &Sample) {
+        let beyond = |s: &&Sample| (s.value - start.value) * side >= 0.0;
+        let mut samples: Vec<Sample> = self.samples.iter().filter(beyond).cloned().collect();
+        samples.sort_by(|a, b| (side * a.value).total_cmp(&(side * b.value)));
+        let mut seen = start.active.clone();
+        for pair in samples.windows(2) {
+            for constraint in &pair[1].active {
+                if seen.contains(constraint) {
+                    continue;
+                }
+                seen.push(constraint.clone());
+                let (mut without, mut with) = (pair[0].clone(), pair[1].clone());
+                for _ in 0..MARK_FITS {
+                    let middle = 0.5 * (without.value + with.value);
+                    let guess = extrapolated(Some(&without), &with, middle);
+                    match self.fit(self.problem, middle, &guess) {
+                        Ok(next) if next.active.contains(constraint) => with = next,
+                        Ok(next) => without = next,
+                        Err(_) => break,
+                    }
+                }
+                self.marks.push(Mark {
+                    value: with.value,
+                    constraint: constraint.clone(),
+                });
+            }
+        }
     }
 
     /// Whether the rise at `end` is the work of the constraints `new`, which are not active at the
@@ -460,9 +357,6 @@ impl Walk<'_> {
         }
     }
 }
-
-/// Without a limit, so many sizes away is far.
-const FAR: f64 = 1e3;
 
 /// The parameters at `value` on the line through two samples; those of the second without a first.
 fn extrapolated(first: Option<&Sample>, second: &Sample, value: f64) -> Vec<f64> {

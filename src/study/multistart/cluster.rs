@@ -1,0 +1,90 @@
+//! Which optima are one.
+
+use super::Waterfall;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::solvers::Status;
+
+/// How far two optima are from each other, without unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// Largest root mean square difference of a ratio `p/m`, relative to its natural size.
+    pub ratios: f64,
+    /// Root mean square difference of the displacements, relative to their own.
+    pub motions: f64,
+}
+
+/// Optima that are one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cluster {
+    /// Indices of the runs, by rising cost.
+    pub members: Vec<usize>,
+    /// Lowest cost.
+    pub cost: f64,
+}
+
+impl Waterfall {
+    /// Clusters by rising cost: a run belongs to the first cluster whose best member is no further
+    /// than `tolerance`, in ratios and motions both. Only converged runs are told apart; the others
+    /// have not reached an optimum.
+    pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
+        let mut clusters: Vec<Cluster> = Vec::new();
+        for &i in &self.order {
+            let run = &self.runs[i];
+            let (Some(found), Status::Converged) = (&run.found, run.status) else {
+                continue;
+            };
+            let near = |cluster: &&mut Cluster| {
+                let best = self.runs[cluster.members[0]].found.as_ref();
+                best.is_some_and(|best| {
+                    let apart = distance(problem, &best.evaluation, &found.evaluation);
+                    apart.ratios <= tolerance.ratios && apart.motions <= tolerance.motions
+                })
+            };
+            match clusters.iter_mut().find(near) {
+                Some(cluster) => cluster.members.push(i),
+                None => clusters.push(Cluster {
+                    members: vec![i],
+                    cost: found.evaluation.cost,
+                }),
+            }
+        }
+        clusters
+    }
+}
+
+/// How far two points are from each other.
+pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
+    let natural = problem.natural_sizes(a);
+    let mut ratios = 0.0f64;
+    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
+        let (one, two) = (a.device_of(which), b.device_of(which));
+        for (j, (p, q)) in one.coefficients.iter().zip(&two.coefficients).enumerate() {
+            let size = natural[assembly[j + 1]] / natural[assembly[0]];
+            let changes = (0..p.len()).map(|i| p[i] / one.mass[i] - q[i] / two.mass[i]);
+            let change = rms(changes);
+            if change > 0.0 {
+                ratios = ratios.max(change / size);
+            }
+        }
+    }
+    let pairs = a.trajectories.iter().zip(&b.trajectories);
+    let changes = pairs.flat_map(|(a, b)| {
+        let nodes = a.displacement.iter().zip(&b.displacement);
+        nodes.map(|(a, b)| a - b)
+    });
+    let own = a
+        .trajectories
+        .iter()
+        .flat_map(|t| t.displacement.iter().copied());
+    let (change, own) = (rms(changes), rms(own));
+    Distance {
+        ratios,
+        motions: if change > 0.0 { change / own } else { 0.0 },
+    }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v * v, n + 1));
+    (sum / count.max(1) as f64).sqrt()
+}

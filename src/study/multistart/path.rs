@@ -1,0 +1,83 @@
+//! Whether two optima share a valley.
+
+use crate::dynamics::Device;
+use crate::problem::Problem;
+
+/// The cost along two paths between two points; infinite where there is no motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Paths {
+    /// Along `(1 - s) a + s b`, both ends included.
+    pub straight: Vec<f64>,
+    /// Along the gauge: the mass goes from one to the other geometrically, `m_a^(1-s) m_b^s`, and the
+    /// ratios to it go straight, so that between devices with the same ratios nothing but the common
+    /// factor changes. `None` where the functions cannot follow, as when one is fixed.
+    pub gauge: Option<Vec<f64>>,
+}
+
+impl Paths {
+    /// Whether one of the paths never rises by more than `rise` above the higher end: then the two
+    /// are ends of one valley. No path below it proves nothing.
+    pub fn one_valley(&self, rise: f64) -> bool {
+        let low = |path: &Vec<f64>| {
+            let ends = path[0].max(path[path.len() - 1]);
+            path.iter().all(|cost| *cost <= ends + rise)
+        };
+        low(&self.straight) || self.gauge.as_ref().is_some_and(low)
+    }
+}
+
+/// The cost at `points` steps between the parameters `a` and `b`.
+pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths {
+    let points = points.max(1);
+    let shares: Vec<f64> = (0..=points).map(|i| i as f64 / points as f64).collect();
+    let cost = |theta: &[f64]| problem.evaluate(theta).map_or(f64::INFINITY, |e| e.cost);
+    let mix = |s: f64| -> Vec<f64> {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (1.0 - s) * a + s * b).collect()
+    };
+    let straight = shares.iter().map(|s| cost(&mix(*s))).collect();
+    let gauge: Option<Vec<Vec<f64>>> = shares
+        .iter()
+        .map(|s| along_gauge(problem, a, b, *s, mix(*s)))
+        .collect();
+    Paths {
+        straight,
+        gauge: gauge.map(|path| path.iter().map(|theta| cost(theta)).collect()),
+    }
+}
+
+/// The point at `s` of the gauge path, functions of single experiments and scalars straight.
+fn along_gauge(
+    problem: &Problem,
+    a: &[f64],
+    b: &[f64],
+    s: f64,
+    straight: Vec<f64>,
+) -> Option<Vec<f64>> {
+    let mut theta = straight;
+    let (one, two) = (problem.functions.device(a), problem.functions.device(b));
+    if one.mass.iter().chain(&two.mass).any(|m| *m <= 0.0) {
+        return None;
+    }
+    let between = mixed(&one, &two, s);
+    let grid = &problem.oscillator.grid;
+    let assembly = problem.functions.assembly(0);
+    for (&f, values) in assembly.iter().zip(between.functions()) {
+        let basis = problem.functions.get(f).basis.as_ref()?;
+        let range = problem.functions.ranges()[f].clone();
+        theta[range].copy_from_slice(&basis.project(grid, values)?);
+    }
+    Some(theta)
+}
+
+fn mixed(one: &Device, two: &Device, s: f64) -> Device {
+    let pairs = one.mass.iter().zip(&two.mass);
+    let mass: Vec<f64> = pairs.map(|(a, b)| a.powf(1.0 - s) * b.powf(s)).collect();
+    let coefficient = |p: &Vec<f64>, q: &Vec<f64>| -> Vec<f64> {
+        let ratio = |i: usize| (1.0 - s) * p[i] / one.mass[i] + s * q[i] / two.mass[i];
+        (0..p.len()).map(|i| mass[i] * ratio(i)).collect()
+    };
+    let pairs = one.coefficients.iter().zip(&two.coefficients);
+    let coefficients = pairs.map(|(p, q)| coefficient(p, q)).collect();
+    Device { mass, coefficients }
+}

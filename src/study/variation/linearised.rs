@@ -1,0 +1,106 @@
+//! Refits of both models to simulated readings, by their linearisation.
+
+use super::reduced::Reduced;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::solvers::weighted_jacobian;
+use crate::study::simulate::{normal, sigmas, stream};
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this share of the largest are directions that nothing sees.
+const UNSEEN: f64 = 1e-10;
+
+/// Both models, linearised at the constant optimum.
+pub struct Linearised {
+    /// Orthonormal columns that span what each model can do: constant, varying.
+    spans: [DMatrix<f64>; 2],
+    /// Root weight times sigma of each reading.
+    noise: Vec<f64>,
+    /// What penalties and priors ask for.
+    asked: Vec<f64>,
+}
+
+impl Linearised {
+    pub fn new(problem: &Problem, reduced: &Reduced, theta: &[f64], here: &Evaluation) -> Self {
+        let (jacobian, _) = weighted_jacobian(problem, here);
+        let n = theta.len();
+        let ranges = problem.functions.ranges();
+        let mut rest: Vec<(DVector<f64>, f64)> = Vec::new();
+        for penalty in &problem.penalties {
+            let range = ranges[penalty.function].clone();
+            let root = penalty.weight.sqrt();
+            let residuals = penalty.residuals(&theta[range.clone()]);
+            for (i, r) in residuals.iter().enumerate() {
+                let mut row = DVector::zeros(n);
+                penalty
+                    .rows
+                    .row(i)
+                    .for_each(|(j, a)| row[range.start + j] += root * a);
+                rest.push((row, -root * r));
+            }
+        }
+        let scalars = problem.functions.scalar_range();
+        for (j, scalar) in scalars.zip(problem.functions.scalars()) {
+            if let Some(prior) = scalar.prior {
+                let mut row = DVector::zeros(n);
+                row[j] = 1.0 / prior.sigma;
+                rest.push((row, (prior.mean - theta[j]) / prior.sigma));
+            }
+        }
+        let readings = jacobian.nrows();
+        let mut varying = jacobian.resize_vertically(readings + rest.len(), 0.0);
+        for (i, (row, _)) in rest.iter().enumerate() {
+            varying.set_row(readings + i, &row.transpose());
+        }
+        let mut embedding = DMatrix::zeros(n, reduced.problem.parameters());
+        for j in 0..n {
+            let (column, a) = reduced.column(j, 1.0);
+            embedding[(j, column)] = a;
+        }
+        let constant = &varying * embedding;
+        let sigmas = sigmas(&reduced.problem, here);
+        let roots = problem
+            .channels()
+            .flat_map(|c| (0..c.len()).map(|i| c.weighting().weight(i, c.len()).sqrt()));
+        Self {
+            spans: [span(constant), span(varying)],
+            noise: roots
+                .zip(&sigmas)
+                .map(|(root, sigma)| root * sigma)
+                .collect(),
+            asked: rest.iter().map(|(_, b)| *b).collect(),
+        }
+    }
+
+    /// Least costs of both models for simulated readings `index`.
+    pub fn costs(&self, seed: u64, index: usize) -> [f64; 2] {
+        let mut random = stream(seed, index);
+        let unit = normal(&mut random, self.noise.len());
+        let errors = unit.iter().zip(&self.noise).map(|(u, s)| u * s);
+        let right: Vec<f64> = errors.chain(self.asked.iter().copied()).collect();
+        let right = DVector::from_vec(right);
+        let cost = |span: &DMatrix<f64>| {
+            let inside = span * span.tr_mul(&right);
+            (&right - inside).norm_squared()
+        };
+        [cost(&self.spans[0]), cost(&self.spans[1])]
+    }
+}
+
+/// An orthonormal basis of the columns' span; columns are first scaled to size 1, for parameters have
+/// units.
+fn span(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
+    for mut column in matrix.column_iter_mut() {
+        let size = column.norm();
+        if size > 0.0 {
+            column /= size;
+        }
+    }
+    let svd = matrix.svd(true, false);
+    let most = svd.singular_values.max();
+    let seen: Vec<usize> = (0..svd.singular_values.len())
+        .filter(|i| svd.singular_values[*i] > UNSEEN * most)
+        .collect();
+    let u = svd.u.expect("asked for");
+    u.select_columns(&seen)
+}
