@@ -52,8 +52,10 @@
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
 //!    starts, the choice of a weight; and the equation error, which simulates nothing.
 //! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.
-//! 9. [`report`] writes tables, figures and the result document, and compares runs.
-//! 10. [`cli`] is one file per command.
+//! 9. [`identifiability`] says what the readings can show, how far a fit may be off, and which record
+//!    would show more.
+//! 10. [`report`] writes tables, figures and the result document, and compares runs.
+//! 11. [`cli`] is one file per command.
 //!
 //! Beside these, [`units`] knows units and their factors to SI, and [`signal`] what lies between
 //! samples, shapes of excitation, filters and spectra.
@@ -122,6 +124,7 @@ pub mod diagnostics;
 pub mod dynamics;
 pub mod error;
 pub mod functions;
+pub mod identifiability;
 mod input;
 mod near;
 pub mod objective;

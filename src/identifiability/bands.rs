@@ -1,0 +1,490 @@
+//! How far the functions may be off: standard errors and bands.
+//!
+//! Without penalties the covariance of the parameters is `(J^T W J)^-1` (Cramér and Rao, for Gaussian
+//! noise and the linearised predictions). With penalties it is the sandwich
+//!
+//! ```text
+//! Cov = H^-1 (J^T W J) H^-1,    H = J^T W J + sum_j weight_j L_j^T L_j
+//! ```
+//!
+//! the scatter of the estimate from one set of noise to the next. It **leaves out the smoothing bias**: how
+//! far the penalties pull the mean of the estimates from the truth. Priors of scalars count as
+//! measurements. Total variation is left out, and so is the curvature of the predictions.
+//!
+//! Rows that hold with equality at the point cannot change (the covariance is that in their null space);
+//! where that leaves a function no freedom because a bound is active, the band is one-sided, as wide
+//! as it would be without the bound. Where a direction that is not seen changes a function, its
+//! band is infinite.
+
+use super::active::{ActiveRow, active_rows};
+use super::covariance::{Factor, Information};
+use super::directions::Directions;
+use super::linear::{span_words, spans};
+use super::sensitivity::Sensitivity;
+use crate::diagnostics::NORMAL_975;
+use crate::dynamics::Term;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use nalgebra::DMatrix;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+/// Most parameters for which the whole covariance is formed; beyond, that of smooth directions.
+const MOST_PARAMETERS: usize = 800;
+/// Most nodes at which bands are computed; beyond, at every second, third, ...
+const MOST_NODES: usize = 4000;
+/// Most nodes whose maximum a simultaneous band is simulated for: bands are smooth between.
+const MOST_SIMULATED: usize = 300;
+/// Draws that are simulated at once.
+const BLOCK: usize = 250;
+/// A value depends on an unseen direction if more than this share of its slope lies there.
+const UNSEEN_SHARE: f64 = 1e-6;
+/// A standard error below this share of that without bounds is none at all.
+const HELD: f64 = 1e-6;
+/// Probability of the bands.
+const LEVEL: f64 = 0.95;
+
+/// How simultaneous bands are simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BandSettings {
+    /// Number of draws; 0 for no simultaneous bands.
+    pub draws: usize,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+impl Default for BandSettings {
+    fn default() -> Self {
+        Self {
+            draws: 10_000,
+            seed: 1,
+        }
+    }
+}
+
+/// To which sides of the value its band reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Both.
+    Both,
+    /// Only above: a lower bound is active.
+    Above,
+    /// Only below: an upper bound is active.
+    Below,
+    /// Neither: an equality, or nothing is sought.
+    Neither,
+}
+
+/// The band of one function or ratio over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// `mass`, ..., `k/m`, `c/m`, `natural frequency`, `damping ratio`.
+    pub name: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Values at the times of [`Bands::times`]; NaN where a frequency or damping ratio is not defined,
+    /// which a note says.
+    pub values: Vec<f64>,
+    /// Standard errors; infinite where not seen.
+    pub standard_error: Vec<f64>,
+    /// Sides that the band reaches to.
+    pub sides: Vec<Side>,
+    /// Number of standard errors of the band that holds at all times at once with probability 95 %;
+    /// `None` if not simulated.
+    pub simultaneous: Option<f64>,
+    /// What is to be said of it.
+    pub notes: Vec<String>,
+}
+
+impl Band {
+    /// Lower and upper end of the band of `factor` standard errors at index `i`.
+    pub fn ends(&self, i: usize, factor: f64) -> [f64; 2] {
+        let (value, width) = (self.values[i], factor * self.standard_error[i]);
+        match self.sides[i] {
+            Side::Both => [value - width, value + width],
+            Side::Above => [value, value + width],
+            Side::Below => [value - width, value],
+            Side::Neither => [value, value],
+        }
+    }
+
+    /// The band that holds at each time with probability 95 %.
+    pub fn pointwise(&self, i: usize) -> [f64; 2] {
+        self.ends(i, NORMAL_975)
+    }
+}
+
+/// Bands of all functions and of the ratios of the main device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bands {
+    /// s.
+    pub times: Vec<f64>,
+    /// One per function of the list.
+    pub functions: Vec<Band>,
+    /// `k/m`, `c/m`, natural frequency, damping ratio; those whose terms the oscillator has.
+    pub ratios: Vec<Band>,
+    /// Estimated standard deviation of the readings that have none, in their unit.
+    pub sigma: Option<f64>,
+    /// Number of directions that nothing sees.
+    pub unseen: usize,
+    /// What is to be said of all.
+    pub notes: Vec<String>,
+}
+
+/// A value over time that is linear in the parameters, to first order.
+struct Linear {
+    /// Answer to each column of the covariance's root, with all active rows held, and with only the
+    /// equalities held.
+    roots: [DMatrix<f64>; 2],
+    /// Norm of the part in the unseen directions of both.
+    hidden: [DMatrix<f64>; 2],
+    /// Norm of the whole slope.
+    sizes: Vec<f64>,
+}
+
+impl Bands {
+    /// The bands at the parameters `theta`, of which `evaluation` is the evaluation.
+    pub fn at(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        settings: &BandSettings,
+    ) -> Self {
+        let directions = Directions::new(problem, evaluation, MOST_PARAMETERS);
+        let coarse = directions.is_coarse();
+        let sensitivity = Sensitivity::along(problem, evaluation, directions);
+        let information = Information::new(problem, theta, sensitivity);
+        let active = active_rows(problem, theta);
+        let equal: Vec<&ActiveRow> = active.iter().filter(|r| r.equality).collect();
+        let bounded = active.iter().any(|r| !r.equality);
+        let all: Vec<&ActiveRow> = active.iter().collect();
+        let loose = information.factor(&equal);
+        let tight = if bounded {
+            information.factor(&all)
+        } else {
+            Factor {
+                root: loose.root.clone(),
+                unseen: loose.unseen.clone(),
+                variance: loose.variance,
+            }
+        };
+        let stride = problem.functions.nodes().div_ceil(MOST_NODES);
+        let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
+        let maker = Maker {
+            problem,
+            times: nodes
+                .iter()
+                .map(|i| problem.oscillator.grid.time(*i))
+                .collect(),
+            nodes,
+            factors: [&tight, &loose],
+            directions: &information.sensitivity().directions,
+            active: &active,
+            settings,
+        };
+        let linears: Vec<Linear> = (0..problem.functions.ranges().len())
+            .map(|f| maker.function(f))
+            .collect();
+        let values = problem.functions.values(theta);
+        let functions = linears.iter().enumerate().map(|(f, linear)| {
+            let function = problem.functions.get(f);
+            let at_nodes = maker.nodes.iter().map(|i| values[f][*i]).collect();
+            let unit = function.quantity.unit();
+            maker.band(function.name(), unit, at_nodes, linear, Some(f))
+        });
+        let functions = functions.collect();
+        let mut notes = Vec::new();
+        if coarse {
+            notes.push(
+                "the parameters are many: bands are those of smooth changes, rougher ones are not counted"
+                    .to_owned(),
+            );
+        }
+        if information.is_pulled() {
+            notes.push(
+                "bands are the scatter of the estimate; the bias of its smoothing is not in them"
+                    .to_owned(),
+            );
+        }
+        if !problem.variations.is_empty() {
+            notes.push("total variation is left out of the bands".to_owned());
+        }
+        if bounded {
+            let mut names: Vec<&str> = (active.iter().filter(|r| !r.equality))
+                .map(|r| r.name.as_str())
+                .collect();
+            names.dedup();
+            notes.push(format!("bounds are active: {}", names.join(", ")));
+        }
+        let unseen = loose.unseen.ncols();
+        if unseen > 0 {
+            notes.push(format!(
+                "{unseen} directions are seen by nothing: the bands of what they change are infinite"
+            ));
+        }
+        Self {
+            functions,
+            ratios: maker.ratios(&values, &linears),
+            sigma: tight.variance.map(f64::sqrt),
+            unseen,
+            notes,
+            times: maker.times,
+        }
+    }
+
+    /// The band of a ratio by its name.
+    pub fn ratio(&self, name: &str) -> Option<&Band> {
+        self.ratios.iter().find(|b| b.name == name)
+    }
+}
+
+struct Maker<'a> {
+    problem: &'a Problem,
+    nodes: Vec<usize>,
+    times: Vec<f64>,
+    factors: [&'a Factor; 2],
+    directions: &'a Directions,
+    active: &'a [ActiveRow],
+    settings: &'a BandSettings,
+}
+
+impl Maker<'_> {
+    /// Slopes of the values of function `f` at node `i`, in the scaled directions.
+    fn slope(&self, f: usize, i: usize) -> Vec<f64> {
+        let functions = &self.problem.functions;
+        let first = functions.ranges()[f].start;
+        let row = functions.get(f).design.row(i);
+        self.directions.row(row.map(|(j, b)| (first + j, b)))
+    }
+
+    fn function(&self, f: usize) -> Linear {
+        let functions = &self.problem.functions;
+        let range = functions.ranges()[f].clone();
+        let image = |columns: &DMatrix<f64>| {
+            let mut out = DMatrix::zeros(self.nodes.len(), columns.ncols());
+            for (z, mut into) in columns.column_iter().zip(out.column_iter_mut()) {
+                let theta = self.directions.to_parameters(z.as_slice());
+                let design = &functions.get(f).design;
+                let values = design.multiply(&theta[range.clone()], functions.nodes());
+                into.iter_mut()
+                    .zip(&self.nodes)
+                    .for_each(|(x, i)| *x = values[*i]);
+            }
+            out
+        };
+        let size = |i: &usize| {
+            let slope = self.slope(f, *i);
+            slope.iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
+        Linear {
+            roots: self.factors.map(|factor| image(&factor.root)),
+            hidden: self.factors.map(|factor| image(&factor.unseen)),
+            sizes: self.nodes.iter().map(size).collect(),
+        }
+    }
+
+    fn band(
+        &self,
+        name: String,
+        unit: &str,
+        values: Vec<f64>,
+        linear: &Linear,
+        function: Option<usize>,
+    ) -> Band {
+        let count = self.nodes.len();
+        let error = |which: usize, i: usize| {
+            let hidden = linear.hidden[which].row(i).norm();
+            match hidden > UNSEEN_SHARE * linear.sizes[i] {
+                true => f64::INFINITY,
+                false => linear.roots[which].row(i).norm(),
+            }
+        };
+        let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for i in 0..count {
+            let (tight, loose) = (error(0, i), error(1, i));
+            let (standard_error, side) = if !values[i].is_finite() || tight.is_nan() {
+                (f64::INFINITY, Side::Both)
+            } else if loose == 0.0 {
+                (0.0, Side::Neither)
+            } else if tight <= HELD * loose {
+                let side = function.map_or(Side::Both, |f| self.side(f, self.nodes[i]));
+                (loose, side)
+            } else {
+                (tight, Side::Both)
+            };
+            errors.push(standard_error);
+            sides.push(side);
+        }
+        let mut notes = Vec::new();
+        let mut note = |words: &str, holds: &dyn Fn(usize) -> bool| {
+            let found = spans(&self.times, holds);
+            if !found.is_empty() {
+                notes.push(format!("{words} on {}", span_words(&found)));
+            }
+        };
+        note("not defined", &|i| !values[i].is_finite());
+        note("not seen", &|i| {
+            values[i].is_finite() && errors[i].is_infinite()
+        });
+        note("one-sided, for a bound is active,", &|i| {
+            matches!(sides[i], Side::Above | Side::Below)
+        });
+        Band {
+            simultaneous: self.simultaneous(linear, &errors, &sides),
+            name,
+            unit: unit.to_owned(),
+            values,
+            standard_error: errors,
+            sides,
+            notes,
+        }
+    }
+
+    /// To which side function `f` may move at node `i`, where the active rows leave it no freedom.
+    fn side(&self, f: usize, i: usize) -> Side {
+        let slope = self.slope(f, i);
+        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for row in self.active.iter().filter(|r| !r.equality) {
+            let inwards = self.directions.row(row.entries.iter().copied());
+            let dot: f64 = inwards.iter().zip(&slope).map(|(a, b)| a * b).sum();
+            let cosine = dot / (norm(&inwards) * norm(&slope)).max(f64::MIN_POSITIVE);
+            if cosine.abs() > 1.0 - HELD {
+                return if cosine > 0.0 {
+                    Side::Above
+                } else {
+                    Side::Below
+                };
+            }
+        }
+        // Held by several rows together.
+        Side::Both
+    }
+
+    /// The factor of the simultaneous band: the 95 % point of `max |z_i|` over the nodes.
+    fn simultaneous(&self, linear: &Linear, errors: &[f64], sides: &[Side]) -> Option<f64> {
+        if self.settings.draws == 0 {
+            return None;
+        }
+        let usable =
+            |i: &usize| errors[*i].is_finite() && errors[*i] > 0.0 && sides[*i] == Side::Both;
+        let usable: Vec<usize> = (0..errors.len()).filter(usable).collect();
+        if usable.is_empty() {
+            return None;
+        }
+        let stride = usable.len().div_ceil(MOST_SIMULATED);
+        let chosen: Vec<usize> = usable.into_iter().step_by(stride).collect();
+        let mut rows = linear.roots[0].select_rows(&chosen);
+        for mut row in rows.row_iter_mut() {
+            let norm = row.norm();
+            row /= norm.max(f64::MIN_POSITIVE);
+        }
+        if rows.ncols() > rows.nrows() {
+            // The same joint distribution from fewer numbers.
+            rows = rows.transpose().qr().r().transpose();
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        let mut most = Vec::with_capacity(self.settings.draws);
+        while most.len() < self.settings.draws {
+            let block = BLOCK.min(self.settings.draws - most.len());
+            let normal = |_, _| -> f64 { StandardNormal.sample(&mut random) };
+            let z = &rows * DMatrix::from_fn(rows.ncols(), block, normal);
+            most.extend(z.column_iter().map(|c| c.amax()));
+        }
+        most.sort_by(f64::total_cmp);
+        let index = (LEVEL * most.len() as f64).ceil() as usize;
+        Some(most[index.clamp(1, most.len()) - 1])
+    }
+
+    /// Ratios of the main device by the delta method.
+    fn ratios(&self, values: &[Vec<f64>], linears: &[Linear]) -> Vec<Band> {
+        let assembly = self.problem.functions.assembly(0);
+        let terms = &self.problem.oscillator.terms;
+        let of = |term: Term| {
+            let place = terms.iter().position(|t| *t == term)?;
+            Some(assembly[place + 1])
+        };
+        let (mass, damping, stiffness) = (assembly[0], of(Term::Damping), of(Term::Stiffness));
+        let at = |f: usize| -> Vec<f64> { self.nodes.iter().map(|i| values[f][*i]).collect() };
+        let mut bands = Vec::new();
+        let m = at(mass);
+        let over = |f: Vec<f64>| -> Vec<f64> { f.iter().zip(&m).map(|(f, m)| f / m).collect() };
+        let over_mass = |f: usize| {
+            let ratio = over(at(f));
+            let by_mass = ratio.iter().zip(&m).map(|(r, m)| -r / m).collect();
+            let by_own = m.iter().map(|m| 1.0 / m).collect();
+            (ratio, combine(linears, &[(f, by_own), (mass, by_mass)]))
+        };
+        if let Some(k) = stiffness {
+            let (ratio, linear) = over_mass(k);
+            bands.push(self.band("k/m".into(), "1/s^2", ratio, &linear, None));
+        }
+        if let Some(c) = damping {
+            let (ratio, linear) = over_mass(c);
+            bands.push(self.band("c/m".into(), "1/s", ratio, &linear, None));
+        }
+        if let Some(k) = stiffness {
+            let stiffness = at(k);
+            // f = sqrt(k/m)/(2 pi): df = f/2 (dk/k - dm/m).
+            let frequency: Vec<f64> = (stiffness.iter().zip(&m))
+                .map(|(k, m)| (k / m).sqrt() / TAU)
+                .collect();
+            let half = |by: &[f64]| frequency.iter().zip(by).map(|(f, p)| 0.5 * f / p).collect();
+            let by_mass: Vec<f64> = half(&m);
+            let by_mass = by_mass.into_iter().map(|x| -x).collect();
+            let linear = combine(linears, &[(k, half(&stiffness)), (mass, by_mass)]);
+            let name = "natural frequency".into();
+            bands.push(self.band(name, "Hz", frequency.clone(), &linear, None));
+            if let Some(c) = damping {
+                // zeta = c/(2 sqrt(k m)): d zeta = dc/(2 sqrt(k m)) - zeta/2 (dk/k + dm/m).
+                let root: Vec<f64> = (stiffness.iter().zip(&m))
+                    .map(|(k, m)| {
+                        if *k > 0.0 {
+                            2.0 * (k * m).sqrt()
+                        } else {
+                            f64::NAN
+                        }
+                    })
+                    .collect();
+                let zeta: Vec<f64> = at(c).iter().zip(&root).map(|(c, r)| c / r).collect();
+                let half = |by: &[f64]| zeta.iter().zip(by).map(|(z, p)| -0.5 * z / p).collect();
+                let by_damping = root.iter().map(|r| 1.0 / r).collect();
+                let parts = [(c, by_damping), (k, half(&stiffness)), (mass, half(&m))];
+                let linear = combine(linears, &parts);
+                bands.push(self.band("damping ratio".into(), "", zeta, &linear, None));
+            }
+        }
+        bands
+    }
+}
+
+/// `sum_f factor_f(t) p_f(t)`.
+fn combine(linears: &[Linear], parts: &[(usize, Vec<f64>)]) -> Linear {
+    let sum = |of: &dyn Fn(&Linear) -> DMatrix<f64>| {
+        let mut total: Option<DMatrix<f64>> = None;
+        for (f, factors) in parts {
+            let mut part = of(&linears[*f]);
+            for (mut row, factor) in part.row_iter_mut().zip(factors) {
+                row *= *factor;
+            }
+            total = Some(match total {
+                None => part,
+                Some(sum) => sum + part,
+            });
+        }
+        total.expect("at least one part")
+    };
+    let nodes = linears[parts[0].0].sizes.len();
+    let size = |i: usize| {
+        let each = parts
+            .iter()
+            .map(|(f, by)| (linears[*f].sizes[i] * by[i]).abs());
+        each.fold(0.0, f64::max)
+    };
+    Linear {
+        roots: [sum(&|l| l.roots[0].clone()), sum(&|l| l.roots[1].clone())],
+        hidden: [sum(&|l| l.hidden[0].clone()), sum(&|l| l.hidden[1].clone())],
+        sizes: (0..nodes).map(size).collect(),
+    }
+}

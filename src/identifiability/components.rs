@@ -1,0 +1,98 @@
+//! Which functions share one scale, and where it is fixed.
+
+use crate::dynamics::Stepwise;
+use crate::problem::{Experiment, Problem};
+
+/// Functions that one factor multiplies: those of devices that have a function in common.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Component {
+    /// Indices into the list of functions.
+    pub functions: Vec<usize>,
+    /// Indices of the devices.
+    pub devices: Vec<usize>,
+}
+
+/// The components of the devices that take part in an experiment.
+pub(super) fn components(problem: &Problem) -> Vec<Component> {
+    let mut found: Vec<Component> = Vec::new();
+    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
+        if !problem.experiments.iter().any(|e| e.device == which) {
+            continue;
+        }
+        let shares = |c: &Component| c.functions.iter().any(|f| assembly.contains(f));
+        let (joined, others): (Vec<_>, Vec<_>) = found.into_iter().partition(shares);
+        found = others;
+        let mut union = Component {
+            functions: assembly.clone(),
+            devices: vec![which],
+        };
+        for part in joined {
+            union.functions.extend(part.functions);
+            union.devices.extend(part.devices);
+        }
+        union.functions.sort_unstable();
+        union.functions.dedup();
+        union.devices.sort_unstable();
+        found.push(union);
+    }
+    found.sort_by_key(|c| c.devices[0]);
+    found
+}
+
+impl Component {
+    /// Its experiments.
+    pub fn experiments<'a>(
+        &'a self,
+        problem: &'a Problem,
+    ) -> impl Iterator<Item = &'a Experiment> + 'a {
+        let mine = |e: &&Experiment| self.devices.contains(&e.device);
+        problem.experiments.iter().filter(mine)
+    }
+
+    /// Symbols of its functions, `(m, c, k)`.
+    pub fn symbols(&self, problem: &Problem) -> String {
+        let symbol = |f: &usize| {
+            let function = problem.functions.get(*f);
+            match &function.owner {
+                None => function.quantity.symbol().to_owned(),
+                Some(owner) => format!("{} of {owner}", function.quantity.symbol()),
+            }
+        };
+        let symbols: Vec<String> = self.functions.iter().map(symbol).collect();
+        format!("({})", symbols.join(", "))
+    }
+
+    /// The nodes at which a force acts in one of its experiments: at the node itself or in a step
+    /// beside it. Motion of the base is no force here: it pushes with `m b''`, which scales with `m`.
+    pub fn forced(&self, problem: &Problem) -> Vec<bool> {
+        let mut forced = vec![false; problem.functions.nodes()];
+        for experiment in self.experiments(problem) {
+            let Some(force) = force_of(experiment) else {
+                continue;
+            };
+            for (i, stages) in force.values().iter().enumerate().take(experiment.nodes - 1) {
+                forced[i] |= stages[0] != 0.0 || stages[1] != 0.0;
+                forced[i + 1] |= stages[1] != 0.0 || stages[2] != 0.0;
+            }
+        }
+        forced
+    }
+
+    /// The nodes at which a function that is known is not zero.
+    pub fn known(&self, problem: &Problem) -> Vec<bool> {
+        let mut known = vec![false; problem.functions.nodes()];
+        for &f in &self.functions {
+            let function = problem.functions.get(f);
+            if function.parameters() == 0 {
+                let values = known.iter_mut().zip(&function.offset);
+                values.for_each(|(k, p)| *k |= *p != 0.0);
+            }
+        }
+        known
+    }
+}
+
+/// The force of an experiment, where there is one.
+pub(super) fn force_of(experiment: &Experiment) -> Option<&Stepwise> {
+    experiment.excitation.as_ref()?.force.as_ref()
+}

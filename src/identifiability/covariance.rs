@@ -1,0 +1,173 @@
+//! The covariance of the parameters as a factor, and the directions that it does not bound.
+
+use super::active::ActiveRow;
+use super::linear::{null_space, right_svd};
+use super::sensitivity::Sensitivity;
+use crate::problem::Problem;
+use nalgebra::DMatrix;
+
+/// A direction whose singular value is below this share of the largest is not seen.
+const UNSEEN: f64 = 1e-11;
+/// Constraint rows closer to dependent than this are so.
+const DEPENDENT: f64 = 1e-10;
+
+/// What is known of the parameters, in the scaled directions.
+pub(super) struct Information {
+    sensitivity: Sensitivity,
+    /// Rows that are measurements: readings, then priors.
+    measured: DMatrix<f64>,
+    /// Rows that only pull: penalties and broken soft constraints.
+    pulled: DMatrix<f64>,
+}
+
+/// `Cov = F F^T` on the directions that are seen, nothing on the others.
+pub(super) struct Factor {
+    /// Directions x rank.
+    pub root: DMatrix<f64>,
+    /// Orthonormal basis of the unseen directions, as columns.
+    pub unseen: DMatrix<f64>,
+    /// Estimated variance of a reading without sigma, in the square of its unit; `None` if all have one.
+    pub variance: Option<f64>,
+}
+
+impl Information {
+    pub fn new(problem: &Problem, theta: &[f64], sensitivity: Sensitivity) -> Self {
+        let directions = &sensitivity.directions;
+        let functions = &problem.functions;
+        let mut priors = Vec::new();
+        for (j, scalar) in functions.scalar_range().zip(functions.scalars()) {
+            if let Some(prior) = scalar.prior {
+                priors.push(directions.row([(j, 1.0 / prior.sigma)].into_iter()));
+            }
+        }
+        let mut pulls = Vec::new();
+        for penalty in &problem.penalties {
+            let first = functions.ranges()[penalty.function].start;
+            let root = penalty.weight.sqrt();
+            for i in 0..penalty.target.len() {
+                let row = penalty.rows.row(i).map(|(j, a)| (first + j, root * a));
+                pulls.push(directions.row(row));
+            }
+        }
+        for group in &problem.soft {
+            let root = group.row_weight().sqrt();
+            for i in 0..group.rows.len() {
+                if group.excess(i, theta) != 0.0 {
+                    pulls.push(directions.row(group.rows.row(i).map(|(j, a)| (j, root * a))));
+                }
+            }
+        }
+        let n = directions.len();
+        let stack = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
+        let measured = stacked(&sensitivity.jacobian, &stack(&priors));
+        Self {
+            measured,
+            pulled: stack(&pulls),
+            sensitivity,
+        }
+    }
+
+    /// Readings, priors and penalties as rows of one matrix.
+    pub fn rows(&self) -> DMatrix<f64> {
+        stacked(&self.measured, &self.pulled)
+    }
+
+    pub fn sensitivity(&self) -> &Sensitivity {
+        &self.sensitivity
+    }
+
+    /// Whether something only pulls, so that the covariance is a sandwich.
+    pub fn is_pulled(&self) -> bool {
+        self.pulled.nrows() > 0
+    }
+
+    /// The covariance where the rows `held` cannot change: `H^+ M H^+` in the null space of these rows,
+    /// with `H = J^T W J + R` and `M = J^T W J` (`W` times the estimated variance for readings without a
+    /// sigma).
+    pub fn factor(&self, held: &[&ActiveRow]) -> Factor {
+        let directions = &self.sensitivity.directions;
+        let n = directions.len();
+        let rows: Vec<Vec<f64>> = held
+            .iter()
+            .map(|row| {
+                let mut row = directions.row(row.entries.iter().copied());
+                let size = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+                row.iter_mut()
+                    .for_each(|x| *x /= size.max(f64::MIN_POSITIVE));
+                row
+            })
+            .collect();
+        let free = match rows.is_empty() {
+            true => DMatrix::identity(n, n),
+            false => null_space(
+                &DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]),
+                DEPENDENT,
+            ),
+        };
+        // Rows of zeros make the decomposition name the unseen directions too.
+        let mut reduced = self.rows() * &free;
+        if reduced.nrows() < free.ncols() {
+            reduced = reduced.resize_vertically(free.ncols(), 0.0);
+        }
+        let (values, vectors) = right_svd(&reduced);
+        let most = values.first().copied().unwrap_or(0.0);
+        let rank = values.iter().filter(|s| **s > UNSEEN * most).count();
+        let vectors = free * vectors;
+        let mut inverse_root = vectors.columns(0, rank).into_owned();
+        for (mut column, s) in inverse_root.column_iter_mut().zip(&values) {
+            column /= *s;
+        }
+        let unseen = vectors.columns(rank, vectors.ncols() - rank).into_owned();
+        let mut answers = &self.measured * &inverse_root;
+        let variance = self.variance(&answers);
+        if let Some(variance) = variance {
+            let readings = self
+                .sensitivity
+                .roots
+                .iter()
+                .zip(&self.sensitivity.has_sigma);
+            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(readings) {
+                if !has_sigma {
+                    row *= root * variance.sqrt();
+                }
+            }
+        }
+        let root = match answers.nrows() >= rank && rank > 0 {
+            true => &inverse_root * answers.qr().r().transpose(),
+            false => &inverse_root * answers.transpose(),
+        };
+        Factor {
+            root,
+            unseen,
+            variance,
+        }
+    }
+
+    /// `sum r^2 / (n - effective parameters)` over the readings without a sigma; infinite where there
+    /// are no more readings than that.
+    fn variance(&self, answers: &DMatrix<f64>) -> Option<f64> {
+        let s = &self.sensitivity;
+        let without: Vec<usize> = (0..s.roots.len()).filter(|i| !s.has_sigma[*i]).collect();
+        if without.is_empty() {
+            return None;
+        }
+        let squares = without
+            .iter()
+            .map(|&i| (s.residuals[i] / s.roots[i]).powi(2));
+        let effective: f64 = without.iter().map(|&i| answers.row(i).norm_squared()).sum();
+        let left = without.len() as f64 - effective;
+        Some(if left > 0.5 {
+            squares.sum::<f64>() / left
+        } else {
+            f64::INFINITY
+        })
+    }
+}
+
+/// One matrix above the other.
+pub(super) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());
+    out.rows_mut(0, a.nrows()).copy_from(a);
+    out.rows_mut(a.nrows(), b.nrows()).copy_from(b);
+    out
+}

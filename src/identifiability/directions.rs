@@ -1,0 +1,156 @@
+//! The directions of the parameters along which predictions are differentiated.
+
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use nalgebra::{DMatrix, DVector};
+
+/// Directions `d_k` of the parameters, `theta = sum_k z_k d_k`, scaled so that `z` has no unit.
+///
+/// With sizes `P_j` of the functions ([`Problem::natural_sizes`]) each direction has length one in
+/// `sum_j 1/T integral (delta p_j / P_j)^2 dt + sum_s (delta x_s / size_s)^2`: one unit of `z_k` is a
+/// change by 100 % of the natural size, root mean square over the record. So a singular value says by
+/// how many standard deviations all readings together answer to such a change, whatever the basis.
+///
+/// There is one direction per parameter, or, where these would be too many, hat functions over groups
+/// of neighbouring parameters: a coarser set of smooth directions. What is said of those holds for
+/// changes that are smooth on their scale; rougher ones are not looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Directions {
+    columns: Vec<Vec<(usize, f64)>>,
+    metric: Vec<f64>,
+    coarse: bool,
+}
+
+impl Directions {
+    /// One direction per parameter if there are at most `most`, else hats: so many that there are
+    /// about `most` directions in all.
+    pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize) -> Self {
+        let sizes = problem.natural_sizes(evaluation);
+        let duration = problem.oscillator.grid.duration();
+        let metric = problem.functions.relative_metric(&sizes, duration);
+        let unit = |j: usize| vec![(j, 1.0 / metric[j].sqrt())];
+        let parameters = problem.parameters();
+        if parameters <= most {
+            let columns = (0..parameters).map(unit).collect();
+            return Self {
+                columns,
+                metric,
+                coarse: false,
+            };
+        }
+        let ranges = problem.functions.ranges();
+        let free = ranges.iter().filter(|r| !r.is_empty()).count();
+        let each = (most / free.max(1)).max(FEWEST_HATS);
+        let mut columns = Vec::new();
+        for range in ranges {
+            if range.len() <= each {
+                columns.extend(range.clone().map(unit));
+                continue;
+            }
+            for hat in hats(range.len(), each) {
+                let squares = hat.iter().map(|(j, h)| metric[range.start + j] * h * h);
+                let norm = squares.sum::<f64>().sqrt();
+                columns.push((hat.iter().map(|(j, h)| (range.start + j, h / norm))).collect());
+            }
+        }
+        columns.extend(problem.functions.scalar_range().map(unit));
+        Self {
+            columns,
+            metric,
+            coarse: true,
+        }
+    }
+
+    /// Number of directions.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Whether they are fewer than the parameters.
+    pub fn is_coarse(&self) -> bool {
+        self.coarse
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.metric.len()
+    }
+
+    /// Direction `k` as a change of all parameters.
+    pub fn column(&self, k: usize) -> Vec<f64> {
+        let mut theta = vec![0.0; self.parameters()];
+        self.columns[k].iter().for_each(|(j, d)| theta[*j] = *d);
+        theta
+    }
+
+    /// The change of the parameters that `z` stands for.
+    pub fn to_parameters(&self, z: &[f64]) -> Vec<f64> {
+        let mut theta = vec![0.0; self.parameters()];
+        for (column, z) in self.columns.iter().zip(z) {
+            column.iter().for_each(|(j, d)| theta[*j] += d * z);
+        }
+        theta
+    }
+
+    /// The `z` that comes nearest to a change of the parameters, in the length that the directions
+    /// are scaled by.
+    pub fn nearest(&self, theta: &[f64]) -> Vec<f64> {
+        let weighted: Vec<f64> = (theta.iter().zip(&self.metric))
+            .map(|(t, m)| t * m)
+            .collect();
+        let dual = self.functional(&weighted);
+        if !self.coarse {
+            return dual;
+        }
+        let n = self.len();
+        let scaled: Vec<Vec<f64>> = (0..n)
+            .map(|k| {
+                let column = self.column(k);
+                column
+                    .iter()
+                    .zip(&self.metric)
+                    .map(|(d, m)| d * m)
+                    .collect()
+            })
+            .collect();
+        let mut gram = DMatrix::zeros(n, n);
+        for (k, column) in scaled.iter().enumerate() {
+            gram.set_column(k, &DVector::from_vec(self.functional(column)));
+        }
+        let factor = gram.cholesky().expect("hats are independent");
+        factor.solve(&DVector::from_vec(dual)).as_slice().to_vec()
+    }
+
+    /// A linear function of the parameters, given by its slopes, as one of `z`.
+    pub fn functional(&self, slopes: &[f64]) -> Vec<f64> {
+        let of = |column: &Vec<(usize, f64)>| column.iter().map(|(j, d)| d * slopes[*j]).sum();
+        self.columns.iter().map(of).collect()
+    }
+
+    /// Adds a linear function with few slopes to `out`, as one of `z`.
+    pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
+        let mut slopes = vec![0.0; self.parameters()];
+        entries.for_each(|(j, a)| slopes[j] += a);
+        self.functional(&slopes)
+    }
+}
+
+/// Fewest hats that a function is coarsened to.
+const FEWEST_HATS: usize = 8;
+
+/// `count` hats over `parameters` neighbouring parameters: where each is not zero, and its height.
+fn hats(parameters: usize, count: usize) -> Vec<Vec<(usize, f64)>> {
+    let spacing = (parameters - 1) as f64 / (count - 1) as f64;
+    let hat = |k: usize| {
+        let centre = k as f64 * spacing;
+        let height = |j: usize| 1.0 - (j as f64 - centre).abs() / spacing;
+        let entries = (0..parameters).map(|j| (j, height(j)));
+        entries.filter(|(_, h)| *h > 1e-12).collect()
+    };
+    (0..count).map(hat).collect()
+}

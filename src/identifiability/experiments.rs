@@ -1,0 +1,222 @@
+//! Which further record would show most.
+//!
+//! At the present parameters each candidate is simulated and its Jacobian put below that of the records
+//! there are. **New directions** are those by which the rank grows. For the directions that are seen
+//! already the bands shrink: with singular values `s` before and `t` after, restricted to what is seen now,
+//!
+//! ```text
+//! volume  (D) = exp(mean(ln s - ln t))        average (A) = sqrt(sum 1/t^2 / sum 1/s^2)
+//! worst   (E) = s_min / t_min
+//! ```
+//!
+//! as ratios of standard errors after and before: 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
+
+use super::covariance::{Information, stacked};
+use super::gauge::Gauge;
+use super::linear::right_svd;
+use super::sensitivity::{Sensitivity, rank_of};
+use crate::dynamics::{ChannelKind, Excitation, State};
+use crate::objective::{Channel, Evaluation, Weighting};
+use crate::problem::{Experiment, Problem};
+use nalgebra::{DMatrix, DVector};
+
+/// A record sees the scale if its answer to it is above this share of its largest answer: rounding
+/// and the stepper's error in `s(t)` are below.
+const ANSWER: f64 = 1e-9;
+
+/// What a candidate would measure, at all nodes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CandidateChannel {
+    /// What.
+    pub kind: ChannelKind,
+    /// Standard deviation of a reading, in the unit of the kind.
+    pub sigma: f64,
+}
+
+/// A record that could be made, of the main device over the whole grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its name.
+    pub name: String,
+    /// Displacement and velocity at the first node.
+    pub initial: State,
+    /// What drives it; `None` is free motion.
+    pub excitation: Option<Excitation>,
+    /// What is measured.
+    pub channels: Vec<CandidateChannel>,
+}
+
+/// What a candidate adds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gain {
+    /// Directions that are seen with it and not without.
+    pub new_directions: usize,
+    /// Directions that are seen with it.
+    pub rank: usize,
+    /// Whether it sees the common scale of the functions; `None` where nothing leaves that free.
+    pub sees_scale: Option<bool>,
+    /// D: ratio of the geometric mean of the standard errors, after to before.
+    pub volume: f64,
+    /// A: ratio of their root mean squares.
+    pub average: f64,
+    /// E: ratio of the largest.
+    pub worst: f64,
+}
+
+/// A candidate with what it adds, or why it cannot be simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranked {
+    /// Its name.
+    pub name: String,
+    /// What it adds.
+    pub gain: Result<Gain, String>,
+}
+
+impl Ranked {
+    /// In words.
+    pub fn sentence(&self) -> String {
+        match &self.gain {
+            Err(reason) => format!("`{}` cannot be simulated: {reason}", self.name),
+            Ok(gain) => {
+                let scale = match gain.sees_scale {
+                    Some(true) => ", the scale among them",
+                    Some(false) => ", not the scale",
+                    None => "",
+                };
+                format!(
+                    "`{}` adds {} directions{scale}; what is seen already becomes {:.3} times as wide",
+                    self.name, gain.new_directions, gain.volume
+                )
+            }
+        }
+    }
+}
+
+/// The candidates, best first: by new directions, then by the volume of the bands. Those that cannot be
+/// simulated come last. With `penalties` these count as seen when the bands are compared; new
+/// directions are always those of the readings.
+pub fn rank_experiments(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    candidates: &[Candidate],
+    penalties: bool,
+) -> Vec<Ranked> {
+    let sensitivity = Sensitivity::of(problem, evaluation);
+    let information = Information::new(problem, theta, sensitivity);
+    let now = &information.sensitivity().jacobian;
+    let rows = match penalties {
+        true => information.rows(),
+        false => now.clone(),
+    };
+    let (values, vectors) = right_svd(&rows);
+    let seen = rank_of(&values);
+    let rank_now = match penalties {
+        true => rank_of(&right_svd(now).0),
+        false => seen,
+    };
+    let directions = &information.sensitivity().directions;
+    let gauge = Gauge::at(problem, theta);
+    let scale = gauge.basis(directions);
+    let gain = |candidate: &Candidate| -> Result<Gain, String> {
+        let added = jacobian(problem, theta, candidate, &information)?;
+        let rank = rank_of(&right_svd(&stacked(now, &added)).0);
+        let before = &values[..seen];
+        let kept = vectors.columns(0, seen);
+        let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
+        let (after, _) = right_svd(&stacked(&old, &(&added * kept)));
+        let size = right_svd(&added).0.first().copied().unwrap_or(0.0);
+        let answer = (&added * &scale)
+            .column_iter()
+            .map(|c| c.norm())
+            .fold(0.0, f64::max);
+        let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
+        let shrinks = |ratio: f64| if seen == 0 { 1.0 } else { ratio };
+        let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
+        Ok(Gain {
+            new_directions: rank.saturating_sub(rank_now),
+            rank,
+            sees_scale: (!gauge.is_empty()).then_some(answer > ANSWER * size),
+            volume: shrinks((logs.sum::<f64>() / seen as f64).exp()),
+            average: shrinks((inverse(&after) / inverse(before)).sqrt()),
+            worst: match (before.last(), after.last()) {
+                (Some(s), Some(t)) => s / t,
+                _ => 1.0,
+            },
+        })
+    };
+    let each = candidates.iter().map(|candidate| Ranked {
+        name: candidate.name.clone(),
+        gain: gain(candidate),
+    });
+    let mut ranked: Vec<Ranked> = each.collect();
+    let key = |r: &Ranked| match &r.gain {
+        Ok(gain) => (false, usize::MAX - gain.new_directions, gain.volume),
+        Err(_) => (true, 0, 0.0),
+    };
+    ranked.sort_by(|a, b| {
+        let (a, b) = (key(a), key(b));
+        (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
+    });
+    ranked
+}
+
+/// The candidate's Jacobian along the directions of the records there are.
+fn jacobian(
+    problem: &Problem,
+    theta: &[f64],
+    candidate: &Candidate,
+    information: &Information,
+) -> Result<DMatrix<f64>, String> {
+    let grid = &problem.oscillator.grid;
+    let nodes = grid.nodes();
+    if candidate.channels.is_empty() {
+        return Err("it measures nothing".into());
+    }
+    let State {
+        displacement,
+        velocity,
+    } = candidate.initial;
+    if !(displacement.is_finite() && velocity.is_finite()) {
+        return Err(format!("it starts from ({displacement}, {velocity})"));
+    }
+    let mut experiment = Experiment::free(candidate.name.clone(), candidate.initial, nodes);
+    if let Some(excitation) = &candidate.excitation {
+        let parts = [&excitation.force, &excitation.base];
+        for part in parts.into_iter().flatten() {
+            if part.steps() + 1 < nodes {
+                let steps = part.steps();
+                return Err(format!("its drive covers {steps} of {} steps", nodes - 1));
+            }
+            if !part.values().iter().flatten().all(|x| x.is_finite()) {
+                return Err("its drive is not finite".into());
+            }
+        }
+        experiment.excitation = Some(excitation.clone());
+    }
+    for channel in &candidate.channels {
+        if !(channel.sigma > 0.0 && channel.sigma.is_finite()) {
+            return Err(format!("a sigma of {} is not positive", channel.sigma));
+        }
+        let weighting = Weighting::Sigma(channel.sigma);
+        let times = grid.times();
+        let made = Channel::new(
+            channel.kind,
+            times,
+            vec![0.0; nodes],
+            weighting,
+            grid,
+            nodes,
+        );
+        experiment = experiment.with_channel(made.ok_or("its readings are not on the grid")?);
+    }
+    let mut trial = problem.clone();
+    trial.experiments = vec![experiment];
+    let evaluation = trial.evaluate(theta).map_err(|b| b.to_string())?;
+    let directions = information.sensitivity().directions.clone();
+    let jacobian = Sensitivity::along(&trial, &evaluation, directions).jacobian;
+    match jacobian.iter().all(|x| x.is_finite()) {
+        true => Ok(jacobian),
+        false => Err("its derivatives overflow".into()),
+    }
+}

@@ -1,0 +1,32 @@
+//! What the readings can show of the functions, before a fit and after it, and which experiment would
+//! show more.
+//!
+//! * [`count`]: from the problem alone, how many directions of the parameters can be seen at most, and
+//!   which scale stays free;
+//! * [`Sensitivity`] and [`Spectrum`]: how well each direction is seen at a point;
+//! * [`Gauge`]: the directions that leave the motion unchanged, and whether an unseen direction is one;
+//! * [`Bands`]: how far each function and ratio may be off;
+//! * [`verdicts`]: the same in words; [`anchors`]: the instants at which a ratio is fixed;
+//! * [`rank_experiments`]: which further record adds most.
+
+mod active;
+mod anchors;
+mod bands;
+mod components;
+mod counting;
+mod covariance;
+mod directions;
+mod experiments;
+mod gauge;
+mod linear;
+mod sensitivity;
+mod verdict;
+
+pub use anchors::{Anchors, anchors};
+pub use bands::{Band, BandSettings, Bands, Side};
+pub use counting::{Count, Symmetry, count};
+pub use directions::Directions;
+pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
+pub use gauge::{Gauge, GaugeDirection, MOSTLY, Named};
+pub use sensitivity::{RANK, Seen, Sensitivity, Spectrum};
+pub use verdict::{IDENTIFIED, Judgement, LEAST, MOST, Verdict, verdicts};

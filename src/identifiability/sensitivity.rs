@@ -1,0 +1,291 @@
+//! The weighted Jacobian of all predictions and its singular values.
+
+use super::directions::Directions;
+use super::linear::right_svd;
+use crate::dynamics::{Trajectory, adjoint};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Singular values above this share of the largest count: the rank of problem.md, section 5.
+pub const RANK: f64 = 1e-12;
+/// Most work of a decomposition, rows x columns x the smaller of both: 2000 readings of 6000
+/// parameters. Beyond it the directions are made coarser.
+const MOST_WORK: f64 = 2.5e10;
+/// Number of directions, then.
+const COARSE: usize = 600;
+
+/// `sqrt(w_i) dz_i/dtheta . d_k` for all readings `i` and directions `k`.
+///
+/// `w` are the weights of the readings (`1/sigma^2`, or the quadrature weights of the integral cost; of
+/// a robust loss those of the squares that stand for it), and the directions `d_k` have natural sizes
+/// ([`Directions`]), so the entries have no unit with sigmas, and that of `sqrt(J)` without.
+#[derive(Debug, Clone)]
+pub struct Sensitivity {
+    /// Readings x directions.
+    pub jacobian: DMatrix<f64>,
+    /// `sqrt(w_i) r_i` with the residuals `r = model - reading`.
+    pub residuals: Vec<f64>,
+    /// `sqrt(w_i)`, in the inverse unit of the channel or with the root of a second.
+    pub roots: Vec<f64>,
+    /// Whether each reading has a standard deviation.
+    pub has_sigma: Vec<bool>,
+    /// What the columns differentiate along.
+    pub directions: Directions,
+    /// The nodes, s, and for each function of the list its name.
+    names: Vec<String>,
+}
+
+impl Sensitivity {
+    /// At an evaluated point, along all parameters; along fewer smooth directions where readings and
+    /// parameters are more than about 2000 and 6000 together.
+    pub fn of(problem: &Problem, evaluation: &Evaluation) -> Self {
+        let (rows, columns) = (problem.reading_count() as f64, problem.parameters() as f64);
+        let fits = rows * columns * rows.min(columns) <= MOST_WORK;
+        let most = if fits { usize::MAX } else { COARSE };
+        Self::along(
+            problem,
+            evaluation,
+            Directions::new(problem, evaluation, most),
+        )
+    }
+
+    /// Along given directions: one tangent solve for each, or one adjoint solve per reading where
+    /// these are fewer.
+    pub fn along(problem: &Problem, evaluation: &Evaluation, directions: Directions) -> Self {
+        let (mut roots, mut residuals) = (Vec::new(), Vec::new());
+        let mut has_sigma = Vec::new();
+        for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
+            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+                for (i, r) in channel.residuals(predicted).enumerate() {
+                    let root = channel.weight(i, r).sqrt();
+                    roots.push(root);
+                    residuals.push(root * r);
+                    has_sigma.push(channel.weighting().is_sigma());
+                }
+            }
+        }
+        let jacobian = if roots.len() < directions.len() {
+            by_adjoints(problem, evaluation, &directions, &roots)
+        } else {
+            by_tangents(problem, evaluation, &directions, &roots)
+        };
+        Self {
+            jacobian,
+            residuals,
+            roots,
+            has_sigma,
+            names: problem.functions.iter().map(|f| f.name()).collect(),
+            directions,
+        }
+    }
+
+    /// Singular values and directions.
+    pub fn spectrum(&self) -> Spectrum {
+        let (singular_values, vectors) = right_svd(&self.jacobian);
+        Spectrum {
+            rank: rank_of(&singular_values),
+            singular_values,
+            vectors,
+            directions: self.directions.clone(),
+            names: self.names.clone(),
+        }
+    }
+}
+
+/// Number of singular values above [`RANK`] times the largest.
+pub(super) fn rank_of(values: &[f64]) -> usize {
+    let most = values.first().copied().unwrap_or(0.0);
+    let counts = |s: &&f64| **s > RANK * most;
+    values.iter().filter(counts).count()
+}
+
+fn by_tangents(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    directions: &Directions,
+    roots: &[f64],
+) -> DMatrix<f64> {
+    let mut jacobian = DMatrix::zeros(roots.len(), directions.len());
+    for k in 0..directions.len() {
+        let changes = problem.predictions_tangent(evaluation, &directions.column(k));
+        let all = changes.iter().flatten().flatten().zip(roots);
+        for (entry, (change, root)) in jacobian.column_mut(k).iter_mut().zip(all) {
+            *entry = root * change;
+        }
+    }
+    jacobian
+}
+
+fn by_adjoints(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    directions: &Directions,
+    roots: &[f64],
+) -> DMatrix<f64> {
+    // By columns, as the storage is: the transpose is turned in the end.
+    let mut transposed = DMatrix::zeros(directions.len(), roots.len());
+    let mut row = 0;
+    for (e, experiment) in problem.experiments.iter().enumerate() {
+        for channel in &experiment.channels {
+            let mut slopes = vec![0.0; channel.len()];
+            for i in 0..channel.len() {
+                slopes[i] = roots[row];
+                let gradient = reading_gradient(problem, evaluation, e, |view, parts| {
+                    channel.add_transpose(view, &slopes, parts.0, parts.1, parts.2);
+                });
+                slopes[i] = 0.0;
+                let z = directions.functional(&gradient);
+                transposed.column_mut(row).copy_from_slice(&z);
+                row += 1;
+            }
+        }
+    }
+    transposed.transpose()
+}
+
+type Parts<'a> = (
+    &'a mut Trajectory,
+    &'a mut crate::dynamics::Device,
+    &'a mut [f64],
+);
+
+/// Gradient in the parameters of a linear function of the predictions of experiment `e`.
+fn reading_gradient(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    add: impl FnOnce(crate::objective::View, Parts),
+) -> Vec<f64> {
+    let experiment = &problem.experiments[e];
+    let view = problem.view(evaluation, e);
+    let mut source = Trajectory::zeros(experiment.nodes);
+    let mut nodal = problem.functions.empty_device();
+    let mut scalars = vec![0.0; evaluation.scalars.len()];
+    add(view, (&mut source, &mut nodal, &mut scalars));
+    let share = adjoint::discrete::gradient(
+        view.oscillator,
+        view.device,
+        view.excitation,
+        view.motion,
+        &source,
+    );
+    for (total, share) in nodal.functions_mut().zip(share.device.functions()) {
+        total.iter_mut().zip(share).for_each(|(t, s)| *t += s);
+    }
+    let slopes = [share.initial.displacement, share.initial.velocity];
+    for (index, slope) in experiment.sought.into_iter().zip(slopes) {
+        if let Some(index) = index {
+            scalars[index] += slope;
+        }
+    }
+    let mut gradient = vec![0.0; problem.parameters()];
+    (problem.functions).add_transpose(&nodal, experiment.device, &mut gradient);
+    gradient[problem.functions.scalar_range()].copy_from_slice(&scalars);
+    gradient
+}
+
+/// What the readings see: `J = U S V^T`.
+#[derive(Debug, Clone)]
+pub struct Spectrum {
+    /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
+    /// readings together per change by 100 % of the natural sizes ([`Directions`]).
+    pub singular_values: Vec<f64>,
+    /// Number of those above [`RANK`] times the largest.
+    pub rank: usize,
+    vectors: DMatrix<f64>,
+    directions: Directions,
+    names: Vec<String>,
+}
+
+/// A direction of the parameters with what the readings make of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Its singular value.
+    pub singular_value: f64,
+    /// Change of the parameters, in their units.
+    pub change: Vec<f64>,
+    /// Change of each function over the nodes, in its unit, with its name.
+    pub functions: Vec<(String, Vec<f64>)>,
+}
+
+impl Spectrum {
+    /// Number of directions that were looked at: that of the parameters, unless it is coarse.
+    pub fn of(&self) -> usize {
+        self.directions.len()
+    }
+
+    /// Number of directions that are not seen.
+    pub fn unseen(&self) -> usize {
+        self.of() - self.rank
+    }
+
+    /// The directions that it is about.
+    pub fn directions(&self) -> &Directions {
+        &self.directions
+    }
+
+    /// Right singular vectors of the directions that are seen, as columns.
+    pub fn seen(&self) -> nalgebra::DMatrixView<'_, f64> {
+        self.vectors.columns(0, self.rank)
+    }
+
+    /// The part of `z` that is not seen.
+    pub fn unseen_part(&self, z: &DMatrix<f64>) -> DMatrix<f64> {
+        let seen = self.seen();
+        let mut rest = z.clone();
+        // Twice: what the first pass leaves to rounding.
+        for _ in 0..2 {
+            let inside = seen.tr_mul(&rest);
+            rest -= seen * inside;
+        }
+        rest
+    }
+
+    /// The directions of these ranks, best first, as changes of every function over time.
+    pub fn at(&self, problem: &Problem, ranks: Range<usize>) -> Vec<Seen> {
+        let each = ranks.filter(|k| *k < self.vectors.ncols()).map(|k| {
+            let z = self.vectors.column(k);
+            let change = self.directions.to_parameters(z.as_slice());
+            Seen {
+                singular_value: self.singular_values[k],
+                functions: functions_along(problem, &change, &self.names),
+                change,
+            }
+        });
+        each.collect()
+    }
+
+    /// The `count` directions that the readings see best.
+    pub fn best(&self, problem: &Problem, count: usize) -> Vec<Seen> {
+        self.at(problem, 0..count)
+    }
+
+    /// The `count` directions that they see worst, the worst last, of those they do see.
+    pub fn worst(&self, problem: &Problem, count: usize) -> Vec<Seen> {
+        self.at(problem, self.rank.saturating_sub(count)..self.rank)
+    }
+
+    /// In words.
+    pub fn sentence(&self) -> String {
+        let (rank, of) = (self.rank, self.of());
+        match self.directions.is_coarse() {
+            false => format!("the readings see {rank} of {of} directions"),
+            true => format!(
+                "the readings see {rank} of {of} smooth directions (of {} parameters)",
+                self.directions.parameters()
+            ),
+        }
+    }
+}
+
+fn functions_along(problem: &Problem, change: &[f64], names: &[String]) -> Vec<(String, Vec<f64>)> {
+    let functions = &problem.functions;
+    let parts = functions.iter().zip(functions.ranges()).zip(names);
+    let each = parts.map(|((function, range), name)| {
+        let values = (function.design).multiply(&change[range.clone()], functions.nodes());
+        (name.clone(), values)
+    });
+    each.collect()
+}
