@@ -33,6 +33,8 @@ use std::f64::consts::TAU;
 
 /// Most parameters for which the whole covariance is formed; beyond, that of smooth directions.
 const MOST_PARAMETERS: usize = 800;
+/// Most work of their decomposition, readings x directions^2.
+const MOST_WORK: f64 = 2e9;
 /// Most nodes at which bands are computed; beyond, at every second, third, ...
 const MOST_NODES: usize = 4000;
 /// Most nodes whose maximum a simultaneous band is simulated for: bands are smooth between.
@@ -152,7 +154,10 @@ impl Bands {
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
-        let directions = Directions::new(problem, evaluation, MOST_PARAMETERS);
+        let readings = problem.reading_count().max(1) as f64;
+        let affordable = (MOST_WORK / readings).sqrt() as usize;
+        let smooth = affordable.min(MOST_PARAMETERS);
+        let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let coarse = directions.is_coarse();
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information = Information::new(problem, theta, sensitivity);

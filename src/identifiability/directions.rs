@@ -23,8 +23,8 @@ pub struct Directions {
 
 impl Directions {
     /// One direction per parameter if there are at most `most`, else hats: so many that there are
-    /// about `most` directions in all.
-    pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize) -> Self {
+    /// about `coarse` directions in all.
+    pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize, coarse: usize) -> Self {
         let sizes = problem.natural_sizes(evaluation);
         let duration = problem.oscillator.grid.duration();
         let metric = problem.functions.relative_metric(&sizes, duration);
@@ -40,7 +40,7 @@ impl Directions {
         }
         let ranges = problem.functions.ranges();
         let free = ranges.iter().filter(|r| !r.is_empty()).count();
-        let each = (most / free.max(1)).max(FEWEST_HATS);
+        let each = (coarse / free.max(1)).max(FEWEST_HATS);
         let mut columns = Vec::new();
         for range in ranges {
             if range.len() <= each {
@@ -132,7 +132,7 @@ impl Directions {
         self.columns.iter().map(of).collect()
     }
 
-    /// Adds a linear function with few slopes to `out`, as one of `z`.
+    /// A linear function of the parameters with few slopes, as one of `z`.
     pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut slopes = vec![0.0; self.parameters()];
         entries.for_each(|(j, a)| slopes[j] += a);

@@ -33,7 +33,7 @@ pub struct Sensitivity {
     pub has_sigma: Vec<bool>,
     /// What the columns differentiate along.
     pub directions: Directions,
-    /// The nodes, s, and for each function of the list its name.
+    /// The name of each function of the list.
     names: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ impl Sensitivity {
         Self::along(
             problem,
             evaluation,
-            Directions::new(problem, evaluation, most),
+            Directions::new(problem, evaluation, most, COARSE),
         )
     }
 
