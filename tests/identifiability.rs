@@ -754,9 +754,9 @@ fn tangents_and_adjoints_give_the_same_jacobian() {
 
 /// By hand: `cargo test --test identifiability -- --ignored --nocapture`.
 #[test]
-#[ignore = "some twenty seconds; prints the times of a large problem"]
+#[ignore = "half a minute; prints the times of a large problem"]
 fn times_of_large_problems() {
-    for nodes in [500, 1000, 2000, 8000] {
+    for nodes in [200, 500, 1000, 2000, 8000, 40_000] {
         let oscillator = common::oscillator(nodes, Method::Midpoint);
         let device = common::paper_device(nodes);
         let mut problem = nodal(&oscillator, &device, &[free(0)]);

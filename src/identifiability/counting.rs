@@ -490,7 +490,7 @@ impl Inputs {
             // before it.
             let before = |r: &&Experiment| i == 0 || force(r, i - 1, 1) == 0.0;
             let at_node = |r: &&Experiment| force(r, i, 0) == 0.0;
-            silent.push(records.iter().all(|r| before(&r) && at_node(&r)));
+            silent.push(records.iter().all(|r| before(r) && at_node(r)));
         }
         let still = |r: &&Experiment| {
             let base = r.excitation.as_ref().and_then(|e| e.base.as_ref());
