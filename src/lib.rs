@@ -56,8 +56,9 @@
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
 //!    starts, the choice of a weight; and the equation error, which simulates nothing.
 //! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.
-//! 9. [`study`] asks what the readings say beyond one fit: profiles, equivalent and extreme devices,
-//!    many starts, whether a function varies at all, bootstrap, prediction.
+//! 9. [`identifiability`] says what the readings can show, how far a fit may be off, and which record
+//!    would show more; [`study`] asks further: profiles, equivalent and extreme devices, many starts,
+//!    whether a function varies at all, bootstrap, prediction.
 //! 10. [`report`] writes tables, figures and the result document, and compares runs.
 //! 11. [`cli`] is one file per command.
 //!

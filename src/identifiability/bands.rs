@@ -33,6 +33,10 @@ use std::f64::consts::TAU;
 
 /// Most parameters for which the whole covariance is formed; beyond, that of smooth directions.
 const MOST_PARAMETERS: usize = 800;
+/// Most of these.
+const MOST_SMOOTH: usize = 400;
+/// Most work of their decomposition, readings x directions^2.
+const MOST_WORK: f64 = 2e9;
 /// Most nodes at which bands are computed; beyond, at every second, third, ...
 const MOST_NODES: usize = 4000;
 /// Most nodes whose maximum a simultaneous band is simulated for: bands are smooth between.
@@ -152,7 +156,10 @@ impl Bands {
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
-        let directions = Directions::new(problem, evaluation, MOST_PARAMETERS);
+        let readings = problem.reading_count().max(1) as f64;
+        let affordable = (MOST_WORK / readings).sqrt() as usize;
+        let smooth = affordable.min(MOST_SMOOTH);
+        let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let coarse = directions.is_coarse();
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information = Information::new(problem, theta, sensitivity);
@@ -302,9 +309,9 @@ impl Maker<'_> {
             }
         };
         let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        for i in 0..count {
+        for (i, value) in values.iter().enumerate() {
             let (tight, loose) = (error(0, i), error(1, i));
-            let (standard_error, side) = if !values[i].is_finite() || tight.is_nan() {
+            let (standard_error, side) = if !value.is_finite() || tight.is_nan() {
                 (f64::INFINITY, Side::Both)
             } else if loose == 0.0 {
                 (0.0, Side::Neither)

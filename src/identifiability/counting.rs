@@ -6,7 +6,8 @@
 //! neither does a forced one before its force sets in.
 //!
 //! **Silent nodes.** With one value per node and one reading per step, a step of the midpoint rule
-//! without a force moves states of two dimensions: it adds at most two equations.
+//! without a force, and without one half a step before, moves states of two dimensions: it adds at most
+//! two equations.
 //!
 //! **Columns.** A parameter that acts after the last reading is not seen, and neither is the common
 //! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the motion unchanged where no force acts. For functions
@@ -485,7 +486,11 @@ impl Inputs {
                 span.len()
             });
             after.push(stages);
-            silent.push(records.iter().all(|r| force(r, i, 0) == 0.0));
+            // The displacement after the step also answers to the node through the middle of the step
+            // before it.
+            let before = |r: &&Experiment| i == 0 || force(r, i - 1, 1) == 0.0;
+            let at_node = |r: &&Experiment| force(r, i, 0) == 0.0;
+            silent.push(records.iter().all(|r| before(r) && at_node(r)));
         }
         let still = |r: &&Experiment| {
             let base = r.excitation.as_ref().and_then(|e| e.base.as_ref());

@@ -1,10 +1,12 @@
 //! The covariance of the parameters as a factor, and the directions that it does not bound.
 
 use super::active::ActiveRow;
+use super::directions::Directions;
 use super::linear::{null_space, right_svd};
 use super::sensitivity::Sensitivity;
+use crate::functions::Penalty;
 use crate::problem::Problem;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A direction whose singular value is below this share of the largest is not seen.
 const UNSEEN: f64 = 1e-11;
@@ -41,14 +43,6 @@ impl Information {
             }
         }
         let mut pulls = Vec::new();
-        for penalty in &problem.penalties {
-            let first = functions.ranges()[penalty.function].start;
-            let root = penalty.weight.sqrt();
-            for i in 0..penalty.target.len() {
-                let row = penalty.rows.row(i).map(|(j, a)| (first + j, root * a));
-                pulls.push(directions.row(row));
-            }
-        }
         for group in &problem.soft {
             let root = group.row_weight().sqrt();
             for i in 0..group.rows.len() {
@@ -60,9 +54,13 @@ impl Information {
         let n = directions.len();
         let stack = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
         let measured = stacked(&sensitivity.jacobian, &stack(&priors));
+        let mut pulled = stack(&pulls);
+        for penalty in &problem.penalties {
+            pulled = stacked(&pulled, &roughness(problem, penalty, directions));
+        }
         Self {
             measured,
-            pulled: stack(&pulls),
+            pulled,
             sensitivity,
         }
     }
@@ -162,6 +160,24 @@ impl Information {
             f64::INFINITY
         })
     }
+}
+
+/// `sqrt(weight) L` of a penalty along the directions, or its triangular factor where that has fewer
+/// rows.
+fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> DMatrix<f64> {
+    let range = problem.functions.ranges()[penalty.function].clone();
+    let (rows, n) = (penalty.target.len(), directions.len());
+    let mut out = DMatrix::zeros(rows, n);
+    for k in 0..n {
+        let theta = directions.column(k);
+        let part = &theta[range.clone()];
+        if part.iter().any(|x| *x != 0.0) {
+            let image = penalty.rows.multiply(part, rows);
+            out.set_column(k, &DVector::from_vec(image));
+        }
+    }
+    out *= penalty.weight.sqrt();
+    if rows > n { out.qr().r() } else { out }
 }
 
 /// One matrix above the other.

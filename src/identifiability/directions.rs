@@ -2,7 +2,7 @@
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Directions `d_k` of the parameters, `theta = sum_k z_k d_k`, scaled so that `z` has no unit.
 ///
@@ -14,17 +14,18 @@ use nalgebra::{DMatrix, DVector};
 /// There is one direction per parameter, or, where these would be too many, hat functions over groups
 /// of neighbouring parameters: a coarser set of smooth directions. What is said of those holds for
 /// changes that are smooth on their scale; rougher ones are not looked at.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Directions {
     columns: Vec<Vec<(usize, f64)>>,
     metric: Vec<f64>,
-    coarse: bool,
+    /// Of the inner products of hats; `None` for one direction per parameter, which are orthonormal.
+    gram: Option<Cholesky<f64, Dyn>>,
 }
 
 impl Directions {
     /// One direction per parameter if there are at most `most`, else hats: so many that there are
-    /// about `most` directions in all.
-    pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize) -> Self {
+    /// about `coarse` directions in all.
+    pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize, coarse: usize) -> Self {
         let sizes = problem.natural_sizes(evaluation);
         let duration = problem.oscillator.grid.duration();
         let metric = problem.functions.relative_metric(&sizes, duration);
@@ -35,12 +36,12 @@ impl Directions {
             return Self {
                 columns,
                 metric,
-                coarse: false,
+                gram: None,
             };
         }
         let ranges = problem.functions.ranges();
         let free = ranges.iter().filter(|r| !r.is_empty()).count();
-        let each = (most / free.max(1)).max(FEWEST_HATS);
+        let each = (coarse / free.max(1)).max(FEWEST_HATS);
         let mut columns = Vec::new();
         for range in ranges {
             if range.len() <= each {
@@ -54,11 +55,24 @@ impl Directions {
             }
         }
         columns.extend(problem.functions.scalar_range().map(unit));
-        Self {
+        let mut directions = Self {
             columns,
             metric,
-            coarse: true,
+            gram: None,
+        };
+        directions.gram = Some(directions.inner_products());
+        directions
+    }
+
+    fn inner_products(&self) -> Cholesky<f64, Dyn> {
+        let n = self.len();
+        let mut gram = DMatrix::zeros(n, n);
+        for k in 0..n {
+            let weighted = self.column(k).into_iter().zip(&self.metric);
+            let weighted: Vec<f64> = weighted.map(|(d, m)| d * m).collect();
+            gram.set_column(k, &DVector::from_vec(self.functional(&weighted)));
         }
+        gram.cholesky().expect("hats are independent")
     }
 
     /// Number of directions.
@@ -73,7 +87,7 @@ impl Directions {
 
     /// Whether they are fewer than the parameters.
     pub fn is_coarse(&self) -> bool {
-        self.coarse
+        self.gram.is_some()
     }
 
     /// Number of parameters.
@@ -104,25 +118,9 @@ impl Directions {
             .map(|(t, m)| t * m)
             .collect();
         let dual = self.functional(&weighted);
-        if !self.coarse {
+        let Some(factor) = &self.gram else {
             return dual;
-        }
-        let n = self.len();
-        let scaled: Vec<Vec<f64>> = (0..n)
-            .map(|k| {
-                let column = self.column(k);
-                column
-                    .iter()
-                    .zip(&self.metric)
-                    .map(|(d, m)| d * m)
-                    .collect()
-            })
-            .collect();
-        let mut gram = DMatrix::zeros(n, n);
-        for (k, column) in scaled.iter().enumerate() {
-            gram.set_column(k, &DVector::from_vec(self.functional(column)));
-        }
-        let factor = gram.cholesky().expect("hats are independent");
+        };
         factor.solve(&DVector::from_vec(dual)).as_slice().to_vec()
     }
 
@@ -132,7 +130,7 @@ impl Directions {
         self.columns.iter().map(of).collect()
     }
 
-    /// Adds a linear function with few slopes to `out`, as one of `z`.
+    /// A linear function of the parameters with few slopes, as one of `z`.
     pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut slopes = vec![0.0; self.parameters()];
         entries.for_each(|(j, a)| slopes[j] += a);

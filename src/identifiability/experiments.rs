@@ -20,10 +20,6 @@ use crate::objective::{Channel, Evaluation, Weighting};
 use crate::problem::{Experiment, Problem};
 use nalgebra::{DMatrix, DVector};
 
-/// A record sees the scale if its answer to it is above this share of its largest answer: rounding
-/// and the stepper's error in `s(t)` are below.
-const ANSWER: f64 = 1e-9;
-
 /// What a candidate would measure, at all nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateChannel {
@@ -53,7 +49,8 @@ pub struct Gain {
     pub new_directions: usize,
     /// Directions that are seen with it.
     pub rank: usize,
-    /// Whether it sees the common scale of the functions; `None` where nothing leaves that free.
+    /// Whether it fixes the common scale of the functions, at some times at least: only a force does.
+    /// `None` where the scale is not free.
     pub sees_scale: Option<bool>,
     /// D: ratio of the geometric mean of the standard errors, after to before.
     pub volume: f64,
@@ -115,28 +112,23 @@ pub fn rank_experiments(
         true => rank_of(&right_svd(now).0),
         false => seen,
     };
-    let directions = &information.sensitivity().directions;
     let gauge = Gauge::at(problem, theta);
-    let scale = gauge.basis(directions);
     let gain = |candidate: &Candidate| -> Result<Gain, String> {
-        let added = jacobian(problem, theta, candidate, &information)?;
+        let experiment = simulated(problem, candidate)?;
+        let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = rank_of(&right_svd(&stacked(now, &added)).0);
         let before = &values[..seen];
         let kept = vectors.columns(0, seen);
         let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
         let (after, _) = right_svd(&stacked(&old, &(&added * kept)));
-        let size = right_svd(&added).0.first().copied().unwrap_or(0.0);
-        let answer = (&added * &scale)
-            .column_iter()
-            .map(|c| c.norm())
-            .fold(0.0, f64::max);
         let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
         let shrinks = |ratio: f64| if seen == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
         Ok(Gain {
             new_directions: rank.saturating_sub(rank_now),
             rank,
-            sees_scale: (!gauge.is_empty()).then_some(answer > ANSWER * size),
+            sees_scale: (!gauge.is_empty())
+                .then(|| fixes_scale(problem, theta, experiment, &gauge)),
             volume: shrinks((logs.sum::<f64>() / seen as f64).exp()),
             average: shrinks((inverse(&after) / inverse(before)).sqrt()),
             worst: match (before.last(), after.last()) {
@@ -161,13 +153,15 @@ pub fn rank_experiments(
     ranked
 }
 
-/// The candidate's Jacobian along the directions of the records there are.
-fn jacobian(
-    problem: &Problem,
-    theta: &[f64],
-    candidate: &Candidate,
-    information: &Information,
-) -> Result<DMatrix<f64>, String> {
+/// Whether the gauge is smaller with one more record.
+fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gauge) -> bool {
+    let mut with = problem.clone();
+    with.experiments.push(record);
+    Gauge::at(&with, theta).directions.len() < gauge.directions.len()
+}
+
+/// The candidate as an experiment; why it is none otherwise.
+fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, String> {
     let grid = &problem.oscillator.grid;
     let nodes = grid.nodes();
     if candidate.channels.is_empty() {
@@ -210,8 +204,18 @@ fn jacobian(
         );
         experiment = experiment.with_channel(made.ok_or("its readings are not on the grid")?);
     }
+    Ok(experiment)
+}
+
+/// The record's Jacobian along the directions of the records there are.
+fn jacobian(
+    problem: &Problem,
+    theta: &[f64],
+    record: Experiment,
+    information: &Information,
+) -> Result<DMatrix<f64>, String> {
     let mut trial = problem.clone();
-    trial.experiments = vec![experiment];
+    trial.experiments = vec![record];
     let evaluation = trial.evaluate(theta).map_err(|b| b.to_string())?;
     let directions = information.sensitivity().directions.clone();
     let jacobian = Sensitivity::along(&trial, &evaluation, directions).jacobian;

@@ -19,7 +19,7 @@ const HOLDS: f64 = 1e-8;
 /// A direction is named after the gauge if this share of its squared norm lies there.
 pub const MOSTLY: f64 = 0.9;
 /// Up to so many nodes the scale over time is written node by node, beyond by so many hats.
-const MOST_FACTORS: usize = 500;
+const MOST_FACTORS: usize = 200;
 
 /// One gauge direction.
 #[derive(Debug, Clone, PartialEq)]
@@ -216,21 +216,19 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
     }
     let matrix = DMatrix::from_fn(rows.len(), directions.len(), |i, j| rows[i][j]);
     let kept = null_space(&matrix, HOLDS);
-    let combine = |weights: &[f64], of: &dyn Fn(&GaugeDirection) -> Vec<f64>| {
-        let mut sum = vec![0.0; of(first).len()];
-        for (d, w) in directions.iter().zip(weights) {
-            sum.iter_mut().zip(of(d)).for_each(|(s, x)| *s += w * x);
-        }
-        sum
+    let combined = |of: &dyn Fn(&GaugeDirection) -> &Vec<f64>| {
+        let columns: Vec<DVector<f64>> = (directions.iter())
+            .map(|d| DVector::from_column_slice(of(d)))
+            .collect();
+        DMatrix::from_columns(&columns) * &kept
     };
-    let each = kept.column_iter().map(|weights| {
-        let weights = weights.as_slice();
-        GaugeDirection {
-            name: first.name.clone(),
-            constant: first.constant,
-            factor: combine(weights, &|d| d.factor.clone()),
-            change: combine(weights, &|d| d.change.clone()),
-        }
+    let (factors, changes) = (combined(&|d| &d.factor), combined(&|d| &d.change));
+    let pairs = factors.column_iter().zip(changes.column_iter());
+    let each = pairs.map(|(factor, change)| GaugeDirection {
+        name: first.name.clone(),
+        constant: first.constant,
+        factor: factor.as_slice().to_vec(),
+        change: change.as_slice().to_vec(),
     });
     each.collect()
 }

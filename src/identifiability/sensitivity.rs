@@ -10,10 +10,10 @@ use std::ops::Range;
 
 /// Singular values above this share of the largest count: the rank of problem.md, section 5.
 pub const RANK: f64 = 1e-12;
-/// Most work of a decomposition, rows x columns x the smaller of both: 2000 readings of 6000
-/// parameters. Beyond it the directions are made coarser.
-const MOST_WORK: f64 = 2.5e10;
-/// Number of directions, then.
+/// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
+/// readings of 3000 parameters. Beyond it the directions are made coarser.
+const MOST_WORK: f64 = 3.1e9;
+/// Number of smooth directions, then.
 const COARSE: usize = 600;
 
 /// `sqrt(w_i) dz_i/dtheta . d_k` for all readings `i` and directions `k`.
@@ -33,13 +33,16 @@ pub struct Sensitivity {
     pub has_sigma: Vec<bool>,
     /// What the columns differentiate along.
     pub directions: Directions,
-    /// The nodes, s, and for each function of the list its name.
+    /// The name of each function of the list.
     names: Vec<String>,
 }
 
 impl Sensitivity {
-    /// At an evaluated point, along all parameters; along fewer smooth directions where readings and
-    /// parameters are more than about 2000 and 6000 together.
+    /// At an evaluated point, along all parameters; along some 600 smooth directions where these are
+    /// more than about 1000 readings of 3000 parameters ([`Directions::is_coarse`] says so): their rank is
+    /// that of functions on as many knots. The whole Jacobian is still to be had by
+    /// [`Sensitivity::along`], 2000 readings of 6000 parameters in a second; its decomposition takes a
+    /// minute.
     pub fn of(problem: &Problem, evaluation: &Evaluation) -> Self {
         let (rows, columns) = (problem.reading_count() as f64, problem.parameters() as f64);
         let fits = rows * columns * rows.min(columns) <= MOST_WORK;
@@ -47,7 +50,7 @@ impl Sensitivity {
         Self::along(
             problem,
             evaluation,
-            Directions::new(problem, evaluation, most),
+            Directions::new(problem, evaluation, most, COARSE),
         )
     }
 
