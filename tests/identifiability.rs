@@ -249,12 +249,11 @@ fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
         &a.trajectories[0].displacement,
         &b.trajectories[0].displacement,
     );
+    let cost = (a.cost - b.cost).abs() / a.cost;
+    println!("motion {off:.1e} m, cost {cost:.1e} of itself");
+    // Relative to a motion of 3.3 m, and to the cost.
     assert!(off < 1e-13 * 3.3, "{off}");
-    assert!(
-        (a.cost - b.cost).abs() < 1e-13 * a.cost.max(1.0) * 10.0,
-        "{}",
-        a.cost - b.cost
-    );
+    assert!(cost < 1e-13, "{cost}");
     let seen = Sensitivity::of(&problem, &a).spectrum();
     let gauge = Gauge::at(&problem, &theta);
     assert_eq!(gauge.directions.len(), 1);
@@ -800,4 +799,207 @@ fn times_of_large_problems() {
             println!("    {}", judgement.sentence);
         }
     }
+}
+
+#[test]
+fn a_record_that_ends_early_identifies_only_its_span() {
+    let (nodes, half) = (500, 250);
+    let oscillator = common::oscillator(nodes, Method::Rk4);
+    let grid = oscillator.grid;
+    let basis = Basis::PiecewiseLinear {
+        knots: uniform_knots(&grid, 11),
+    };
+    let device = Device {
+        mass: vec![1.0; nodes],
+        coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
+    };
+    let list = vec![
+        CoefficientFunction::free(Quantity::Mass, basis, &grid, vec![1.0; 11]),
+        CoefficientFunction::constant(Quantity::Damping, 0.05, nodes),
+        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+    ];
+    let mut problem = with_records(&oscillator, list, &device, &[free(0)]);
+    let record = &mut problem.experiments[0];
+    let part = record.channels[0].first(half);
+    let (times, values) = (part.times().to_vec(), part.observed().to_vec());
+    let weighting = part.weighting().clone();
+    let part = Channel::new(part.kind(), times, values, weighting, &grid, half).unwrap();
+    record.channels[0] = part;
+    record.nodes = half;
+    // Half of the knots are beyond the last reading.
+    assert_eq!(count(&problem).seen_at_most, 7);
+    assert_eq!(spectrum(&problem).rank, 7);
+    let theta = problem.start();
+    let here = problem.evaluate(&theta).unwrap();
+    let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
+    let words = verdicts(&problem, &here, &bands);
+    words.iter().for_each(|j| println!("{}", j.sentence));
+    let Verdict::OnlyOn(spans) = &words[0].verdict else {
+        panic!("{}", words[0].sentence);
+    };
+    assert_eq!(spans.len(), 1);
+    // Up to the last reading at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
+    assert_eq!(spans[0][0], 0.0);
+    assert!((12.4..=12.5).contains(&spans[0][1]), "{spans:?}");
+    assert!(matches!(words[1].verdict, Verdict::Identified { .. }));
+    assert_eq!(words[2].verdict, Verdict::Fixed);
+}
+
+/// Smoothness so heavy that the estimate scatters much less than Cramer and Rao would have it: the
+/// sandwich says by how much.
+#[test]
+fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
+    let (nodes, sigma, seeds) = (300, 0.05, 200);
+    let oscillator = common::oscillator(nodes, Method::Rk4);
+    let grid = oscillator.grid;
+    let basis = Basis::PiecewiseLinear {
+        knots: uniform_knots(&grid, 9),
+    };
+    let device = Device {
+        mass: vec![1.0; nodes],
+        coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
+    };
+    let list = vec![
+        CoefficientFunction::free(Quantity::Mass, basis.clone(), &grid, vec![1.0; 9]),
+        CoefficientFunction::fixed(Quantity::Damping, vec![0.05; nodes]),
+        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+    ];
+    let bare = with_records(&oscillator, list, &device, &[free(0)]);
+    let mut problem = bare.clone();
+    problem
+        .penalties
+        .push(Penalty::new(0, 2, 3e4, basis.roughness(&grid, 2)));
+    let theta = problem.start();
+    let clean = problem.evaluate(&theta).unwrap().predictions[0][0].clone();
+    let record = |problem: &Problem, values: Vec<f64>| {
+        let mut noisy = problem.clone();
+        noisy.experiments[0].channels = vec![Channel::displacement_at_nodes(
+            values,
+            1,
+            Weighting::Sigma(sigma),
+            &grid,
+        )];
+        noisy
+    };
+    let errors = |problem: &Problem| {
+        let problem = record(problem, clean.clone());
+        let here = problem.evaluate(&theta).unwrap();
+        let settings = BandSettings { draws: 0, seed: 1 };
+        let bands = Bands::at(&problem, &theta, &here, &settings);
+        bands.functions[0].standard_error.clone()
+    };
+    let mut squares = vec![0.0; nodes];
+    for seed in 0..seeds {
+        let fit = run(&record(&problem, with_noise(&clean, sigma, 1000 + seed)));
+        let mass = &fit.best.evaluation.device.mass;
+        squares
+            .iter_mut()
+            .zip(mass)
+            .for_each(|(s, m)| *s += (m - 1.0).powi(2) / seeds as f64);
+    }
+    let (sandwich, cramer_rao) = (errors(&problem), errors(&bare));
+    for i in (0..nodes).step_by(30) {
+        let ratio = squares[i].sqrt() / sandwich[i];
+        println!(
+            "{i}: scatter {:.5}, sandwich {:.5}, without {:.5}",
+            squares[i].sqrt(),
+            sandwich[i],
+            cramer_rao[i]
+        );
+        // A standard deviation from 200 seeds scatters by 5 %: three of these.
+        assert!((ratio - 1.0).abs() < 0.15, "{ratio} at {i}");
+    }
+    assert!(sandwich[150] < 0.9 * cramer_rao[150]);
+}
+
+#[test]
+fn the_scale_by_bases_and_drives() {
+    let nodes = 61;
+    let oscillator = common::oscillator(nodes, Method::Rk4);
+    let grid = oscillator.grid;
+    let device = Device {
+        mass: grid.times().iter().map(|t| 1.0 - 0.02 * t).collect(),
+        coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
+    };
+    let with = |bases: [Basis; 3], records: &[Record]| {
+        let parts = QUANTITIES.into_iter().zip(bases).zip(device.functions());
+        let list = parts.map(|((quantity, basis), values)| {
+            let start = basis.project(&grid, values).unwrap();
+            CoefficientFunction::free(quantity, basis, &grid, start)
+        });
+        with_records(&oscillator, list.collect(), &device, records)
+    };
+    let all = |basis: Basis| [basis.clone(), basis.clone(), basis];
+    let knots = |count| uniform_knots(&grid, count);
+    let cells = Basis::PiecewiseConstant { knots: knots(7) };
+    let line = |count| Basis::PiecewiseLinear {
+        knots: knots(count),
+    };
+    let table = [
+        (all(cells.clone()), 12, Symmetry::Function),
+        // Six cells and four have two halves of the record in common.
+        (
+            [
+                cells.clone(),
+                Basis::PiecewiseConstant { knots: knots(5) },
+                cells,
+            ],
+            14,
+            Symmetry::Function,
+        ),
+        (all(line(9)), 26, Symmetry::NearlyFunction),
+        (all(line(3)), 8, Symmetry::ConstantFactor),
+        (
+            all(Basis::BSpline { knots: knots(9) }),
+            32,
+            Symmetry::NearlyFunction,
+        ),
+        (
+            [line(9), Basis::Constant, line(9)],
+            18,
+            Symmetry::ConstantFactor,
+        ),
+    ];
+    for (bases, expected, symmetry) in table {
+        let name = format!("{bases:?}");
+        let problem = with(bases, &[free(0), free(1)]);
+        let counted = count(&problem);
+        println!(
+            "{}: {}",
+            problem.functions.get(0).basis.as_ref().unwrap().name(),
+            counted.sentences.join("; ")
+        );
+        assert_eq!(
+            (counted.seen_at_most, counted.symmetry),
+            (expected, symmetry),
+            "{name}"
+        );
+        // Values that jump at knots are linear over the step there: the rank is that of the constant
+        // factor alone, with singular values that fall with the step.
+        if symmetry != Symmetry::Function {
+            assert!(spectrum(&problem).rank <= expected, "{name}");
+        }
+        let gauge = Gauge::at(&problem, &problem.start());
+        assert_eq!(gauge.constant().count(), 1, "{name}");
+    }
+
+    // A base that moves pushes with m b'': that scales too.
+    let mut problem = nodal(&oscillator, &device, &[free(0)]);
+    problem.experiments[0].excitation = Some(Excitation {
+        force: None,
+        base: Some(Stepwise::linear(&vec![1.5; nodes])),
+    });
+    assert_eq!(count(&problem).symmetry, Symmetry::Function);
+    assert_eq!(
+        Gauge::at(&problem, &problem.start()).over_time().count(),
+        nodes
+    );
+
+    // Motions of a stiffness that is not linear do not add up: a third free record counts.
+    let mut cubic = oscillator.clone();
+    cubic.terms = vec![Term::Damping, Term::CubicStiffness];
+    let records = [free(0), free(1), free(2)];
+    let linear = count(&nodal(&oscillator, &device, &records)).equations;
+    let bent = count(&nodal(&cubic, &device, &records)).equations;
+    assert_eq!((linear, bent), (2 * (nodes - 1), 3 * (nodes - 1)));
 }
