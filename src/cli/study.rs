@@ -303,11 +303,11 @@ impl Work<'_> {
                 Err(reason) => self.fail("refits", &reason),
             }
         }
-        let states = &self.model.predictions;
+        let model = self.model;
         let (tubes, predictions) = piece!("tubes", {
             let level = gather::level(&problem, &theta, &evaluation, plan);
             let (tubes, extremes) = gather::tubes(&problem, &theta, &level, plan, threads);
-            let predictions = gather::predictions(&problem, &theta, &evaluation, states, &extremes);
+            let predictions = gather::predictions(&problem, &theta, &evaluation, model, &extremes);
             (tubes, predictions)
         });
         self.document.tubes = tubes;

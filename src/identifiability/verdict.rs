@@ -106,10 +106,13 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
 
 fn judgement(name: &str, verdict: Verdict) -> Judgement {
     let sentence = match &verdict {
-        Verdict::Identified { relative } => format!(
-            "{name} is identified, to {:.2} % of its size (95 %)",
-            100.0 * relative
-        ),
+        Verdict::Identified { relative } => {
+            let share = match *relative < 1e-4 {
+                true => format!("{relative:.0e}"),
+                false => format!("{:.2} %", 100.0 * relative),
+            };
+            format!("{name} is identified, to {share} of its size (95 %)")
+        }
         Verdict::OnlyRatio(ratio) => {
             format!("{name} is not identified by itself, only the ratio {ratio} is")
         }

@@ -231,6 +231,10 @@ pub struct IdentifiabilitySummary {
     pub verdicts: Vec<String>,
     /// What the model says besides the readings, in words.
     pub knowledge: Vec<String>,
+    /// What is known of each function and ratio at the optimum, in words; for models of few free
+    /// values, of others `kmcfit study` tells.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub functions: Vec<String>,
 }
 
 /// The motion of the found device from one initial state, against the true device's.

@@ -18,7 +18,7 @@ use crate::diagnostics::rms;
 use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction, Ratios};
-use crate::identifiability::count;
+use crate::identifiability::{BandSettings, Bands, count, verdicts};
 use crate::objective::Channel;
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
@@ -26,6 +26,9 @@ use crate::solvers::{
 };
 use std::collections::BTreeMap;
 use std::io;
+
+/// Up to so many free values the bands are computed with every fit: some milliseconds.
+const FEW_PARAMETERS: usize = 64;
 
 /// A fitted model and what it predicts.
 #[derive(Debug, Clone, Copy)]
@@ -147,7 +150,24 @@ impl Run<'_> {
             of: count.of,
             verdicts: count.sentences,
             knowledge,
+            functions: self.bands().map_or(Vec::new(), |bands| {
+                let judged = verdicts(problem, &self.fit.best.evaluation, &bands);
+                judged.into_iter().map(|j| j.sentence).collect()
+            }),
         }
+    }
+
+    /// The bands of functions and ratios, for a simulated motion and few free values.
+    fn bands(&self) -> Option<Bands> {
+        let problem = &self.model.problem;
+        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+        let settings = BandSettings {
+            draws: 0,
+            ..BandSettings::default()
+        };
+        let best = &self.fit.best;
+        (few && self.is_simulated() && problem.reading_count() > problem.parameters())
+            .then(|| Bands::at(problem, &best.parameters, &best.evaluation, &settings))
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -344,6 +364,19 @@ impl Run<'_> {
             .column("c_over_m_per_s", ratios.c_over_m)
             .column("natural_frequency_Hz", ratios.frequency)
             .column("damping_ratio", ratios.damping_ratio);
+        if let Some(bands) = self.bands() {
+            for band in bands.functions.iter().chain(&bands.ratios) {
+                let name = band.name.replace([' ', '/', ','], "_");
+                let ends = |side: usize| -> Vec<f64> {
+                    (0..band.values.len())
+                        .map(|i| band.pointwise(i)[side])
+                        .collect()
+                };
+                table = table
+                    .column(format!("{name}_low_95"), ends(0))
+                    .column(format!("{name}_high_95"), ends(1));
+            }
+        }
         if let Some(truth) = &self.model.truth {
             let functions = self.model.problem.functions.iter();
             for (function, values) in functions.zip(truth.functions()) {

@@ -49,6 +49,10 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     for sentence in &document.identifiability.verdicts {
         writeln!(text, "{sentence}")?;
     }
+    let functions = &document.identifiability.functions;
+    if !functions.is_empty() {
+        writeln!(text, "{}", functions.join("; "))?;
+    }
     writeln!(text)?;
     write_functions(text, document)?;
     write_scalars(text, document)?;

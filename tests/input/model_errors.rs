@@ -73,7 +73,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("title:", "titel:"), @"
     m.yaml:2:1: unknown key
       found: `titel`
-      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
       hint: did you mean `title`?
     ");
     assert_snapshot!(changed("velocity: +0.5", "velocity: 0.5\n      acceleration: 1"), @"
@@ -396,7 +396,7 @@ fn wrong_kinds() {
     assert_snapshot!(message(&SHORT.replace("experiments:\n", "experiments: []\nx:\n")), @"
     m.yaml:3:1: unknown key
       found: `x`
-      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
     ");
     assert_snapshot!(message("format: 1\nexperiments: []\nfunctions:\n  mass: {basis: nodal}\n  damping: {basis: nodal}\n  stiffness: {basis: nodal}\n"), @"
     m.yaml:2:14: experiments: there is no experiment

@@ -417,7 +417,9 @@ pub fn multistart(
     threads: usize,
 ) -> MultistartPiece {
     let how = Multistart {
-        ranges: Ranges::Constants(ranges(&problem.functions, plan.spread)),
+        // Between the bounds, where all functions have them on both sides.
+        ranges: Ranges::of_bounds(problem)
+            .unwrap_or_else(|| Ranges::Constants(ranges(&problem.functions, plan.spread))),
         starts: plan.starts,
         seed: plan.seed,
         threads,
@@ -590,10 +592,16 @@ pub fn candidates(
         })
         .collect();
     let ranked = rank_experiments(problem, theta, evaluation, &described, false);
+    let gain = |r: &identifiability::Ranked, of: fn(&identifiability::Gain) -> f64| {
+        let of = r.gain.as_ref().ok().map(of);
+        of.filter(|ratio| ratio.is_finite())
+    };
     let record = |r: identifiability::Ranked| CandidateRecord {
         sentence: r.sentence(),
         new_directions: r.gain.as_ref().ok().map(|g| g.new_directions),
-        volume: (r.gain.as_ref().ok()).and_then(|g| g.volume.is_finite().then_some(g.volume)),
+        volume: gain(&r, |g| g.volume),
+        average: gain(&r, |g| g.average),
+        worst: gain(&r, |g| g.worst),
         name: r.name,
     };
     ranked.into_iter().map(record).collect()
@@ -611,21 +619,25 @@ fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
     spreads.next().unwrap_or(1.0).max(f64::MIN_POSITIVE.sqrt())
 }
 
-/// The motions from the initial states that the model asks for.
+/// The motions from the initial states that the model asks for, and in the experiments that might be
+/// made.
 pub fn predictions(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    states: &[State],
+    model: &Model,
     extremes: &[Extreme],
 ) -> Vec<PredictionRecord> {
     let covariance = problem.covariance(evaluation);
-    let each = states.iter().filter_map(|state| {
-        let name = format!(
-            "from y = {} m, v = {} m/s",
-            state.displacement, state.velocity
-        );
-        let run = prediction::Run::free(name, *state);
+    let free = model.predictions.iter().map(|state| {
+        let (y, v) = (state.displacement, state.velocity);
+        prediction::Run::free(format!("from y = {y} m, v = {v} m/s"), *state)
+    });
+    let candidates = model.study.candidates.iter().map(|c| prediction::Run {
+        excitation: c.experiment.excitation.clone(),
+        ..prediction::Run::free(format!("`{}`", c.name), c.experiment.initial)
+    });
+    let each = free.chain(candidates).filter_map(|run| {
         let found =
             prediction::predict(problem, theta, &run, covariance.as_ref(), extremes).ok()?;
         Some(PredictionRecord {

@@ -270,8 +270,12 @@ pub struct CandidateRecord {
     pub name: String,
     /// Directions that it would show and that are not seen now; `null` if it cannot be simulated.
     pub new_directions: Option<usize>,
-    /// Ratio of the geometric mean of the standard errors, after to before.
+    /// Ratio of the geometric mean of the standard errors, after to before (D).
     pub volume: Option<f64>,
+    /// Ratio of their root mean squares (A).
+    pub average: Option<f64>,
+    /// Ratio of the largest (E).
+    pub worst: Option<f64>,
     /// In words.
     pub sentence: String,
 }
