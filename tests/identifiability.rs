@@ -751,56 +751,6 @@ fn tangents_and_adjoints_give_the_same_jacobian() {
     assert!(off < 1e-12, "{off}");
 }
 
-/// By hand: `cargo test --test identifiability -- --ignored --nocapture`.
-#[test]
-#[ignore = "half a minute; prints the times of a large problem"]
-fn times_of_large_problems() {
-    for nodes in [200, 500, 1000, 2000, 8000, 40_000] {
-        let oscillator = common::oscillator(nodes, Method::Midpoint);
-        let device = common::paper_device(nodes);
-        let mut problem = nodal(&oscillator, &device, &[free(0)]);
-        common::add_physics(&mut problem, 1.0, false);
-        let theta = problem.start();
-        let here = problem.evaluate(&theta).unwrap();
-        let clock = std::time::Instant::now();
-        let counted = count(&problem);
-        println!(
-            "{nodes} nodes: counted in {:?}: {}",
-            clock.elapsed(),
-            counted.seen_at_most
-        );
-        let clock = std::time::Instant::now();
-        let sensitivity = Sensitivity::of(&problem, &here);
-        println!(
-            "    Jacobian {:?} in {:?}",
-            sensitivity.jacobian.shape(),
-            clock.elapsed()
-        );
-        let clock = std::time::Instant::now();
-        let seen = sensitivity.spectrum();
-        println!("    {} in {:?}", seen.sentence(), clock.elapsed());
-        let clock = std::time::Instant::now();
-        let gauge = Gauge::at(&problem, &theta);
-        let named = gauge.unseen(&seen).len();
-        println!(
-            "    {named} of {} gauge directions in {:?}",
-            gauge.directions.len(),
-            clock.elapsed()
-        );
-        let clock = std::time::Instant::now();
-        let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
-        println!(
-            "    bands in {:?}, {} unseen, {:?}",
-            clock.elapsed(),
-            bands.unseen,
-            bands.notes
-        );
-        for judgement in verdicts(&problem, &here, &bands) {
-            println!("    {}", judgement.sentence);
-        }
-    }
-}
-
 #[test]
 fn a_record_that_ends_early_identifies_only_its_span() {
     let (nodes, half) = (500, 250);

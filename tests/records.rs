@@ -336,3 +336,38 @@ fit: {method: lbfgs, gradient: continuous}
     // Of order 1 at worst: four times the nodes, a quarter of the difference or less.
     assert!(fine < 1e-3 && fine < 0.3 * coarse, "{coarse} {fine}");
 }
+
+/// The initial state is that of the first row, also where its reading is missing: at 0 s.
+#[test]
+fn readings_that_are_missing_at_the_ends() {
+    let y = motion(200.0, 801, &nothing, &nothing);
+    let mut text = String::from("t_s,y_m\n");
+    for (i, y) in y.iter().enumerate() {
+        let t = i as f64 / 200.0;
+        match (80..700).contains(&i) {
+            true => _ = writeln!(text, "{t},{y}"),
+            false => _ = writeln!(text, "{t},"),
+        }
+    }
+    let experiment = "    initial: {displacement: 0.02, velocity: 0.0}";
+    let (model, run) = fitted(&text, experiment, KNOWN);
+    assert_eq!(model.problem.oscillator.grid.start(), 0.0);
+    assert_eq!(model.problem.oscillator.grid.duration(), 4.0);
+    assert!(error(&run) < 1e-5, "{}", error(&run));
+}
+
+/// Few readings that are left by decimation do not make a coarse grid.
+#[test]
+fn decimation_does_not_coarsen_the_grid() {
+    let y = motion(200.0, 801, &nothing, &nothing);
+    let mut text = String::from("t_s,y_m\n");
+    for (i, y) in y.iter().enumerate() {
+        let _ = writeln!(text, "{},{y}", i as f64 / 200.0);
+    }
+    let experiment = "    decimate: 20
+    initial: estimate";
+    let (model, run) = fitted(&text, experiment, KNOWN);
+    assert!(model.problem.oscillator.grid.nodes() > 200);
+    // The filter's edges leave some 1e-3 of the motion at the ends of the record.
+    assert!(error(&run) < 5e-3, "{}", error(&run));
+}

@@ -12,7 +12,7 @@ use crate::problem::Problem;
 use crate::report::study::{StudyDocument, gather};
 use crate::report::{FinishedRun, Heading, Journal, OutputFolder, json};
 use crate::solvers::Status;
-use std::io;
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -97,7 +97,10 @@ fn threads(asked: Option<usize>) -> usize {
 /// Runs the models of a story and tells them on one page.
 fn tell(story: &Story, out: &Path, as_json: bool) -> Result<u8, Failure> {
     let (folder, comparison, interrupted) = side_by_side(&story.models, out)?;
-    let comparison = comparison.told_as(&story.title);
+    let comparison = match interrupted {
+        true => comparison,
+        false => comparison.told_as(&story.title),
+    };
     comparison
         .write(&folder)
         .map_err(|error| unwritable(folder.path(), &error))?;
@@ -105,8 +108,12 @@ fn tell(story: &Story, out: &Path, as_json: bool) -> Result<u8, Failure> {
         print(&json(&comparison.document()));
     } else {
         print(&format!("{}\n\n", story.title));
-        for sentence in comparison.conclusions() {
-            print(&format!("- {sentence}\n"));
+        if interrupted {
+            print("interrupted: the story is not complete, so nothing is concluded from it\n");
+        } else {
+            for sentence in comparison.conclusions() {
+                print(&format!("- {sentence}\n"));
+            }
         }
         print(&format!(
             "\nthe page is {}\n",
@@ -250,7 +257,11 @@ impl Work<'_> {
                 if self.interrupted() {
                     return Ok(false);
                 }
-                self.journal.piece($name, || $compute)?
+                let name: &str = $name;
+                if std::io::stderr().is_terminal() {
+                    eprintln!("studying: {name}");
+                }
+                self.journal.piece(name, || $compute)?
             }};
         }
         let spectrum = piece!("spectrum", gather::spectrum(&problem, &theta, &evaluation));
@@ -310,6 +321,10 @@ impl Work<'_> {
             let predictions = gather::predictions(&problem, &theta, &evaluation, model, &extremes);
             (tubes, predictions)
         });
+        if tubes.is_empty() {
+            let reason = "the optimum itself is not within the stated level and the constraints";
+            self.fail("tubes", reason);
+        }
         self.document.tubes = tubes;
         self.document.budgeted = !problem.penalties.is_empty();
         self.document.predictions = predictions;

@@ -10,6 +10,9 @@ use std::ops::Range;
 
 /// Singular values above this share of the largest count: the rank of problem.md, section 5.
 pub const RANK: f64 = 1e-12;
+/// The same along smooth directions of many parameters, where the error of the stepper, some 1e-5 of a
+/// motion, makes the scale over time faintly seen.
+pub const COARSE_RANK: f64 = 1e-5;
 /// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
 /// readings of 3000 parameters. Beyond it the directions are made coarser.
 const MOST_WORK: f64 = 3.1e9;
@@ -87,8 +90,13 @@ impl Sensitivity {
     /// Singular values and directions.
     pub fn spectrum(&self) -> Spectrum {
         let (singular_values, vectors) = right_svd(&self.jacobian);
+        // Along smooth directions the scale over time shows through the error of the stepper.
+        let rank = match self.directions.is_coarse() {
+            false => rank_of(&singular_values),
+            true => above(&singular_values, COARSE_RANK),
+        };
         Spectrum {
-            rank: rank_of(&singular_values),
+            rank,
             singular_values,
             vectors,
             directions: self.directions.clone(),
@@ -99,9 +107,13 @@ impl Sensitivity {
 
 /// Number of singular values above [`RANK`] times the largest.
 pub(super) fn rank_of(values: &[f64]) -> usize {
+    above(values, RANK)
+}
+
+/// Number of values above a share of the largest.
+fn above(values: &[f64], share: f64) -> usize {
     let most = values.first().copied().unwrap_or(0.0);
-    let counts = |s: &&f64| **s > RANK * most;
-    values.iter().filter(counts).count()
+    values.iter().filter(|s| **s > share * most).count()
 }
 
 fn by_tangents(
@@ -276,7 +288,8 @@ impl Spectrum {
         match self.directions.is_coarse() {
             false => format!("the readings see {rank} of {of} directions"),
             true => format!(
-                "the readings see {rank} of {of} smooth directions (of {} parameters)",
+                "the readings see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
+                 best (of {} parameters; below that the stepper's own error shows)",
                 self.directions.parameters()
             ),
         }

@@ -45,6 +45,24 @@ pub struct Judgement {
     pub sentence: String,
 }
 
+/// By how much a number is known: as a share of its own largest value, or where that is within the
+/// band, as a number beside which the value cannot be told from zero.
+fn identified(name: &str, band: &Band) -> String {
+    let half = band.standard_error.iter().filter(|e| e.is_finite());
+    let half = NORMAL_975 * half.fold(0.0f64, |most, e| most.max(*e));
+    let own = band.values.iter().filter(|v| v.is_finite());
+    let own = own.fold(0.0f64, |most, v| most.max(v.abs()));
+    if half >= own {
+        let unit = &band.unit;
+        return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
+    }
+    let share = match half / own {
+        share if share < 1e-4 => format!("{share:.0e}"),
+        share => format!("{:.2} %", 100.0 * share),
+    };
+    format!("{name} is identified, to {share} of its largest value (95 %)")
+}
+
 /// Verdicts on every function of the list, then on `k/m` and `c/m`.
 pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
     let sizes = problem.natural_sizes(evaluation);
@@ -80,10 +98,11 @@ pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Ve
                 other => known(f).map_or(other, Verdict::OnlyRatio),
             },
         };
-        judgement(&band.name, verdict)
+        judgement(&band.name, verdict, band)
     });
     let functions: Vec<Judgement> = functions.collect();
-    let ratios = ratios.into_iter().map(|(name, _, v)| judgement(name, v));
+    let ratios = (ratios.into_iter())
+        .filter_map(|(name, _, v)| Some(judgement(name, v, bands.ratio(name)?)));
     functions.into_iter().chain(ratios).collect()
 }
 
@@ -104,15 +123,9 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
     }
 }
 
-fn judgement(name: &str, verdict: Verdict) -> Judgement {
+fn judgement(name: &str, verdict: Verdict, band: &Band) -> Judgement {
     let sentence = match &verdict {
-        Verdict::Identified { relative } => {
-            let share = match *relative < 1e-4 {
-                true => format!("{relative:.0e}"),
-                false => format!("{:.2} %", 100.0 * relative),
-            };
-            format!("{name} is identified, to {share} of its size (95 %)")
-        }
+        Verdict::Identified { .. } => identified(name, band),
         Verdict::OnlyRatio(ratio) => {
             format!("{name} is not identified by itself, only the ratio {ratio} is")
         }

@@ -15,7 +15,8 @@ impl Problem {
     /// Covariance of the parameters at an evaluated point, from the linearised predictions:
     /// `(J^T W J)^-1` with `W = 1/sigma^2` where the readings have a sigma (the Cramer-Rao bound for
     /// Gaussian noise), else times the residuals' mean square. Penalties, constraints and priors do
-    /// not count. `None` where some direction is not seen, or there are too many parameters.
+    /// not count. `None` where some direction is not seen, there are too many parameters, or
+    /// noise is neither given nor left by the fit.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
         let n = self.parameters();
         let readings = self.reading_count();
@@ -50,6 +51,7 @@ impl Problem {
                 covariance[(i, j)] = scale * sum / (sizes[i] * sizes[j]);
             }
         }
-        Some(covariance)
+        // A fit that leaves nothing says nothing of the noise.
+        (scale > 0.0).then_some(covariance)
     }
 }

@@ -27,7 +27,7 @@ study:
     - {scalar: initial velocity of free decay}
   starts: 4
   spread: 1.5
-  bootstrap: 20
+  bootstrap: 40
   varies: true
   candidates:
     - {name: the same again, initial: {displacement: 1.0, velocity: 0.0}}
@@ -148,6 +148,9 @@ fn mistakes() {
         changed("seed: 3", "confidence: 95"),
         changed("spread: 1.5", "spread: 1.0"),
         changed("starts: 4", "starts: 0"),
+        changed("starts: 4", "starts: 9000000000000000000"),
+        changed("bootstrap: 40", "bootstrap: 2"),
+        changed("seed: 3", "tubes: []"),
         changed("at: 5.0", "at: 50.0"),
         changed("{function: damping}", "{function: mass}"),
         changed("{function: damping}", "{function: offset}"),
@@ -187,4 +190,26 @@ fn a_story() {
     bench.write("models/short.yaml", "format: 1\nstory: []\n");
     let before = refused(&bench, &["study", "models/short.yaml"]);
     assert!(before.contains("the story has no model"), "{before}");
+}
+
+/// A record without motion: nothing is seen, and a study says so and ends.
+#[test]
+fn a_record_at_rest() {
+    let bench = bench();
+    let mut text = String::from("t_s,y_m\n");
+    for i in 0..101 {
+        text += &format!("{},0\n", 0.1 * f64::from(i));
+    }
+    bench.write("readings.csv", &text);
+    let model = MODEL
+        .replace(
+            "displacement: 1.0, velocity: estimate",
+            "displacement: 0.0, velocity: 0.0",
+        )
+        .replace("    - {scalar: initial velocity of free decay}\n", "");
+    bench.write("model.yaml", &model);
+    let (code, stdout, stderr) = bench.run(&["study", "model.yaml"]);
+    assert!(code == 0 || code == 3, "{code} {stderr}");
+    assert!(stdout.contains("the readings see 0 of"), "{stdout}");
+    assert!(!stdout.contains("NaN"), "{stdout}");
 }

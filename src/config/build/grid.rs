@@ -67,7 +67,8 @@ fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
             && c.spacing.is_some_and(|s| close(s, spacing))
             && close(c.times[0], first.times[0])
     };
-    channels.all(same).then_some(first.times.len())
+    let usable = !first.decimated && first.span[0] == first.times[0];
+    (usable && channels.all(same)).then_some(first.times.len())
 }
 
 /// First time and length of the records; the length from the model without.

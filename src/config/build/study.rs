@@ -94,6 +94,12 @@ pub struct Candidate {
 const CONFIDENCE: f64 = 0.95;
 const SEED: u64 = 1;
 const SPREAD: f64 = 3.0;
+const WIDEST_SPREAD: f64 = 1e6;
+/// More starts or replicates than these would run for days.
+const MOST_STARTS: usize = 100_000;
+const MOST_REPLICATES: usize = 1_000_000;
+/// Ends of an interval of 95 % need more than twenty values beyond which to lie.
+const FEWEST_REPLICATES: usize = 40;
 /// Ratios and motions that differ by less are those of one optimum.
 const SAME: f64 = 1e-3;
 /// Tubes are sought at so many times unless the model names some.
@@ -105,7 +111,9 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let confidence = within(file, "study.confidence", spec.confidence, CONFIDENCE, |x| {
         x > 0.0 && x < 1.0
     })?;
-    let spread = within(file, "study.spread", spec.spread, SPREAD, |x| x > 1.0)?;
+    let spread = within(file, "study.spread", spec.spread, SPREAD, |x| {
+        x > 1.0 && x <= WIDEST_SPREAD
+    })?;
     let same = within(file, "study.same", spec.same, SAME, |x| x > 0.0)?;
     if let Some(level) = spec.level.filter(|l| l.0 <= 0.0) {
         return Err(file
@@ -113,11 +121,32 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
             .found(level.0)
             .expected("a number greater than 0, in the unit of J"));
     }
-    if spec.starts.is_some_and(|count| count.0 == 0) {
+    let limits = [
+        ("starts", spec.starts, 1, MOST_STARTS),
+        (
+            "bootstrap",
+            spec.bootstrap,
+            FEWEST_REPLICATES,
+            MOST_REPLICATES,
+        ),
+    ];
+    for (name, given, fewest, most) in limits {
+        if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
+            return Err(file
+                .error_at(&format!("study.{name}"), "this number cannot be used")
+                .found(count.0)
+                .expected(format!("{fewest} to {most}, or no `{name}`")));
+        }
+    }
+    if spec
+        .tubes
+        .as_ref()
+        .is_some_and(|tubes| tubes.values().is_empty())
+    {
         return Err(file
-            .error_at("study.starts", "a search needs starts")
-            .found(0)
-            .expected("an integer, 1 or more, or no `starts`"));
+            .error_at("study.tubes", "there is no time")
+            .found("an empty list")
+            .expected("times in s, or no `tubes` for five over the record"));
     }
     let profiles = spec.profiles.iter().flatten().enumerate();
     let profiles = profiles
@@ -186,7 +215,7 @@ fn within(
             .found(number.0)
             .expected(match key {
                 "study.confidence" => "a number between 0 and 1, for instance 0.95",
-                "study.spread" => "a factor greater than 1",
+                "study.spread" => "a factor greater than 1, at most 1e6",
                 _ => "a number greater than 0",
             })),
         given => Ok(given.map_or(usual, |number| number.0)),

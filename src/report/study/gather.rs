@@ -31,6 +31,8 @@ const DRAWS: usize = 10_000;
 const BUDGET: f64 = 2.0;
 /// Least stiffness of an equivalent device, as a share of the fit's largest.
 const LEAST_STIFFNESS: f64 = 1e-3;
+/// A misfit of this share of the level is at it.
+const AT_LEVEL: f64 = 0.999;
 /// Steps of the paths between two optima.
 const PATH: usize = 40;
 /// A path that rises by less than this share of the higher end's cost joins two ends of one valley.
@@ -304,7 +306,7 @@ pub fn tubes(
             high: bands.iter().map(|band| band.high.value).collect(),
             level: level.misfit,
             devices: ends
-                .map(|e| (e.name(), e.misfit, ended(e.ended).to_owned()))
+                .map(|e| (e.name(), e.misfit, ended(e, level.misfit).to_owned()))
                 .collect(),
         });
         extremes.extend(bands.into_iter().flat_map(|band| [band.low, band.high]));
@@ -312,8 +314,10 @@ pub fn tubes(
     (records, extremes)
 }
 
-fn ended(how: Ended) -> &'static str {
-    match how {
+/// At the level nothing is left to gain, however the search ended.
+fn ended(extreme: &Extreme, level: f64) -> &'static str {
+    match extreme.ended {
+        Ended::Stuck if extreme.misfit >= AT_LEVEL * level => super::text::ENDED,
         Ended::Settled => super::text::ENDED,
         Ended::Reach => "at the reach that was stated: no end was met",
         Ended::Stuck => "no trial could be brought back to the level",
@@ -368,7 +372,12 @@ pub fn equivalents(
             .fold(0.0f64, |m, y| m.max(y.abs()));
         let pairs = moved.displacement.iter().zip(&motion.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-        records.push(record(grid, &name, &found, off / largest));
+        records.push(record(
+            grid,
+            &name,
+            &found,
+            if off == 0.0 { 0.0 } else { off / largest },
+        ));
     }
     match records.len() {
         1 => Vec::new(),
@@ -432,13 +441,15 @@ pub fn multistart(
         motions: plan.same,
     };
     let clusters = waterfall.clusters(problem, tolerance);
-    let mut sentences = vec![format!(
-        "{} of {} starts led to {} different optima; the lowest cost is {:.6e}",
-        waterfall.order.len(),
-        plan.starts,
-        clusters.len(),
-        waterfall.costs().first().copied().unwrap_or(f64::NAN)
-    )];
+    let mut sentences = vec![match waterfall.costs().first() {
+        None => format!("none of {} starts led anywhere", plan.starts),
+        Some(lowest) => format!(
+            "{} of {} starts led to {} different points; the lowest cost is {lowest:.6e}",
+            waterfall.order.len(),
+            plan.starts,
+            clusters.len().max(1),
+        ),
+    }];
     let of = |cluster: &multistart::Cluster| {
         let found = waterfall.runs[cluster.members[0]].found.as_ref();
         found.map(|f| f.parameters.clone())
@@ -457,14 +468,20 @@ pub fn multistart(
             }
         });
     }
-    if let Ok(here) = problem.evaluate(theta)
-        && let Some(best) = waterfall.costs().first()
-        && *best < here.cost * (1.0 - 1e-6)
-    {
-        sentences.push(format!(
-            "a start led lower than the fit: {best:.6e} instead of {:.6e}",
-            here.cost
-        ));
+    // Below this share of what there is to explain a difference of costs is rounding.
+    let rounding = 1e-12 * problem.misfit_of_silence();
+    if let (Ok(here), Some(best)) = (problem.evaluate(theta), waterfall.costs().first()) {
+        if *best < here.cost * (1.0 - 1e-6) - rounding {
+            sentences.push(format!(
+                "a start led lower than the fit: {best:.6e} instead of {:.6e}",
+                here.cost
+            ));
+        } else if *best > here.cost * 1.01 + rounding {
+            sentences.push(format!(
+                "no start reached the fit, whose cost is {:.6e}: they were too far off, or got stuck",
+                here.cost
+            ));
+        }
     }
     MultistartPiece {
         costs: waterfall.costs(),
@@ -536,6 +553,14 @@ pub fn refits(
     plan: &StudyPlan,
     threads: usize,
 ) -> Result<Vec<BootstrapRecord>, String> {
+    let evaluation = problem.evaluate(theta).map_err(|b| b.to_string())?;
+    if problem.covariance(&evaluation).is_none() {
+        return Err(
+            "the readings do not determine all parameters, or these are more than 64: refits from the \
+             optimum would not move where nothing is seen"
+                .into(),
+        );
+    }
     let found = bootstrap(
         problem,
         theta,

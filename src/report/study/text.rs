@@ -58,14 +58,13 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
         study.profiles.iter().map(|p| p.sentence.clone()).collect(),
     );
     let tube = |t: &super::TubeRecord| {
-        let ends = |f: &[f64], pick: fn(f64, f64) -> f64| f.iter().copied().reduce(pick);
+        let width = |i: &usize| t.high[*i] - t.low[*i];
+        let widest = (0..t.times.len().min(t.low.len()))
+            .max_by(|a, b| width(a).total_cmp(&width(b)))
+            .unwrap_or(0);
         format!(
-            "{}: from {:.4} to {:.4} {} among devices with a misfit of at most {:.4e}",
-            t.name,
-            ends(&t.low, f64::min).unwrap_or(f64::NAN),
-            ends(&t.high, f64::max).unwrap_or(f64::NAN),
-            t.unit,
-            t.level
+            "{}: widest at {} s, from {:.6} to {:.6} {}, among devices with a misfit of at most {:.4e}",
+            t.name, t.times[widest], t.low[widest], t.high[widest], t.unit, t.level
         )
     };
     let mut lines: Vec<String> = study.tubes.iter().map(tube).collect();

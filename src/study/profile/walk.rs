@@ -9,6 +9,8 @@ use crate::solvers::{Point, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
 
+/// A rise of so many quantiles in one step is a fit that was lost.
+const LOST: f64 = 1e4;
 /// Name of the row that holds the number.
 const HELD: &str = "the profiled number";
 /// A step that raises the cost by less than this share of the quantile was too short: the next is
@@ -133,6 +135,10 @@ impl<'a> Walk<'a> {
         let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
         match found.outcome.status {
             Status::Infeasible | Status::Failed => Err(found.outcome.reason),
+            // A step that leads out of the valley is too long, and says nothing of its walls.
+            _ if self.rise(found.best.evaluation.cost) > LOST * self.how.quantile => {
+                Err("no fit near the optimum was found with the number held there".to_owned())
+            }
             _ => Ok(Sample {
                 value,
                 cost: found.best.evaluation.cost,

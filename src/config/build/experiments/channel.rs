@@ -39,6 +39,10 @@ pub struct RawChannel {
     pub values: Vec<f64>,
     /// Spacing of the readings where it is equal and none is missing, s.
     pub spacing: Option<f64>,
+    /// First and last time of the rows, with a reading or without, s.
+    pub span: [f64; 2],
+    /// Whether most readings were left out, so that they no longer tell how fine the steps must be.
+    pub decimated: bool,
     /// s.
     pub median_spacing: f64,
     /// `None` for the integral cost.
@@ -204,6 +208,7 @@ fn read_one(
     if let Some(factor) = spec.decimate {
         decimate(file, &key, factor.0, &mut source, &mut ignored)?;
     }
+    let span = [source.times[0], source.times[source.times.len() - 1]];
     let present: Vec<usize> = (0..source.values.len())
         .filter(|&r| !source.values[r].is_nan())
         .collect();
@@ -253,6 +258,8 @@ fn read_one(
     let loss = loss(file, &key, of_kind, weighting.as_ref())?;
     Ok(RawChannel {
         kind,
+        span,
+        decimated: spec.decimate.is_some_and(|factor| factor.0 > 1),
         median_spacing: median_spacing(&times),
         times,
         values,

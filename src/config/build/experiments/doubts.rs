@@ -4,8 +4,9 @@ use super::{Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::dynamics::ChannelKind;
+use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
+use crate::functions::Quantity;
 use crate::problem::Problem;
 use crate::signal::Spectrum;
 use std::f64::consts::TAU;
@@ -82,15 +83,47 @@ fn spread(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
+/// Refuses a force offset beside sensor offsets: a motion that is shifted by `d`, a sensor that reads `d`
+/// less and a force that is `k d` larger look the same.
+fn offsets(
+    file: &ModelFile,
+    problem: &Problem,
+    open: &dyn Fn(Option<usize>) -> bool,
+) -> Result<(), InputError> {
+    let mut functions = problem.functions.iter();
+    let sought = functions.any(|f| f.quantity == Quantity::Offset && f.parameters() > 0);
+    let shifted = |e: &crate::problem::Experiment| {
+        let sees = |c: &crate::objective::Channel| {
+            c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index())
+        };
+        open(e.sought[0]) && e.channels.iter().all(sees)
+    };
+    if !(sought && problem.experiments.iter().all(shifted)) {
+        return Ok(());
+    }
+    Err(file
+        .error_at(
+            "functions.offset",
+            "the offset of the force and those of the sensors cannot both be estimated: a shifted \
+             motion looks the same",
+        )
+        .found("no known offset, initial displacement or prior")
+        .expected("a number for one of them, or a `prior`"))
+}
+
 /// Refuses gains that stand for the same freedom as something else: in a linear device a free motion
 /// and its initial state, or a forced motion and the scale of mass, damping and stiffness, can be
 /// multiplied by what the gain is divided by.
 pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputError> {
+    let scalars = problem.functions.scalars();
+    let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
+    let shift_is_free = |t: &Term| t.is_linear() || *t == Term::Offset;
+    if problem.oscillator.terms.iter().all(shift_is_free) {
+        offsets(file, problem, &open)?;
+    }
     if !problem.oscillator.terms.iter().all(|term| term.is_linear()) {
         return Ok(());
     }
-    let scalars = problem.functions.scalars();
-    let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
     let gains_open = |e: &crate::problem::Experiment| {
         let gain = |c: &crate::objective::Channel| {
             // A base that is added to the motion is a scale of its own.

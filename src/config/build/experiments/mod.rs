@@ -31,15 +31,15 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// First time of its readings, s.
+    /// First time of its rows, s: also of those without a reading.
     pub fn start(&self) -> f64 {
-        let first = self.channels.iter().map(|c| c.times[0]);
+        let first = self.channels.iter().map(|c| c.span[0]);
         first.fold(f64::INFINITY, f64::min)
     }
 
-    /// Last time of its readings, s.
+    /// Last time of its rows, s.
     pub fn end(&self) -> f64 {
-        let last = self.channels.iter().filter_map(|c| c.times.last().copied());
+        let last = self.channels.iter().map(|c| c.span[1]);
         last.fold(f64::NEG_INFINITY, f64::max)
     }
 
@@ -313,6 +313,7 @@ fn reading_per_node(raw: &mut RawChannel, grid: &Grid) {
         raw.values = resample(&raw.values, grid.nodes());
         raw.times = grid.times();
         raw.spacing = Some(grid.step());
+        raw.decimated = false;
         raw.weighting = None;
     }
 }
