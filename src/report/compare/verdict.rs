@@ -7,6 +7,9 @@ use super::{CLOSE, MATCHED, RECOVERED};
 use crate::report::cost::CostKind;
 use crate::report::document::ResultDocument;
 
+/// Fit in per cent from which a motion whose noise was estimated counts as matched.
+const FITTED: f64 = 90.0;
+
 /// The line: whether the motion is matched, and whether the device is the true one.
 pub(super) fn verdict(run: &ComparedRun, errors: Option<&Errors>) -> String {
     let (matched, how) = matching(run);
@@ -42,6 +45,17 @@ pub(super) fn verdict(run: &ComparedRun, errors: Option<&Errors>) -> String {
 fn matching(run: &ComparedRun) -> (bool, String) {
     let document = &run.finished.document;
     let ratio = document.cost.ratio;
+    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    if channels().any(|c| c.sigma_estimated) {
+        // Chi-square is then what it is by construction.
+        let least = channels().map(|c| c.fit_percent).fold(100.0, f64::min);
+        let verb = match least >= FITTED {
+            true => "matches",
+            false => "does not match",
+        };
+        let how = format!("{verb} the motion (fit {least:.1} %; its noise was estimated from it)");
+        return (least >= FITTED, how);
+    }
     if is_chi_square(document) {
         let n = document
             .experiments
