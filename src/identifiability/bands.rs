@@ -228,7 +228,7 @@ impl Bands {
         let unseen = loose.unseen.ncols();
         if unseen > 0 {
             notes.push(format!(
-                "{unseen} directions are seen by nothing: the bands of what they change are infinite"
+                "directions seen by nothing: {unseen}; the bands of what they change are infinite"
             ));
         }
         Self {

@@ -9,7 +9,6 @@ use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step, equation_error};
 use crate::dynamics::{Breakdown, Cause};
-use crate::functions::Functions;
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
@@ -179,14 +178,20 @@ impl Run<'_> {
     }
 
     /// The outcome of a search that is over before its first iteration.
-    fn nothing_to_do(&self, functions: Option<&Functions>) -> Option<Outcome> {
+    fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
         let cost = self.progress.as_ref().ok()?.point.evaluation.cost;
         let converged = |reason: &str| Some(Outcome::new(Status::Converged, reason));
-        if functions.is_some_and(|f| f.parameters() == 0) {
+        if problem.is_some_and(|p| p.parameters() == 0) {
             return converged("there is nothing to fit: every function is fixed");
         }
         if cost == 0.0 {
-            return converged("the start fits exactly");
+            // Squares of readings below 1e-154 are zero.
+            return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {
+                true => converged(
+                    "there is nothing to explain: the readings, or their squares, are zero",
+                ),
+                false => converged("the start fits exactly"),
+            };
         }
         self.settings.stopping.out_of_iterations(0)
     }
@@ -245,7 +250,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         let parameters = state.take_param().unwrap_or_default();
         let mut work = Work::new(problem, self.settings);
         self.progress = self.start(&mut work, parameters);
-        self.outcome = self.nothing_to_do(problem.problem.as_ref().map(|p| &p.functions));
+        self.outcome = self.nothing_to_do(problem.problem);
         Ok((self.view(state), None))
     }
 

@@ -2,6 +2,7 @@
 
 use crate::dynamics::Place;
 use crate::dynamics::quadrature::trapezoid_weights;
+use crate::functions::Basis;
 use crate::problem::Problem;
 
 /// `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, a function's value or its mean.
@@ -68,7 +69,11 @@ impl Linear {
         let grid = &problem.oscillator.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let shares = weights.into_iter().map(|w| w / grid.duration());
-        let name = format!("mean of {}", problem.functions.get(function).name());
+        let of = problem.functions.get(function);
+        let name = match of.basis {
+            Some(Basis::Constant) => of.name(),
+            _ => format!("mean of {}", of.name()),
+        };
         Self::combine(problem, function, name, shares.enumerate())
     }
 
