@@ -35,7 +35,7 @@ enum Entry {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let (folder, comparison, interrupted) = side_by_side(&arguments.runs, &arguments.out)?;
+    let (folder, comparison, interrupted) = side_by_side(&arguments.runs, &arguments.out, false)?;
     comparison
         .write(&folder)
         .map_err(|error| unwritable(folder.path(), &error))?;
@@ -56,10 +56,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Fits models and reads finished runs; the folder of all, the comparison, and whether it was
-/// interrupted.
+/// interrupted. With `go_on` the fits that were finished in the folder before are read, not made again.
 pub(super) fn side_by_side(
     runs: &[PathBuf],
     out: &Path,
+    go_on: bool,
 ) -> Result<(OutputFolder, Comparison, bool), Failure> {
     // Whatever is wrong with the input is said before anything is run or made.
     let names = names(runs, out);
@@ -78,7 +79,10 @@ pub(super) fn side_by_side(
     }
     for ((entry, name), folder) in entries.into_iter().zip(&names).zip(&folders) {
         match (entry, folder) {
-            (Entry::Model(model), Some(folder)) => compared.fit(name, *model, folder, &flag)?,
+            (Entry::Model(model), Some(folder)) => match finished(name, folder, go_on) {
+                Some(run) => compared.runs.push(run),
+                None => compared.fit(name, *model, folder, &flag)?,
+            },
             (Entry::Run(run), _) => compared.runs.push(*run),
             (Entry::Model(_), None) => {}
         }
@@ -86,6 +90,15 @@ pub(super) fn side_by_side(
     let interrupted = compared.interrupted;
     let comparison = Comparison::new(compared.runs, compared.left_out);
     Ok((folder, comparison, interrupted))
+}
+
+/// What a fit left in its folder before, if it came to its end.
+fn finished(name: &str, folder: &OutputFolder, go_on: bool) -> Option<ComparedRun> {
+    let run = ComparedRun::read(name, folder.path())
+        .ok()
+        .filter(|_| go_on)?;
+    let status = &run.finished.document.outcome.status;
+    (status != Status::Interrupted.name()).then_some(run)
 }
 
 /// The runs so far.

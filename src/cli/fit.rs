@@ -5,7 +5,7 @@ use super::{Failure, exit_code, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
-use crate::report::{OutputFolder, Run, json, predict, summary};
+use crate::report::{Known, OutputFolder, Run, json, predict, summary};
 use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit_with_noise, without_motion};
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,9 @@ pub(super) fn fit_into(
     };
     let model = weighted.as_ref().unwrap_or(model);
     let predictions = predictions(model, &found);
+    let known = Known::of(model, &found);
     let run = Run {
+        known: &known,
         model,
         fit: &found,
         predictions: &predictions,

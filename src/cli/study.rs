@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return study(&model, &out, arguments.json, threads, false);
     }
     match Story::read(&arguments.model)? {
-        Some(story) => tell(&story, &out, arguments.json),
+        Some(story) => tell(&arguments.model, &story, &out, arguments.json, false),
         None => {
             let threads = threads(arguments.threads);
             study(&arguments.model, &out, arguments.json, threads, false)
@@ -79,6 +79,15 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 
 pub fn resume(arguments: &ResumeArguments) -> Result<u8, Failure> {
     let heading = Journal::heading(&arguments.study)?;
+    if let Some(story) = Story::read(&heading.model)? {
+        return tell(
+            &heading.model,
+            &story,
+            &arguments.study,
+            arguments.json,
+            true,
+        );
+    }
     let threads = threads(arguments.threads);
     study(
         &heading.model,
@@ -95,8 +104,24 @@ fn threads(asked: Option<usize>) -> usize {
 }
 
 /// Runs the models of a story and tells them on one page.
-fn tell(story: &Story, out: &Path, as_json: bool) -> Result<u8, Failure> {
-    let (folder, comparison, interrupted) = side_by_side(&story.models, out)?;
+fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> Result<u8, Failure> {
+    let mut text = String::new();
+    for model in &story.models {
+        // Whatever is wrong with a model is said before anything is made.
+        let file = ModelFile::read(model)?;
+        build(&file, Purpose::Fit)?;
+        text += &file.text;
+    }
+    let heading = Heading::new(path, &text, 0.0);
+    if go_on {
+        // Refused where a model is another one by now.
+        Journal::go_on(out, &heading)?;
+    } else {
+        let folder = OutputFolder::prepare(out)?;
+        Journal::begin(folder.path(), &heading)
+            .map_err(|error| unwritable(folder.path(), &error))?;
+    }
+    let (folder, comparison, interrupted) = side_by_side(&story.models, out, go_on)?;
     let comparison = match interrupted {
         true => comparison,
         false => comparison.told_as(&story.title),

@@ -2,14 +2,24 @@
 
 use nalgebra::DMatrix;
 
+/// Whether all entries are finite: an iteration for singular values of others would not end.
+fn is_finite(matrix: &DMatrix<f64>) -> bool {
+    matrix.iter().all(|x| x.is_finite())
+}
+
 /// Singular values, decreasing, and the right singular vectors that belong to them as columns.
 ///
 /// A tall matrix is first reduced to its triangular factor, a wide one to that of its transpose, so
-/// that the decomposition is of a square of the smaller dimension.
+/// that the decomposition is of a square of the smaller dimension. Of a matrix with entries that are
+/// not finite nothing is known: all values are zero.
 pub(super) fn right_svd(matrix: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let (rows, columns) = matrix.shape();
     if rows == 0 || columns == 0 {
         return (Vec::new(), DMatrix::zeros(columns, 0));
+    }
+    if !is_finite(matrix) {
+        let count = rows.min(columns);
+        return (vec![0.0; count], DMatrix::identity(columns, count));
     }
     if rows < columns {
         let qr = matrix.transpose().qr();
@@ -32,7 +42,7 @@ pub(super) fn right_svd(matrix: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
 /// length, as columns.
 pub(super) fn null_space(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     let (rows, columns) = matrix.shape();
-    if rows == 0 {
+    if rows == 0 || !is_finite(matrix) {
         return DMatrix::identity(columns, columns);
     }
     // Rows of zeros make it square, so that the decomposition names every right vector.

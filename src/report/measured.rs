@@ -10,6 +10,7 @@ use crate::functions::CoefficientFunction;
 use crate::objective::{Channel, Evaluation, Refined, Weighting};
 use crate::problem::Problem;
 use crate::solvers::{Fit, predict_held_out};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// One channel of an experiment at the best point, in its own unit.
@@ -215,12 +216,12 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> StatisticsSumma
     summary
 }
 
-/// The scalars of a problem at a point.
-pub fn scalars(problem: &Problem, evaluation: &Evaluation) -> Vec<ScalarSummary> {
-    if problem.functions.scalars().is_empty() {
-        return Vec::new();
-    }
-    let covariance = problem.covariance(evaluation);
+/// The scalars of a problem at a point, whose parameters have this covariance where it is known.
+pub fn scalars(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    covariance: Option<&DMatrix<f64>>,
+) -> Vec<ScalarSummary> {
     let range = problem.functions.scalar_range();
     let list = problem.functions.scalars().iter().zip(range);
     list.zip(&evaluation.scalars)
@@ -228,7 +229,7 @@ pub fn scalars(problem: &Problem, evaluation: &Evaluation) -> Vec<ScalarSummary>
             name: scalar.name.clone(),
             unit: scalar.unit.clone(),
             value: *value,
-            standard_error: covariance.as_ref().map(|c| c[(index, index)].sqrt()),
+            standard_error: covariance.map(|c| c[(index, index)].sqrt()),
         })
         .collect()
 }
@@ -286,7 +287,11 @@ pub fn held_out(model: &Model, fit: &Fit) -> Vec<HoldOutSummary> {
                     channels: channels
                         .map(|(i, (c, predicted))| channel(c, out.notes.get(i), predicted))
                         .collect(),
-                    scalars: scalars(&problem, &evaluation),
+                    scalars: scalars(
+                        &problem,
+                        &evaluation,
+                        problem.covariance(&evaluation).as_ref(),
+                    ),
                     failure: None,
                 }
             }
@@ -305,7 +310,7 @@ pub fn held_out(model: &Model, fit: &Fit) -> Vec<HoldOutSummary> {
 pub fn standard_error(
     function: &CoefficientFunction,
     index: usize,
-    covariance: Option<&nalgebra::DMatrix<f64>>,
+    covariance: Option<&DMatrix<f64>>,
 ) -> Option<f64> {
     let constant = matches!(function.basis, Some(crate::functions::Basis::Constant));
     let covariance = covariance.filter(|_| constant)?;

@@ -51,6 +51,6 @@ pub use finished::FinishedRun;
 pub use journal::{Heading, JOURNAL, Journal};
 pub use mark::{Colour, Dash, Mark, Style};
 pub use predict::{PredictedMotion, predict};
-pub use run::{Run, json};
+pub use run::{Known, Run, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};

@@ -24,6 +24,7 @@ use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
     active_constraints,
 };
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io;
 
@@ -41,6 +42,41 @@ pub struct Run<'a> {
     pub predictions: &'a [Prediction],
     /// The path on which the weight of the smoothness was chosen, if by a rule.
     pub weights: Option<&'a WeightPath>,
+    /// How well the readings determine what was found.
+    pub known: &'a Known,
+}
+
+/// How well the readings determine what was found, for models of few free values: computed once, told in
+/// several places.
+#[derive(Debug, Clone, Default)]
+pub struct Known {
+    covariance: Option<DMatrix<f64>>,
+    bands: Option<Bands>,
+}
+
+impl Known {
+    /// For a simulated motion and up to [`FEW_PARAMETERS`] free values; nothing for others.
+    pub fn of(model: &Model, fit: &Fit) -> Self {
+        let (problem, best) = (&model.problem, &fit.best);
+        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+        let is_simulated = model.settings.solver != Solver::EquationError;
+        if !(few && is_simulated && problem.reading_count() > problem.parameters()) {
+            return Self::default();
+        }
+        let settings = BandSettings {
+            draws: 0,
+            ..BandSettings::default()
+        };
+        Self {
+            covariance: problem.covariance(&best.evaluation),
+            bands: Some(Bands::at(
+                problem,
+                &best.parameters,
+                &best.evaluation,
+                &settings,
+            )),
+        }
+    }
 }
 
 impl Run<'_> {
@@ -111,7 +147,10 @@ impl Run<'_> {
             experiments: self.experiment_summaries(),
             held_out: measured::held_out(model, fit),
             scalars: match self.is_simulated() {
-                true => measured::scalars(&model.problem, &fit.best.evaluation),
+                true => {
+                    let covariance = self.known.covariance.as_ref();
+                    measured::scalars(&model.problem, &fit.best.evaluation, covariance)
+                }
                 false => Vec::new(),
             },
             statistics: match self.is_simulated() {
@@ -150,24 +189,11 @@ impl Run<'_> {
             of: count.of,
             verdicts: count.sentences,
             knowledge,
-            functions: self.bands().map_or(Vec::new(), |bands| {
-                let judged = verdicts(problem, &self.fit.best.evaluation, &bands);
+            functions: self.known.bands.as_ref().map_or(Vec::new(), |bands| {
+                let judged = verdicts(problem, &self.fit.best.evaluation, bands);
                 judged.into_iter().map(|j| j.sentence).collect()
             }),
         }
-    }
-
-    /// The bands of functions and ratios, for a simulated motion and few free values.
-    fn bands(&self) -> Option<Bands> {
-        let problem = &self.model.problem;
-        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let settings = BandSettings {
-            draws: 0,
-            ..BandSettings::default()
-        };
-        let best = &self.fit.best;
-        (few && self.is_simulated() && problem.reading_count() > problem.parameters())
-            .then(|| Bands::at(problem, &best.parameters, &best.evaluation, &settings))
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -266,16 +292,16 @@ impl Run<'_> {
 
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let problem = &self.model.problem;
-        let covariance = match self.is_simulated() {
-            true => problem.covariance(&self.fit.best.evaluation),
-            false => None,
-        };
         let list = self.named_functions().into_iter().enumerate();
         list.map(|(i, (function, values))| {
             let index = problem.functions.ranges()[i].start;
             let summary = FunctionSummary {
                 powers: self.powers(i),
-                standard_error: measured::standard_error(function, index, covariance.as_ref()),
+                standard_error: measured::standard_error(
+                    function,
+                    index,
+                    self.known.covariance.as_ref(),
+                ),
                 ..summarise(&values, self.true_function(i))
             };
             (function.name(), summary)
@@ -364,7 +390,7 @@ impl Run<'_> {
             .column("c_over_m_per_s", ratios.c_over_m)
             .column("natural_frequency_Hz", ratios.frequency)
             .column("damping_ratio", ratios.damping_ratio);
-        if let Some(bands) = self.bands() {
+        if let Some(bands) = &self.known.bands {
             for band in bands.functions.iter().chain(&bands.ratios) {
                 let name = band.name.replace([' ', '/', ','], "_");
                 let ends = |side: usize| -> Vec<f64> {

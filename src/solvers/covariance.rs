@@ -26,13 +26,15 @@ impl Problem {
         let (mut jacobian, residuals) = weighted_jacobian(self, evaluation);
         // Parameters have units: only a Jacobian with columns of one size has singular values.
         let sizes: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
-        if sizes.iter().any(|s| s.is_nan() || *s <= 0.0) {
+        // A decomposition of numbers that are not finite would not end.
+        if sizes.iter().any(|s| !s.is_finite() || *s <= 0.0) {
             return None;
         }
         for (mut column, size) in jacobian.column_iter_mut().zip(&sizes) {
             column /= *size;
         }
-        let svd = jacobian.svd(false, true);
+        // The triangular factor has the same singular values and right vectors, and n rows.
+        let svd = jacobian.qr().r().svd(false, true);
         let largest = svd.singular_values.max();
         let v = svd.v_t?.transpose();
         if svd.singular_values.min() <= UNSEEN * largest {

@@ -187,6 +187,39 @@ fn a_story() {
             .read("runs/short-study/compare.html")
             .contains("What it comes to")
     );
+    // Gone on with after the second fit was lost: the first is kept as it is, and all ends alike.
+    let first = bench.read("runs/short-study/paper-positive/result.json");
+    let table = bench.read("runs/short-study/compare.csv");
+    std::fs::remove_file(bench.path("runs/short-study/linear-mass/result.json")).expect("removed");
+    let again = bench.run_to(0, &["resume", "runs/short-study"]);
+    assert_eq!(again, stdout);
+    assert!(first == bench.read("runs/short-study/paper-positive/result.json"));
+    let without_time = |table: &str| -> Vec<String> {
+        let header: Vec<&str> = table.lines().next().expect("a header").split(',').collect();
+        let time = header
+            .iter()
+            .position(|h| h.contains("time"))
+            .expect("a time");
+        let rows = table.lines().map(|row| {
+            let fields = row.split(',').enumerate().filter(|(i, _)| *i != time);
+            fields.map(|(_, f)| f).collect::<Vec<&str>>().join(",")
+        });
+        rows.collect()
+    };
+    let after = bench.read("runs/short-study/compare.csv");
+    assert_eq!(without_time(&table), without_time(&after));
+    bench.write(
+        "models/short.yaml",
+        "format: 1\nstory: [linear-mass.yaml, nowhere.yaml]\n",
+    );
+    let missing = refused(
+        &bench,
+        &["study", "models/short.yaml", "--out", "runs/other"],
+    );
+    assert!(
+        missing.contains("nowhere.yaml: there is no such file"),
+        "{missing}"
+    );
     bench.write("models/short.yaml", "format: 1\nstory: []\n");
     let before = refused(&bench, &["study", "models/short.yaml"]);
     assert!(before.contains("the story has no model"), "{before}");
