@@ -7,6 +7,7 @@ mod autocorrelation;
 mod information;
 #[cfg(test)]
 mod noise;
+mod quantiles;
 mod record;
 mod residuals;
 mod whiteness;
@@ -14,6 +15,7 @@ mod words;
 
 pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
 pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, reduced_chi_square, rms};
 pub use whiteness::{FEWEST_READINGS, Reason, SIGNIFICANCE, Verdict, Whiteness, whiteness};

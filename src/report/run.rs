@@ -55,7 +55,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// For a simulated motion and up to [`FEW_PARAMETERS`] free values; nothing for others.
+    /// For a simulated motion and up to 64 free values; nothing for others.
     pub fn of(model: &Model, fit: &Fit) -> Self {
         let (problem, best) = (&model.problem, &fit.best);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());

@@ -2,6 +2,7 @@
 
 use super::pieces::*;
 use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
+use crate::diagnostics::{chi_square_one, normal_half_width};
 use crate::dynamics::{Device, Grid, State};
 use crate::functions::{Functions, Quantity, Ratios};
 use crate::identifiability::{
@@ -19,7 +20,6 @@ use crate::study::profile::{ProfileSettings, Verdict as ProfileVerdict};
 use crate::study::pull_apart::{Ended, Extreme, Level, ratios_at, tube, values_at};
 use crate::study::variation::{Asking, variation};
 use crate::study::{Linear, prediction};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 /// Directions that are drawn of each end of the spectrum.
 const DIRECTIONS: usize = 3;
@@ -121,7 +121,7 @@ pub fn bands(
         seed: plan.seed,
     };
     let bands = Bands::at(problem, theta, evaluation, &settings);
-    let factor = standard_errors(plan.confidence);
+    let factor = normal_half_width(plan.confidence);
     let judged = verdicts(problem, evaluation, &bands);
     let ratios = truth.map(Ratios::of);
     let list = bands.functions.iter().chain(&bands.ratios);
@@ -183,16 +183,6 @@ pub fn bands(
     }
 }
 
-/// Half-width of a two-sided interval of this confidence, in standard errors.
-fn standard_errors(confidence: f64) -> f64 {
-    Normal::standard().inverse_cdf(0.5 + 0.5 * confidence)
-}
-
-/// The rise of a chi-square of one degree of freedom at this confidence.
-fn rise(confidence: f64) -> f64 {
-    ChiSquared::new(1.0).map_or(f64::NAN, |chi| chi.inverse_cdf(confidence))
-}
-
 /// The number that a target asks about.
 pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
     match target {
@@ -213,7 +203,7 @@ pub fn profile_of(
     plan: &StudyPlan,
 ) -> Result<ProfilePiece, String> {
     let how = ProfileSettings {
-        quantile: rise(plan.confidence),
+        quantile: chi_square_one(plan.confidence),
         ..ProfileSettings::default()
     };
     let found = profile(problem, theta, of, &how).map_err(|breakdown| breakdown.to_string())?;
@@ -243,9 +233,9 @@ pub fn level(problem: &Problem, theta: &[f64], evaluation: &Evaluation, plan: &S
     let sigma = problem.channels().all(|c| c.weighting().is_sigma());
     let allowed = match (plan.level, sigma) {
         (Some(level), _) => level,
-        (None, true) => evaluation.misfit + rise(plan.confidence),
+        (None, true) => evaluation.misfit + chi_square_one(plan.confidence),
         // n ln J rises by the quantile.
-        (None, false) => evaluation.misfit * (rise(plan.confidence) / n).exp(),
+        (None, false) => evaluation.misfit * (chi_square_one(plan.confidence) / n).exp(),
     };
     let mut level = Level::of(allowed);
     // A budget of roughness, where the fit paid for it.
