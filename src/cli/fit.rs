@@ -5,9 +5,10 @@ use super::{Failure, exit_code, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
-use crate::report::{Known, OutputFolder, Run, json, predict, summary};
+use crate::report::{Known, OutputFolder, Run, TimingsSummary, json, predict, summary};
 use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit_with_noise, without_motion};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Fit the functions of a model to its data; write result, tables and figures.
 #[derive(Debug, clap::Args)]
@@ -23,6 +24,9 @@ pub struct Arguments {
     /// Write no figures.
     #[arg(long)]
     no_report: bool,
+    /// Print where the time went.
+    #[arg(long)]
+    timings: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
@@ -42,6 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         print(&json(&document));
     } else {
         print(&summary(&document));
+        if arguments.timings {
+            print(&format!("\n{}\n", document.timings.text()));
+        }
         print(&format!("results in {}\n", folder.path().display()));
     }
     Ok(exit_code(status))
@@ -54,6 +61,7 @@ pub(super) fn fit_into(
     progress: &Progress,
     with_figures: bool,
 ) -> Result<(ResultDocument, Status), Failure> {
+    let clock = Instant::now();
     // A folder holds a result only of the run that wrote the rest of it.
     folder
         .begin()
@@ -78,9 +86,18 @@ pub(super) fn fit_into(
         predictions: &predictions,
         weights: path.as_ref(),
     };
-    let document = run.document();
-    run.write(folder, &document, with_figures)
-        .map_err(|error| unwritable(folder.path(), &error))?;
+    let full = |error| unwritable(folder.path(), &error);
+    let mut document = run.document();
+    let writing = run.write(folder, with_figures).map_err(full)?;
+    let before = &model.preparation;
+    document.timings = TimingsSummary::new(
+        &found,
+        before.reading + writing,
+        before.total + clock.elapsed(),
+    );
+    folder
+        .write("result.json", &json(&document))
+        .map_err(full)?;
     Ok((document, found.outcome.status))
 }
 

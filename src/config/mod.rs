@@ -17,8 +17,8 @@ mod story;
 mod syntax;
 
 pub use build::{
-    Candidate, ChannelNote, Equivalent, HoldOut, Model, Purpose, StudyPlan, StudyTarget,
-    WeightSearch, build,
+    Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, Purpose, StudyPlan,
+    StudyTarget, WeightSearch, build,
 };
 pub use model_file::ModelFile;
 pub use scalar::{Number, NumberOrColumn, Text};

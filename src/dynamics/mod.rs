@@ -32,3 +32,8 @@ pub use step_jacobian::{StateChange, StepJacobian};
 pub use tableau::Method;
 pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
+
+/// What the steppers compute with on this machine.
+pub fn arithmetic() -> &'static str {
+    "scalar"
+}

@@ -4,6 +4,7 @@ use super::cost::CostKind;
 use super::measured::{
     ChannelSummary, HoldOutSummary, RefinedSummary, ScalarSummary, StatisticsSummary,
 };
+use super::timings::TimingsSummary;
 use crate::dynamics::Grid;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -36,8 +37,11 @@ pub struct ResultDocument {
     pub gradient: GradientSummary,
     /// Work done; one count is one pass over all experiments.
     pub counts: CountsSummary,
-    /// Wall-clock time, s: the only key that differs between two runs of one model.
+    /// Wall-clock time of the fit, s. Two runs of one model differ in this and in `timings` only.
     pub seconds: f64,
+    /// Where the time of the whole run went.
+    #[serde(default)]
+    pub timings: TimingsSummary,
     /// The functions found, by name.
     pub functions: BTreeMap<String, FunctionSummary>,
     /// The constraints at the best point.

@@ -41,6 +41,7 @@ pub mod study;
 mod summary;
 pub mod svg;
 mod text;
+mod timings;
 
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
@@ -54,3 +55,4 @@ pub use predict::{PredictedMotion, predict};
 pub use run::{Known, Run, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};
+pub use timings::{PartSummary, TimingsSummary};

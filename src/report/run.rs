@@ -13,6 +13,7 @@ use super::files::OutputFolder;
 use super::knowledge::knowledge;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
 use super::render;
+use super::timings::TimingsSummary;
 use crate::config::{ChannelNote, Model};
 use crate::diagnostics::rms;
 use crate::dynamics::Term;
@@ -22,11 +23,12 @@ use crate::identifiability::{BandSettings, Bands, count, verdicts};
 use crate::objective::Channel;
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
-    active_constraints,
+    active_constraints, timed,
 };
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io;
+use std::time::Duration;
 
 /// Up to so many free values the bands are computed with every fit: some milliseconds.
 const FEW_PARAMETERS: usize = 64;
@@ -80,22 +82,19 @@ impl Known {
 }
 
 impl Run<'_> {
-    /// Writes tables and, if asked for, figures; the result `document` last, so that a folder with a
-    /// result is complete.
+    /// Writes tables and, if asked for, figures: all but the result document, which comes last, so that
+    /// a folder with a result is complete. Returns what the writing took.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn write(
-        &self,
-        folder: &OutputFolder,
-        document: &ResultDocument,
-        with_figures: bool,
-    ) -> io::Result<()> {
-        folder.write("history.csv", &self.history().to_csv())?;
-        folder.write("functions.csv", &self.functions_table().to_csv())?;
-        folder.write("trajectory.csv", &self.trajectories().to_csv())?;
+    pub fn write(&self, folder: &OutputFolder, with_figures: bool) -> io::Result<Duration> {
+        let mut writing = Duration::ZERO;
+        let mut write = |name: &str, text: &str| timed(&mut writing, || folder.write(name, text));
+        write("history.csv", &self.history().to_csv())?;
+        write("functions.csv", &self.functions_table().to_csv())?;
+        write("trajectory.csv", &self.trajectories().to_csv())?;
         for (name, table) in self.readings() {
-            folder.write(&name, &table.to_csv())?;
+            write(&name, &table.to_csv())?;
         }
         let figures = if with_figures {
             self.figures()
@@ -103,9 +102,9 @@ impl Run<'_> {
             Vec::new()
         };
         for figure in figures {
-            folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        folder.write("result.json", &json(document))
+        Ok(writing)
     }
 
     /// The result document.
@@ -139,6 +138,7 @@ impl Run<'_> {
                 qp: fit.counts.qp,
             },
             seconds: fit.elapsed.as_secs_f64(),
+            timings: TimingsSummary::new(fit, Duration::ZERO, fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),

@@ -7,7 +7,7 @@ use super::point::{Counts, Point, Work};
 use super::projected_gradient::ProjectedGradient;
 use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Rung, Solver, Step, equation_error};
+use super::{Descend, FitSettings, Rung, Solver, Step, Timings, equation_error};
 use crate::dynamics::{Breakdown, Cause};
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
@@ -33,6 +33,8 @@ pub struct Fit {
     pub outcome: Outcome,
     /// Work done.
     pub counts: Counts,
+    /// What that work took; the rest of `elapsed` is bookkeeping.
+    pub timings: Timings,
     /// Wall-clock time.
     pub elapsed: Duration,
     /// The starts that were tried, in order.
@@ -69,6 +71,7 @@ pub(super) fn search(
         settings,
         reference,
         clock: Instant::now(),
+        timings: Timings::default(),
         progress: Err(NOT_STARTED),
         outcome: None,
         observe,
@@ -112,6 +115,7 @@ struct Run<'a> {
     settings: &'a FitSettings,
     reference: Option<Reference>,
     clock: Instant,
+    timings: Timings,
     progress: Result<Progress, Breakdown>,
     outcome: Option<Outcome>,
     observe: &'a mut dyn FnMut(&Row),
@@ -222,6 +226,7 @@ impl Run<'_> {
                 .outcome
                 .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
             counts,
+            timings: self.timings,
             elapsed: self.clock.elapsed(),
             rungs: Vec::new(),
         })
@@ -250,6 +255,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         let parameters = state.take_param().unwrap_or_default();
         let mut work = Work::new(problem, self.settings);
         self.progress = self.start(&mut work, parameters);
+        self.timings += work.timings;
         self.outcome = self.nothing_to_do(problem.problem);
         Ok((self.view(state), None))
     }
@@ -259,7 +265,9 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        self.advance(&mut Work::new(problem, self.settings));
+        let mut work = Work::new(problem, self.settings);
+        self.advance(&mut work);
+        self.timings += work.timings;
         Ok((self.view(state), None))
     }
 

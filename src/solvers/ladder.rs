@@ -9,11 +9,12 @@
 use super::all_at_once::all_at_once;
 use super::executor::search;
 use super::recorder::Reference;
-use super::{Fit, FitSettings, Outcome, Row, Solver, Status, equation_error};
+use super::timings::timed;
+use super::{Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, equation_error};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A fit explains the readings of a channel if its misfit is below this share of that of no motion at
 /// all, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
@@ -21,9 +22,9 @@ use std::time::Instant;
 const EXPLAINED: f64 = 1e-3;
 /// Most iterations of a rung before the next is tried: Gauss-Newton from a good start takes some ten.
 const PROBING_ITERATIONS: u64 = 60;
-/// Parts of the record that the growing horizon fits in turn.
-const HORIZONS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
-/// Most iterations on each part but the last.
+/// Parts of the record that the growing horizon fits in turn, before all of it.
+const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
+/// Most iterations on each part.
 const HORIZON_ITERATIONS: u64 = 20;
 
 /// Where a fit starts.
@@ -102,7 +103,8 @@ pub fn fit(
     let attempts = first
         .into_iter()
         .chain([Attempt::GrowingHorizon, Attempt::AllAtOnce]);
-    let mut reference = reference(problem, start, settings);
+    let mut before = Before::default();
+    let mut reference = reference(problem, start, settings, &mut before);
     let climbs = settings.solver == Solver::GaussNewton;
     // A rung that gets stuck in a false valley creeps: the others are tried before it goes on.
     let mut probing = settings.clone();
@@ -115,7 +117,15 @@ pub fn fit(
     let mut trouble = None;
     for attempt in attempts {
         let clock = Instant::now();
-        let result = run(problem, start, &probing, attempt, reference, observe);
+        let result = run(
+            problem,
+            start,
+            &probing,
+            attempt,
+            reference,
+            &mut before,
+            observe,
+        );
         match result {
             Ok(mut fit) => {
                 // With the work that made the start.
@@ -162,7 +172,12 @@ pub fn fit(
                 }
                 _ => fit,
             };
-            Ok(Fit { rungs, ..fit })
+            Ok(Fit {
+                rungs,
+                counts: before.counts + fit.counts,
+                timings: before.timings + fit.timings,
+                ..fit
+            })
         }
         (None, Some(breakdown)) => Err(breakdown),
         (None, None) => {
@@ -171,14 +186,31 @@ pub fn fit(
     }
 }
 
+/// The work that was done before and between the searches.
+#[derive(Default)]
+struct Before {
+    counts: Counts,
+    timings: Timings,
+}
+
 /// Cost and gradient at the start values, to which all rungs are compared.
-fn reference(problem: &Problem, start: &[f64], settings: &FitSettings) -> Option<Reference> {
+fn reference(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    before: &mut Before,
+) -> Option<Reference> {
     if settings.initial == Initial::Functions {
         // The first rung begins there and finds out for itself.
         return None;
     }
-    let evaluation = problem.evaluate(start).ok()?;
-    let gradient = problem.gradient(start, &evaluation, settings.gradient);
+    let Before { counts, timings } = before;
+    counts.forward += 1;
+    let evaluation = timed(&mut timings.forward, || problem.evaluate(start)).ok()?;
+    counts.adjoint += 1;
+    let gradient = timed(&mut timings.adjoint, || {
+        problem.gradient(start, &evaluation, settings.gradient)
+    });
     Some(Reference {
         cost: evaluation.cost,
         norm_squared: gradient.norm_squared,
@@ -218,6 +250,7 @@ fn gone_on(
         history,
         snapshots: fit.snapshots,
         counts: fit.counts + more.counts,
+        timings: fit.timings + more.timings,
         elapsed: fit.elapsed + more.elapsed,
         ..more
     })
@@ -229,6 +262,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
         return fit;
     };
     let counts = best.counts + fit.counts;
+    let timings = best.timings + fit.timings;
     let elapsed = best.elapsed + fit.elapsed;
     let winner = if fit.best.evaluation.cost < best.best.evaluation.cost {
         fit
@@ -237,6 +271,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     };
     Fit {
         counts,
+        timings,
         elapsed,
         ..winner
     }
@@ -263,46 +298,50 @@ fn run(
     settings: &FitSettings,
     attempt: Attempt,
     reference: Option<Reference>,
+    before: &mut Before,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
-    match attempt {
-        Attempt::Functions => search(problem, start, settings, reference, observe),
-        Attempt::Data => search(
-            problem,
-            &from_data(problem, start),
-            settings,
-            reference,
-            observe,
-        ),
-        Attempt::GrowingHorizon => {
-            let mut parameters = from_data(problem, start);
-            for share in HORIZONS {
-                if share == 1.0 {
-                    return search(problem, &parameters, settings, reference, observe);
-                }
-                let part = problem.first_part(share);
-                let mut short = settings.clone();
-                short.stopping.iterations = HORIZON_ITERATIONS;
-                if let Ok(fit) = search(&part, &parameters, &short, None, observe) {
-                    parameters = fit.best.parameters;
-                }
-            }
-            search(problem, &parameters, settings, reference, observe)
-        }
+    let clock = &mut before.timings.start;
+    let parameters = match attempt {
+        Attempt::Functions => start.to_vec(),
+        Attempt::Data => from_data(problem, start, clock),
+        Attempt::GrowingHorizon => over_growing_parts(problem, start, settings, before),
         Attempt::AllAtOnce => {
             let flag = settings.interrupt.as_ref();
             let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
-            let parameters = all_at_once(problem, start, &interrupted)
-                .unwrap_or_else(|| from_data(problem, start));
-            search(problem, &parameters, settings, reference, observe)
+            timed(clock, || all_at_once(problem, start, &interrupted))
+                .unwrap_or_else(|| from_data(problem, start, clock))
+        }
+    };
+    search(problem, &parameters, settings, reference, observe)
+}
+
+/// The equation-error start, fitted to growing parts of the record.
+fn over_growing_parts(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    before: &mut Before,
+) -> Vec<f64> {
+    let mut parameters = from_data(problem, start, &mut before.timings.start);
+    let mut short = settings.clone();
+    short.stopping.iterations = HORIZON_ITERATIONS;
+    for share in HORIZONS {
+        let part = problem.first_part(share);
+        if let Ok(fit) = search(&part, &parameters, &short, None, &mut |_| {}) {
+            before.counts += fit.counts;
+            before.timings += fit.timings;
+            parameters = fit.best.parameters;
         }
     }
+    parameters
 }
 
 /// The equation-error start; where it has no motion, the start as given.
-fn from_data(problem: &Problem, start: &[f64]) -> Vec<f64> {
-    match equation_error(problem, start) {
-        Ok(theta) if problem.evaluate(&theta).is_ok() => theta,
-        _ => start.to_vec(),
-    }
+fn from_data(problem: &Problem, start: &[f64], clock: &mut Duration) -> Vec<f64> {
+    let found = timed(clock, || {
+        let theta = equation_error(problem, start).ok()?;
+        problem.evaluate(&theta).is_ok().then_some(theta)
+    });
+    found.unwrap_or_else(|| start.to_vec())
 }

@@ -45,7 +45,7 @@ impl Lbfgs {
 
     fn attempt(&mut self, work: &mut Work, at: &Coordinates, point: &Point) -> Option<Step> {
         let gradient = at.gradient(point);
-        let direction = self.direction(at, &gradient);
+        let direction = work.algebra(|| self.direction(at, &gradient));
         let slope = at.inner(&gradient, &direction);
         if slope.is_nan() || slope >= 0.0 {
             return None;
@@ -74,7 +74,7 @@ impl Lbfgs {
             first.min(longest),
         )?;
         let (length, next) = trials.accepted?;
-        self.remember(at, point, &next, &gradient);
+        work.algebra(|| self.remember(at, point, &next, &gradient));
         Some(Step::Moved {
             point: Box::new(next),
             length,

@@ -22,12 +22,13 @@ mod recorder;
 mod start;
 mod steepest_descent;
 mod stopping;
+mod timings;
 mod weight_path;
 
 pub use activity::{ActiveGroup, active_constraints};
 pub use equation_error::{Measurements, Unsuited, equation_error};
 pub use executor::{Fit, fit_from};
-pub(crate) use gauss_newton::{add_priors, linear_readings, weighted_jacobian};
+pub(crate) use gauss_newton::{FEW_PARAMETERS, add_priors, linear_readings, weighted_jacobian};
 pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
 pub use kinematics::states_from_readings;
@@ -38,6 +39,8 @@ pub use point::{Counts, Point};
 pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
 pub use start::Start;
 pub use stopping::Stopping;
+pub use timings::Timings;
+pub(crate) use timings::timed;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight};
 
 use crate::objective::GradientKind;

@@ -46,6 +46,7 @@ pub fn fit_with_noise(
         let next = search(&problem, &found.best.parameters, settings, None, observe)?;
         found = Fit {
             counts: found.counts + next.counts,
+            timings: found.timings + next.timings,
             elapsed: found.elapsed + next.elapsed,
             rungs: found.rungs,
             history: match next.history.is_empty() {

@@ -1,6 +1,7 @@
-//! A point of the search, and the counted work that makes one.
+//! A point of the search, and the counted and timed work that makes one.
 
 use super::FitSettings;
+use super::timings::{Timings, timed};
 use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
@@ -35,6 +36,8 @@ pub(crate) struct Work<'a, 'p> {
     kind: GradientKind,
     /// Most iterations of one quadratic program.
     pub program_iterations: u32,
+    /// What the work took.
+    pub timings: Timings,
 }
 
 const FORWARD: &str = "forward_count";
@@ -51,6 +54,7 @@ impl<'a, 'p> Work<'a, 'p> {
             problem,
             kind: settings.gradient,
             program_iterations: settings.stopping.program_iterations,
+            timings: Timings::default(),
         }
     }
 
@@ -68,13 +72,19 @@ impl<'a, 'p> Work<'a, 'p> {
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
         *self.problem.counts.entry(FORWARD).or_insert(0) += 1;
-        self.problem().evaluate_into(parameters, evaluation)
+        let problem = self.problem();
+        timed(&mut self.timings.forward, || {
+            problem.evaluate_into(parameters, evaluation)
+        })
     }
 
     /// One adjoint solve at an evaluated point.
     pub fn gradient(&mut self, parameters: &[f64], evaluation: &Evaluation) -> Gradient {
         *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
-        self.problem().gradient(parameters, evaluation, self.kind)
+        let (problem, kind) = (self.problem(), self.kind);
+        timed(&mut self.timings.adjoint, || {
+            problem.gradient(parameters, evaluation, kind)
+        })
     }
 
     /// Counts tangent solves.
@@ -82,9 +92,15 @@ impl<'a, 'p> Work<'a, 'p> {
         *self.problem.counts.entry(TANGENT).or_insert(0) += solves;
     }
 
-    /// Counts a quadratic program.
-    pub fn count_qp(&mut self) {
+    /// One quadratic program.
+    pub fn program<T>(&mut self, solve: impl FnOnce() -> T) -> T {
         *self.problem.counts.entry(QP).or_insert(0) += 1;
+        timed(&mut self.timings.qp, solve)
+    }
+
+    /// Linear algebra between the solves.
+    pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        timed(&mut self.timings.linear_algebra, work)
     }
 
     /// The point that an evaluation belongs to, completed by its gradient.
@@ -108,6 +124,12 @@ impl std::ops::Add for Counts {
             tangent: self.tangent + other.tangent,
             qp: self.qp + other.qp,
         }
+    }
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
     }
 }
 

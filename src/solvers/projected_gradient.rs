@@ -97,9 +97,9 @@ impl ProjectedGradient {
         if constraints.hold(&target, 0.0) {
             return Ok(target);
         }
-        work.count_qp();
+        let iterations = work.program_iterations;
         let projection =
-            project_within(work.program_iterations, constraints, &target, &self.metric);
+            work.program(|| project_within(iterations, constraints, &target, &self.metric));
         match projection.status {
             ConicStatus::Solved | ConicStatus::Almost
                 if constraints.hold(&projection.theta, TOLERANCE) =>

@@ -1,8 +1,9 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
 use super::executor::search;
-use super::gauss_newton::linearise_at;
-use super::{Counts, Fit, FitSettings, Row, Rung, Status, fit};
+use super::gauss_newton::{linearisation_tangents, linearise_at};
+use super::timings::timed;
+use super::{Counts, Fit, FitSettings, Row, Rung, Status, Timings, fit};
 use crate::dynamics::Breakdown;
 use crate::objective::Channel;
 use crate::problem::Problem;
@@ -140,6 +141,7 @@ pub fn choose_weight(
         last: None,
         rungs: Vec::new(),
         counts: Counts::default(),
+        timings: Timings::default(),
         elapsed: Duration::ZERO,
     };
     let weights = weights(problem);
@@ -158,7 +160,8 @@ pub fn choose_weight(
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(which, points[chosen].weight);
     let mut found = walk.again(&weighted, &points[chosen].parameters)?;
-    found.counts = walk.counts + found.counts;
+    found.counts += walk.counts;
+    found.timings += walk.timings;
     found.elapsed += walk.elapsed;
     if let Ok(evaluation) = weighted.evaluate(start) {
         found.initial_cost = evaluation.cost;
@@ -185,6 +188,7 @@ struct Walk<'a> {
     last: Option<Status>,
     rungs: Vec<Rung>,
     counts: Counts,
+    timings: Timings,
     elapsed: Duration,
 }
 
@@ -222,12 +226,14 @@ impl Walk<'_> {
             self.rungs.clone_from(&found.rungs);
         }
         self.last = Some(found.outcome.status);
-        self.counts = self.counts + found.counts;
+        self.counts += found.counts;
+        self.timings += found.timings;
         self.elapsed += found.elapsed;
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
         let n = problem.reading_count() as f64;
-        let degrees_of_freedom = degrees_of_freedom(&problem, &found);
+        self.counts.tangent += linearisation_tangents(&problem);
+        let degrees_of_freedom = degrees_of_freedom(&problem, &found, &mut self.timings);
         Ok(PathPoint {
             weight,
             iterations: iterations(&found),
@@ -277,8 +283,8 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
 }
 
 /// Trace of the matrix that takes the readings to their fitted values, by random signs.
-fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
-    let (mut sub, readings) = linearise_at(problem, &found.best);
+fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
+    let (mut sub, readings) = linearise_at(problem, &found.best, timings);
     // The proximal term of a fit that has ended is gone.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();
@@ -292,7 +298,8 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit) -> f64 {
         })
         .collect();
     sub.homogeneous();
-    let Some(solutions) = sub.solve_plain_for(&probes) else {
+    let solutions = timed(&mut timings.linear_algebra, || sub.solve_plain_for(&probes));
+    let Some(solutions) = solutions else {
         return f64::NAN;
     };
     let traces = solutions.iter().zip(&probes).map(|(z, probe)| {

@@ -20,8 +20,9 @@ use crate::dynamics::{Device, Oscillator, State};
 use crate::error::{InputError, Place};
 use crate::functions::Functions;
 use crate::problem::Problem;
-use crate::solvers::{self, FitSettings};
+use crate::solvers::{self, FitSettings, timed};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 /// Everything that a model file means.
 #[derive(Debug, Clone)]
@@ -52,6 +53,17 @@ pub struct Model {
     pub warnings: Vec<String>,
     /// What was chosen for the user, and why.
     pub remarks: Vec<String>,
+    /// What it took to build it.
+    pub preparation: Preparation,
+}
+
+/// What it took to build a model, in wall-clock time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Preparation {
+    /// Reading its data.
+    pub reading: Duration,
+    /// All together.
+    pub total: Duration,
 }
 
 /// What a model is built for.
@@ -104,12 +116,16 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
 /// # Errors
 /// At the first thing that cannot be meant, with its line.
 pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
+    let clock = Instant::now();
+    let mut reading = Duration::ZERO;
     let spec = &file.spec;
     experiments::distinct_names(file)?;
     let mut warnings = Vec::new();
     let mut remarks = Vec::new();
     let assemblies = functions::assemblies(file)?;
-    let records = experiments::read(file, purpose, &mut warnings)?;
+    let records = timed(&mut reading, || {
+        experiments::read(file, purpose, &mut warnings)
+    })?;
     let grid = grid::build(file, purpose, &records, &mut remarks)?;
     let list = functions::build(file, &grid, &mut warnings)?;
     let functions =
@@ -141,7 +157,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     if !matches!(purpose, Purpose::Simulate { .. }) {
         constraints::move_start(file, &mut problem, &places, &mut warnings)?;
     }
-    let truth = functions::truth(file, &grid)?;
+    let truth = timed(&mut reading, || functions::truth(file, &grid))?;
     let state = |s: &super::spec::StateSpec| State {
         displacement: s.displacement.0,
         velocity: s.velocity.0,
@@ -161,6 +177,10 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         remarks,
+        preparation: Preparation {
+            reading,
+            total: clock.elapsed(),
+        },
     })
 }
 

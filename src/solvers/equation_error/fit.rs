@@ -1,19 +1,16 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
 use super::measured::{Measured, Measurements, Unsuited};
-use super::{Minimum, add_rows, device, minimise};
+use super::{Minimum, Purpose, add_rows, device, minimise};
 use crate::dynamics::Device;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::gauss_newton::{add_penalties, add_variations};
 use crate::solvers::recorder::ratio;
-use crate::solvers::{Counts, Fit, Outcome, Point, Row, Status};
+use crate::solvers::timings::timed;
+use crate::solvers::{Counts, Fit, Outcome, Point, Row, Status, Timings};
 use std::time::Instant;
-
-/// A minimum moved into the constraints may lose this share of the decrease: the accuracy to which
-/// the convex problem is solved.
-const KEPT: f64 = 1.0 - 1e-9;
 
 /// Minimises over the readings of all experiments
 ///
@@ -26,7 +23,11 @@ const KEPT: f64 = 1.0 - 1e-9;
 /// the equation of motion says of the readings there. Scalars keep their values at the start.
 pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> Fit {
     let clock = Instant::now();
-    let measurements = match Measurements::with_scalars(problem, problem.scalars(start)) {
+    let mut timings = Timings::default();
+    let measurements = timed(&mut timings.start, || {
+        Measurements::with_scalars(problem, problem.scalars(start))
+    });
+    let measurements = match measurements {
         Ok(measurements) => measurements,
         Err(reason) => return failed(problem, start, &reason),
     };
@@ -36,7 +37,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
     };
     let first = cost.point(start.to_vec());
     let mut counts = Counts::default();
-    let (outcome, found) = match cost.minimise(start) {
+    let (outcome, found) = match cost.minimise(start, &mut timings) {
         Ok(minimum) => {
             counts.qp = u64::from(minimum.program.is_some());
             let point = cost.point(minimum.parameters.clone());
@@ -70,6 +71,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
         snapshots: Vec::new(),
         outcome,
         counts,
+        timings,
         elapsed: clock.elapsed(),
         rungs: Vec::new(),
     }
@@ -136,6 +138,7 @@ fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
         snapshots: Vec::new(),
         outcome: Outcome::new(Status::Failed, reason.to_string()),
         counts: Counts::default(),
+        timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         rungs: Vec::new(),
     }
@@ -154,7 +157,17 @@ impl<'a> Cost<'a> {
         pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
     }
 
-    fn minimise(&self, start: &[f64]) -> Result<Minimum, ConicStatus> {
+    fn minimise(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+        let problem = self.problem;
+        let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
+        let sizes = self.measurements.sizes(problem, start);
+        let excess = |theta: &[f64]| self.excess(theta);
+        let optimum = Purpose::Optimum;
+        minimise(problem, sub, start, &sizes, optimum, &excess, timings)
+    }
+
+    /// The squares of J in steps from `start`, without the constraints.
+    fn assembled(&self, start: &[f64]) -> Subproblem {
         let problem = self.problem;
         let mut sub = Subproblem::new(problem.parameters());
         for (experiment, measured) in self.experiments() {
@@ -164,9 +177,7 @@ impl<'a> Cost<'a> {
         add_penalties(problem, start, &mut sub);
         add_variations(problem, start, &mut sub);
         self.add_soft(start, &mut sub);
-        let sizes = self.measurements.sizes(problem, start);
-        let excess = |theta: &[f64]| self.excess(theta);
-        minimise(problem, sub, start, &sizes, KEPT, true, &excess)
+        sub
     }
 
     /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`

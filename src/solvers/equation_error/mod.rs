@@ -14,6 +14,7 @@ pub use measured::{Measurements, Unsuited};
 
 use super::gauss_newton::{add_penalties, add_variations};
 use super::kinematics::Kinematics;
+use super::timings::{Timings, timed};
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::dynamics::{Device, Place, Term};
@@ -25,9 +26,25 @@ use measured::Measured;
 /// leaves open and nothing else.
 const PULL: f64 = 1e-9;
 
-/// A clipped solution is used as a start if it keeps this share of the plain one's decrease: the fit
-/// that follows needs a start, not an optimum.
-const KEPT: f64 = 0.999;
+/// What a minimum is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// To start a fit.
+    Start,
+    /// For its own sake.
+    Optimum,
+}
+
+impl Purpose {
+    /// A plain minimum moved into the constraints is used if it keeps this share of its decrease: a
+    /// fit that follows needs no optimum, and an optimum has the accuracy to which programs are solved.
+    fn kept(self) -> f64 {
+        match self {
+            Purpose::Start => 0.999,
+            Purpose::Optimum => 1.0 - 1e-9,
+        }
+    }
+}
 
 /// Parameters from the equation error, under the problem's penalties and constraints.
 ///
@@ -64,7 +81,15 @@ pub(super) fn from_motions(
     let natural = Measurements { experiments }.sizes(problem, start);
     let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
     let sizes: Vec<f64> = own.into_iter().zip(natural).map(either).collect();
-    let minimum = minimise(problem, sub, start, &sizes, KEPT, false, &|_| Vec::new())?;
+    let minimum = minimise(
+        problem,
+        sub,
+        start,
+        &sizes,
+        Purpose::Start,
+        &|_| Vec::new(),
+        &mut Timings::default(),
+    )?;
     Ok(minimum.parameters)
 }
 
@@ -76,9 +101,9 @@ struct Minimum {
 }
 
 /// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
-/// `sub` may have variables after the parameters: `rest` tells them for given parameters. `in_units`
-/// says whether a quadratic program is solved in units of the `sizes` of the functions, which it
-/// needs for an optimum where these differ by many orders.
+/// `sub` may have variables after the parameters: `rest` tells them for given parameters. For an
+/// optimum a quadratic program is solved in units of the `sizes` of the functions, which it needs where
+/// these differ by many orders. What was solved adds to `timings`.
 ///
 /// # Errors
 /// How the convex problem ended, if not with a solution.
@@ -87,9 +112,9 @@ fn minimise(
     mut sub: Subproblem,
     start: &[f64],
     sizes: &[f64],
-    kept: f64,
-    in_units: bool,
+    purpose: Purpose,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
+    timings: &mut Timings,
 ) -> Result<Minimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
     sub.constrain(&constraints, start);
@@ -104,14 +129,16 @@ fn minimise(
         problem.constraints.clip(&mut theta);
         theta
     };
-    if let Some(z) = sub.solve_plain() {
+    let plain = timed(&mut timings.linear_algebra, || sub.solve_plain());
+    if let Some(z) = plain {
         let parameters = moved(&z);
         let steps = parameters.iter().zip(start).map(|(t, s)| t - s);
         let step: Vec<f64> = steps.chain(rest(&parameters)).collect();
         let (at_start, least) = (sub.value(&vec![0.0; z.len()]), sub.value(&z));
         // Moved into the constraints it is used if they hold there and it is nearly as good as the
         // plain one, which no point in them can beat.
-        let enough = sub.value(&step) - least <= (1.0 - kept) * (at_start - least).max(0.0);
+        let enough =
+            sub.value(&step) - least <= (1.0 - purpose.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
             return Ok(Minimum {
                 parameters,
@@ -120,12 +147,12 @@ fn minimise(
         }
     }
     let mut units = vec![1.0; sub.variables];
-    if in_units {
+    if purpose == Purpose::Optimum {
         for (range, size) in problem.functions.ranges().iter().zip(sizes) {
             units[range.clone()].fill(if *size > 0.0 { *size } else { 1.0 });
         }
     }
-    let mut solution = sub.in_units(&units).solve();
+    let mut solution = timed(&mut timings.qp, || sub.in_units(&units).solve());
     let z = solution.z.iter_mut().zip(&units);
     z.for_each(|(z, unit)| *z *= unit);
     match solution.status {

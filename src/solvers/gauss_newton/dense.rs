@@ -6,10 +6,10 @@ use crate::qp::Subproblem;
 use nalgebra::{DMatrix, DVector};
 
 /// The subproblem in `delta theta`: `|R delta - b|^2` with the triangular factor `R` of the weighted
-/// Jacobian `sqrt(w) dz/dtheta`, and the rest of the residuals as a row of its own.
-pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    let n = problem.parameters();
-    let (jacobian, residuals) = weighted_jacobian(problem, evaluation);
+/// Jacobian `sqrt(w) dz/dtheta`, and the rest of the residuals as a row of its own. Both are those of
+/// [`weighted_jacobian`].
+pub fn subproblem(jacobian: DMatrix<f64>, residuals: DVector<f64>) -> Subproblem {
+    let n = jacobian.ncols();
     let mut sub = Subproblem::new(n);
     let rows = jacobian.nrows();
     let (r, b) = if rows > n {

@@ -13,14 +13,15 @@ pub(crate) use dense::weighted_jacobian;
 
 use super::infeasible::no_step;
 use super::point::Work;
-use super::{Descend, Point, Step};
+use super::timings::timed;
+use super::{Descend, Point, Step, Timings};
 use crate::constraints;
 use crate::objective::{Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 
 /// Up to so many parameters the Jacobian is formed by one tangent solve each.
-const FEW_PARAMETERS: usize = 64;
+pub(crate) const FEW_PARAMETERS: usize = 64;
 /// First weight of the proximal term, relative to J.
 const FIRST_DAMPING: f64 = 1e-2;
 /// Smallest weight: less is lost in the factorisation's own shift.
@@ -166,7 +167,7 @@ fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
 /// The best step that the subproblem offers in the constraint set.
 fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
     let constraints = &work.problem().constraints;
-    let plain = sub.solve_plain();
+    let plain = work.algebra(|| sub.solve_plain());
     let cost = point.evaluation.cost;
     let moved = |z: &[f64]| -> Vec<f64> {
         let mut moved: Vec<f64> = point.parameters.iter().zip(z).map(|(p, d)| p + d).collect();
@@ -192,8 +193,8 @@ fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
             }
         }
     }
-    work.count_qp();
-    let solution = sub.solve_within(work.program_iterations);
+    let iterations = work.program_iterations;
+    let solution = work.program(|| sub.solve_within(iterations));
     match solution.status {
         ConicStatus::Solved | ConicStatus::Almost => {
             let parameters = moved(&solution.z);
@@ -227,7 +228,10 @@ fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f6
         .zip(&delta)
         .map(|(d, z)| d * z * z)
         .sum();
-    near + problem.regularisation(parameters) + linear_misfit(problem, &point.evaluation, &delta)
+    let misfit = timed(&mut work.timings.tangent, || {
+        linear_misfit(problem, &point.evaluation, &delta)
+    });
+    near + problem.regularisation(parameters) + misfit
 }
 
 /// The cost of the readings with every prediction replaced by its linearisation, and every loss by
@@ -255,32 +259,52 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
 
 /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
-    let parameters = work.problem().parameters();
-    work.count_tangents(if parameters <= FEW_PARAMETERS {
-        parameters as u64
-    } else {
-        1
-    });
-    linearise_at(work.problem(), point).0
+    let problem = work.problem();
+    work.count_tangents(linearisation_tangents(problem));
+    linearise_at(problem, point, &mut work.timings).0
+}
+
+/// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
+pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
+    match problem.parameters() {
+        few @ ..=FEW_PARAMETERS => few as u64,
+        _ => 1,
+    }
 }
 
 /// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
 /// variables are the change of the parameters; with many of them the changes of the states follow,
 /// tied to them by equalities.
 pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    timed_readings(problem, evaluation, &mut Timings::default())
+}
+
+/// [`linear_readings`], and what its tangents and its linear algebra took.
+fn timed_readings(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Subproblem {
+    let (tangent, algebra) = (&mut timings.tangent, &mut timings.linear_algebra);
     if problem.parameters() <= FEW_PARAMETERS {
-        dense::subproblem(problem, evaluation)
+        let (jacobian, residuals) = timed(tangent, || weighted_jacobian(problem, evaluation));
+        timed(algebra, || dense::subproblem(jacobian, residuals))
     } else {
-        structured::subproblem(problem, evaluation)
+        let steps = timed(tangent, || structured::steps(problem, evaluation));
+        timed(algebra, || {
+            structured::subproblem(problem, evaluation, &steps)
+        })
     }
 }
 
 /// [`linearise`] without counting, and the number of residual rows that belong to the readings:
 /// they come first.
-pub(super) fn linearise_at(problem: &Problem, point: &Point) -> (Subproblem, usize) {
-    let mut sub = linear_readings(problem, &point.evaluation);
+pub(super) fn linearise_at(
+    problem: &Problem,
+    point: &Point,
+    timings: &mut Timings,
+) -> (Subproblem, usize) {
+    let mut sub = timed_readings(problem, &point.evaluation, timings);
     let readings = sub.residuals.len();
-    add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub);
+    timed(&mut timings.linear_algebra, || {
+        add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub);
+    });
     (sub, readings)
 }
 
@@ -290,7 +314,8 @@ pub(super) fn linearise_about(
     parameters: &[f64],
     evaluation: &Evaluation,
 ) -> Subproblem {
-    let mut sub = structured::subproblem(problem, evaluation);
+    let steps = structured::steps(problem, evaluation);
+    let mut sub = structured::subproblem(problem, evaluation, &steps);
     add_the_rest(problem, parameters, evaluation, &mut sub);
     sub
 }

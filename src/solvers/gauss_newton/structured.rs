@@ -8,29 +8,40 @@ use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
 use crate::signal::SecondOrder;
 
+/// Every step of every experiment, linearised.
+pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
+    let each = (0..problem.experiments.len()).map(|e| {
+        let view = problem.view(evaluation, e);
+        let oscillator = &problem.oscillator;
+        oscillator.step_jacobians(view.device, view.excitation, view.motion)
+    });
+    each.collect()
+}
+
 /// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
 /// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
 ///
 /// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
 /// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
-/// vanish where the states are a motion.
-pub fn subproblem(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+/// vanish where the states are a motion. `steps` are those of [`steps`].
+pub fn subproblem(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    steps: &[Vec<StepJacobian>],
+) -> Subproblem {
     let parameters = problem.parameters();
     let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
     let mut sub = Subproblem::new(parameters + states);
     let mut base = parameters;
-    for e in 0..problem.experiments.len() {
+    for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
         let view = problem.view(evaluation, e);
-        let steps = problem
-            .oscillator
-            .step_jacobians(view.device, view.excitation, view.motion);
         let columns = Columns {
             problem,
             experiment,
             base,
         };
-        columns.add_steps(&steps, view.motion, &mut sub.equalities);
+        columns.add_steps(steps, view.motion, &mut sub.equalities);
         for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
             columns.add_readings(channel, predicted, view, &mut sub);
         }

@@ -1,0 +1,137 @@
+//! Where the time of a run went.
+
+use crate::dynamics::arithmetic;
+use crate::solvers::Fit;
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+use std::time::Duration;
+
+/// Wall-clock time of a run by what it was spent on. No time is in two of the parts, and all of them
+/// together are the total.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TimingsSummary {
+    /// What the steppers compute with: `AVX-512`, `AVX2` or `scalar`.
+    pub arithmetic: String,
+    /// Forward solves of the fit: motions, predictions and costs.
+    pub forward: PartSummary,
+    /// Adjoint solves of the fit: gradients.
+    pub adjoint: PartSummary,
+    /// Tangent solves of the fit.
+    pub tangent: PartSummary,
+    /// Quadratic programs of the fit, by Clarabel.
+    pub qp: PartSummary,
+    /// The plain Gauss-Newton step, assembled, factored and solved; the recursion of L-BFGS; the
+    /// equation error without its programs.
+    pub linear_algebra: PartSummary,
+    /// Starts from the readings, with all that is solved for them.
+    pub start: PartSummary,
+    /// Reading data and writing results; `result.json` itself is written after the clock has stopped.
+    pub io: PartSummary,
+    /// The rest: building the model, bookkeeping, bands and statistics, predictions, figures.
+    pub other: PartSummary,
+    /// From the building of the model to the result.
+    pub total: PartSummary,
+}
+
+/// One part.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct PartSummary {
+    /// s.
+    pub seconds: f64,
+    /// How often it was done, where that is counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<u64>,
+}
+
+impl PartSummary {
+    fn new(time: Duration, count: Option<u64>) -> Self {
+        Self {
+            seconds: time.as_secs_f64(),
+            count,
+        }
+    }
+}
+
+impl TimingsSummary {
+    /// The time of a run that took `total`, `io` of it to read and write.
+    pub fn new(fit: &Fit, io: Duration, total: Duration) -> Self {
+        let (counts, times) = (&fit.counts, &fit.timings);
+        let counted = |time, count| PartSummary::new(time, Some(count));
+        let part = |time| PartSummary::new(time, None);
+        Self {
+            arithmetic: arithmetic().into(),
+            forward: counted(times.forward, counts.forward),
+            adjoint: counted(times.adjoint, counts.adjoint),
+            tangent: counted(times.tangent, counts.tangent),
+            qp: counted(times.qp, counts.qp),
+            linear_algebra: part(times.linear_algebra),
+            start: part(times.start),
+            io: part(io),
+            other: part(total.saturating_sub(times.sum() + io)),
+            total: part(total),
+        }
+    }
+
+    /// All parts with their names, in order, the total last.
+    pub fn parts(&self) -> [(&'static str, PartSummary); 9] {
+        [
+            ("forward", self.forward),
+            ("adjoint", self.adjoint),
+            ("tangent", self.tangent),
+            ("QP", self.qp),
+            ("linear algebra", self.linear_algebra),
+            ("start", self.start),
+            ("I/O", self.io),
+            ("other", self.other),
+            ("total", self.total),
+        ]
+    }
+
+    /// As a table.
+    pub fn text(&self) -> String {
+        let mut text = format!("{:<14} {:>10} {:>7} {:>9}\n", "time", "s", "%", "count");
+        for (name, part) in self.parts() {
+            let share = 100.0 * part.seconds / self.total.seconds.max(f64::MIN_POSITIVE);
+            let count = part.count.map_or(String::new(), |n| format!(" {n:>9}"));
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "{name:<14} {:>10.4} {share:>7.1}{count}",
+                part.seconds
+            );
+        }
+        let _ = writeln!(text, "arithmetic: {}", self.arithmetic);
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_stand_where_there_are_any() {
+        let part = |seconds, count| PartSummary { seconds, count };
+        let timings = TimingsSummary {
+            arithmetic: "scalar".into(),
+            forward: part(1.5, Some(50_001)),
+            adjoint: part(0.25, Some(1001)),
+            other: part(0.25, None),
+            total: part(2.0, None),
+            ..TimingsSummary::default()
+        };
+        insta::assert_snapshot!(timings.text(), @"
+        time                    s       %     count
+        forward            1.5000    75.0     50001
+        adjoint            0.2500    12.5      1001
+        tangent            0.0000     0.0
+        QP                 0.0000     0.0
+        linear algebra     0.0000     0.0
+        start              0.0000     0.0
+        I/O                0.0000     0.0
+        other              0.2500    12.5
+        total              2.0000   100.0
+        arithmetic: scalar
+        ");
+    }
+}
