@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
 /// 8 % fewer still.
-const DEFAULT_MEMORY: usize = 20;
+pub(super) const DEFAULT_MEMORY: usize = 20;
 
 pub(super) fn build(
     file: &ModelFile,

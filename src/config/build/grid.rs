@@ -1,6 +1,7 @@
 //! The time grid: from the model, or one node per reading.
 
 mod auto;
+mod memory;
 
 use super::Purpose;
 use super::experiments::{RawChannel, Record};
@@ -10,8 +11,8 @@ use crate::config::spec::StepMethod;
 use crate::dynamics::{Grid, Method};
 use crate::error::{InputError, Place};
 
-/// Most nodes: at about 400 bytes a node a run then takes 4 GB.
-const MOST_NODES: usize = 10_000_000;
+/// Most nodes that are chosen for the user: the same on every machine.
+const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,
@@ -33,27 +34,55 @@ pub(super) fn build(
                 .error_at("grid", "the number of nodes is missing")
                 .expected("`nodes`, since there are no readings to take it from"));
         }
-        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_NODES, remarks),
+        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
         None => match node_per_reading(records) {
             Some(nodes) => nodes,
-            None => auto::nodes(method(file), records, duration, MOST_NODES, remarks),
+            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
         },
     };
-    if !(Grid::FEWEST_NODES..=MOST_NODES).contains(&nodes) {
-        let problem = "this number of nodes cannot be used";
-        let error = match purpose.nodes() {
-            Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
-            None => file.error_at("grid.nodes", problem),
-        };
-        return Err(error
-            .found(nodes)
-            .expected(format!("{} to {MOST_NODES}", Grid::FEWEST_NODES)));
+    if nodes < Grid::FEWEST_NODES {
+        return Err(
+            about_nodes(file, purpose, "this number of nodes cannot be used")
+                .found(nodes)
+                .expected(format!("{} or more", Grid::FEWEST_NODES)),
+        );
     }
+    fits_into_memory(file, purpose, nodes)?;
     Grid::new(start, duration, nodes).ok_or_else(|| {
         file.error_at("grid", "the times make no grid")
             .found(format!("{nodes} nodes over {duration} s"))
             .expected("a positive duration whose steps are not zero")
     })
+}
+
+fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError {
+    match purpose.nodes() {
+        Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
+        None => file.error_at("grid.nodes", problem),
+    }
+}
+
+/// Refuses a grid that the machine has no memory for, before any is taken.
+fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<(), InputError> {
+    let (each, available) = (memory::per_node(file, purpose), memory::available());
+    let needed = nodes as f64 * each as f64;
+    if needed <= available as f64 {
+        return Ok(());
+    }
+    Err(about_nodes(
+        file,
+        purpose,
+        "a grid of so many nodes does not fit into memory",
+    )
+    .found(format!(
+        "{nodes} nodes, which may need {}: {each} bytes each",
+        memory::in_words(needed)
+    ))
+    .expected(format!(
+        "at most {} nodes: {} are available",
+        available / each as u64,
+        memory::in_words(available as f64)
+    )))
 }
 
 /// One node per reading, where all channels of all records have the same equally spaced times.

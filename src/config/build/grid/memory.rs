@@ -1,0 +1,223 @@
+//! Whether a grid fits into memory, before any of it is taken.
+//!
+//! The bytes per node were measured as the growth of a run's memory with the number of nodes, for
+//! every method, with one to three records and functions, and rounded up: most runs need half as much.
+
+use crate::config::ModelFile;
+use crate::config::build::Purpose;
+use crate::config::build::fit::DEFAULT_MEMORY;
+use crate::config::build::functions::{Slot, slots};
+use crate::config::scalar::Knots;
+use crate::config::spec::{Basis, FitMethod};
+use crate::solvers::FEW_PARAMETERS;
+
+/// Bytes per node of every run: times, tables and figures.
+const RUN: usize = 200;
+/// For each record: its motion, excitation and readings.
+const RECORD: usize = 400;
+/// For each function: its values, design and table.
+const FUNCTION: usize = 100;
+/// The same of a simulation, which keeps one motion and writes one table.
+const SIMULATION: usize = 100;
+/// For each pair that L-BFGS remembers and each function that is free at every node: two numbers.
+const PAIR: usize = 16;
+/// Gauss-Newton with few free values, and for each record: start from the readings, Jacobian.
+const FEW: usize = 1000;
+const FEW_RECORD: usize = 300;
+/// Gauss-Newton with many, for each record and each function that is free at every node: the states
+/// are unknowns, and the factors of their equations are sparse.
+const MANY_RECORD: usize = 3500;
+const MANY_FUNCTION: usize = 1500;
+/// So many times that where quadratic programs may be needed: an interior-point method keeps more.
+const PROGRAMS: usize = 2;
+
+/// What is assumed to be available where the system does not say, bytes.
+const ASSUMED: u64 = 4_000_000_000;
+
+/// Bytes per node that a run of the model may need.
+pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
+    let spec = &file.spec;
+    let (records, functions) = (spec.experiments.len(), slots(file));
+    if let Purpose::Simulate { .. } = purpose {
+        return SIMULATION * (1 + records + functions.len());
+    }
+    let common = RUN + RECORD * records + FUNCTION * functions.len();
+    let values: Vec<FreeValues> = functions.iter().map(free_values).collect();
+    let nodal = values.iter().filter(|v| **v == FreeValues::PerNode).count();
+    let few: usize = (values.iter())
+        .map(|v| match v {
+            FreeValues::Few(count) => *count,
+            FreeValues::PerNode => 0,
+        })
+        .sum();
+    let fit = spec.fit.as_ref();
+    let method = fit.and_then(|f| f.method);
+    let own = match method.unwrap_or(FitMethod::GaussNewton) {
+        FitMethod::SteepestDescent => 0,
+        FitMethod::Lbfgs => {
+            let memory = fit.and_then(|f| f.memory).map_or(DEFAULT_MEMORY, |m| m.0);
+            PAIR.saturating_mul(memory).saturating_mul(nodal)
+        }
+        FitMethod::ProjectedGradient if !has_programs(file, &functions) => 0,
+        FitMethod::ProjectedGradient => PROGRAMS * MANY_FUNCTION * nodal,
+        FitMethod::GaussNewton | FitMethod::EquationError => {
+            let steps = match nodal == 0 && few <= FEW_PARAMETERS {
+                true => FEW + FEW_RECORD * records,
+                false => MANY_RECORD * records + MANY_FUNCTION * nodal,
+            };
+            match has_programs(file, &functions) {
+                true => PROGRAMS * steps,
+                false => steps,
+            }
+        }
+    };
+    own.saturating_add(common)
+}
+
+/// How many values of a function are sought.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum FreeValues {
+    Few(usize),
+    /// One at every node, or so many that they are handled alike.
+    PerNode,
+}
+
+fn free_values(slot: &Slot) -> FreeValues {
+    let spec = slot.spec;
+    let knots = match &spec.knots {
+        Some(Knots::Count(count)) => count.0,
+        Some(Knots::Times(times)) => times.len(),
+        None => 0,
+    };
+    let count = match spec.basis {
+        None => 0,
+        Some(Basis::Nodal) => return FreeValues::PerNode,
+        Some(Basis::Constant) => 1,
+        Some(Basis::Polynomial) => spec.degree.map_or(1, |d| d.0.saturating_add(1)),
+        // A cubic spline has two more than it has knots.
+        Some(Basis::PiecewiseConstant | Basis::PiecewiseLinear | Basis::BSpline) => {
+            knots.saturating_add(2)
+        }
+    };
+    match count <= FEW_PARAMETERS {
+        true => FreeValues::Few(count),
+        false => FreeValues::PerNode,
+    }
+}
+
+/// Whether inequalities or total variation may take a quadratic program.
+fn has_programs(file: &ModelFile, functions: &[Slot]) -> bool {
+    let limited = |slot: &Slot| {
+        let spec = slot.spec;
+        spec.min.is_some() || spec.max.is_some() || spec.variation.is_some()
+    };
+    file.spec.constraints.is_some() || functions.iter().any(limited)
+}
+
+/// Bytes that a run may take: what the system says can be had without swapping.
+pub fn available() -> u64 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    kilobytes(&text).map_or(ASSUMED, |kilobytes| kilobytes.saturating_mul(1024))
+}
+
+/// `MemAvailable` of Linux's `/proc/meminfo`.
+fn kilobytes(text: &str) -> Option<u64> {
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse().ok()
+}
+
+/// Bytes for people: three digits and a unit.
+pub fn in_words(bytes: f64) -> String {
+    let units = ["bytes", "kB", "MB", "GB", "TB", "PB"];
+    let mut value = bytes;
+    let mut unit = 0;
+    while value >= 999.5 && unit + 1 < units.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    let decimals = match value {
+        small if unit > 0 && small < 9.995 => 2,
+        middle if unit > 0 && middle < 99.95 => 1,
+        _ => 0,
+    };
+    format!("{value:.decimals$} {}", units[unit])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_have_three_digits() {
+        let words = [
+            0.0, 999.0, 1000.0, 9994.0, 9996.0, 99_960.0, 123_456.0, 9e14, 9e20,
+        ]
+        .map(in_words);
+        let expected = [
+            "0 bytes",
+            "999 bytes",
+            "1.00 kB",
+            "9.99 kB",
+            "10.0 kB",
+            "100 kB",
+            "123 kB",
+            "900 TB",
+            "900000 PB",
+        ];
+        assert_eq!(words, expected);
+    }
+
+    #[test]
+    fn the_available_memory_is_found_in_its_line() {
+        let text = "MemTotal:       24596268 kB\nMemFree: 1 kB\nMemAvailable:   23456 kB\n";
+        assert_eq!(kilobytes(text), Some(23_456));
+        assert_eq!(kilobytes("MemTotal: 1 kB\n"), None);
+        assert_eq!(kilobytes("MemAvailable: much\n"), None);
+    }
+
+    fn model(functions: &str, fit: &str, more: &str) -> ModelFile {
+        let record = "{initial: {displacement: 1.0, velocity: 0.0}}";
+        let text = format!(
+            "format: 1\nexperiments:\n  - {record}\nfunctions:\n  mass: {{fixed: 1.0}}\n  \
+             damping: {{basis: constant, start: 1.0}}\n  stiffness: {functions}\n\
+             fit: {{method: {fit}}}\n{more}"
+        );
+        ModelFile::parse("m.yaml", text).expect("a model")
+    }
+
+    /// The growth that was measured, in bytes per node, is below what is asked for, and not far.
+    #[test]
+    fn the_estimate_is_above_what_was_measured() {
+        let nodal = "{basis: nodal, start: 1.0}";
+        let constant = "{basis: constant, start: 1.0}";
+        let variation = "{basis: nodal, start: 1.0, variation: {weight: 0.01}}";
+        let measured = [
+            (constant, "lbfgs", 439),
+            (nodal, "lbfgs", 700),
+            (constant, "gauss-newton", 1513),
+            (nodal, "gauss-newton", 3564),
+            (variation, "gauss-newton", 6485),
+        ];
+        for (function, method, bytes) in measured {
+            let file = model(function, method, "");
+            let asked = per_node(&file, Purpose::Fit);
+            assert!(
+                (bytes..=2 * bytes + 500).contains(&asked),
+                "{method}: {asked} {bytes}"
+            );
+        }
+        let simulation = Purpose::Simulate { nodes: None };
+        let asked = per_node(&model(nodal, "lbfgs", ""), simulation);
+        assert!((186..=500).contains(&asked), "{asked}");
+    }
+
+    #[test]
+    fn more_knots_than_a_dense_jacobian_takes_are_many() {
+        let splines = |knots: usize| {
+            let function = format!("{{basis: b-spline, knots: {knots}, start: 1.0}}");
+            per_node(&model(&function, "gauss-newton", ""), Purpose::Fit)
+        };
+        assert_eq!(splines(10), splines(60));
+        assert!(splines(100) > 2 * splines(60));
+    }
+}
