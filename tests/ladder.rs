@@ -74,4 +74,26 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     // Rounding of the motion, 2400 steps, over its sensitivity.
     let error = (found.best.parameters[0] / STIFFNESS - 1.0).abs();
     assert!(error < 1e-8, "{error}");
+    // Every search takes a gradient at its start and one after each iteration; those of the three parts
+    // of the record count as well as those of the three rungs.
+    let iterations: u64 = found.rungs.iter().map(|rung| rung.iterations).sum();
+    assert!(
+        found.counts.adjoint >= iterations + 3 + 3,
+        "{:?}",
+        found.counts
+    );
+    let timings = &found.timings;
+    for spent in [
+        timings.forward,
+        timings.adjoint,
+        timings.tangent,
+        timings.start,
+    ] {
+        assert!(!spent.is_zero(), "{timings:?}");
+    }
+    assert!(
+        timings.sum() <= found.elapsed,
+        "{timings:?} {:?}",
+        found.elapsed
+    );
 }

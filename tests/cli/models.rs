@@ -1,6 +1,7 @@
 //! Every shipped model, and what a run leaves behind.
 
 use crate::workbench::{MODEL, Workbench, column, paper_run, repository, table};
+use insta::assert_snapshot;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,12 +10,36 @@ fn result(bench: &Workbench, run: &str) -> Value {
     serde_json::from_str(&bench.read(&format!("{run}/result.json"))).expect("JSON")
 }
 
-/// Fits a shipped model: its folder and result.
+/// Fits a shipped model, with as much work as ever: its folder and result.
 fn fitted(name: &str, code: i32) -> (Workbench, Value) {
     let bench = Workbench::with_shipped_models();
     bench.run_to(code, &["fit", &format!("models/{name}.yaml")]);
     let result = result(&bench, &format!("runs/{name}"));
+    takes_as_much_work_as_ever(name, &result);
     (bench, result)
+}
+
+/// The work of a shipped model is pinned, so that lost efficiency is seen without a clock. More work
+/// is a loss, and less a gain to be taken in by `cargo insta test --review`.
+fn takes_as_much_work_as_ever(name: &str, result: &Value) {
+    let keys = ["iterations", "forward", "adjoint", "tangent", "qp"];
+    let counts = keys.map(|key| format!("{key}: {}", result["counts"][key]));
+    assert_snapshot!(work_of(name), counts.join("\n"));
+    // What is timed is what is counted.
+    for key in &keys[1..] {
+        let (timed, counted) = (&result["timings"][key], &result["counts"][key]);
+        assert_eq!(&timed["count"], counted, "{name}: {key}");
+        let seconds = timed["seconds"].as_f64().expect("a number");
+        assert_eq!(seconds > 0.0, *counted != 0, "{name}: {key} {timed}");
+    }
+    // Time that was told twice would leave nothing for the rest.
+    let other = &result["timings"]["other"]["seconds"];
+    assert!(other.as_f64().expect("a number") > 0.0, "{name}: {result}");
+}
+
+/// Name of the snapshot of a model's work.
+fn work_of(name: &str) -> String {
+    format!("work-of-{name}")
 }
 
 #[test]
@@ -53,6 +78,17 @@ fn every_shipped_model_is_run_here() {
         "camera.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
+    // All but those that are simulated and the story, which is of other models.
+    let without_fit = [
+        "paper-device.yaml",
+        "paper-experiments.yaml",
+        "paper-story.yaml",
+    ];
+    for file in run_here.iter().filter(|file| !without_fit.contains(file)) {
+        let name = file.strip_suffix(".yaml").expect("YAML");
+        let snapshot = format!("tests/cli/snapshots/cli__models__{}.snap", work_of(name));
+        assert!(repository(&snapshot).exists(), "{snapshot}");
+    }
 }
 
 /// Largest error of a function against the truth.
@@ -114,6 +150,7 @@ fn noisy() {
 fn paper() {
     let (bench, stdout) = paper_run();
     let result = result(bench, "runs/paper");
+    takes_as_much_work_as_ever("paper", &result);
     assert_eq!(result["outcome"]["status"], "completed");
     assert_eq!(result["counts"]["iterations"], 1000);
     assert_eq!(result["counts"]["forward"], 50_001);
@@ -228,6 +265,17 @@ fn stable_keys(result: &Value) {
         "/counts/tangent",
         "/counts/qp",
         "/seconds",
+        "/timings/arithmetic",
+        "/timings/forward/seconds",
+        "/timings/forward/count",
+        "/timings/adjoint/count",
+        "/timings/tangent/count",
+        "/timings/qp/count",
+        "/timings/linear_algebra/seconds",
+        "/timings/start/seconds",
+        "/timings/io/seconds",
+        "/timings/other/seconds",
+        "/timings/total/seconds",
         "/functions/mass/min",
         "/functions/mass/max",
         "/functions/mass/truth_max_error",
@@ -271,6 +319,62 @@ fn options() {
     bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
     assert_eq!(result(&bench, "run")["counts"]["iterations"], 3);
     assert!(bench.path("run/figures/motion.svg").exists());
+}
+
+/// The parts of the time are exclusive: none is more than the whole, and they add up to it.
+#[test]
+fn the_parts_of_the_time_add_up() {
+    let bench = Workbench::with_small_model();
+    let stdout = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--timings"]);
+    let result = result(&bench, "run");
+    let names = [
+        "forward",
+        "adjoint",
+        "tangent",
+        "qp",
+        "linear_algebra",
+        "start",
+        "io",
+        "other",
+    ];
+    let seconds = |name: &str| {
+        let seconds = result["timings"][name]["seconds"].as_f64();
+        seconds.expect("a number")
+    };
+    let sum: f64 = names.into_iter().map(seconds).sum();
+    // Each is rounded to a double.
+    assert!((sum / seconds("total") - 1.0).abs() < 1e-12, "{result}");
+    for worked in ["forward", "adjoint", "linear_algebra", "io", "other"] {
+        assert!(seconds(worked) > 0.0, "{worked}: {result}");
+    }
+    for idle in ["tangent", "qp", "start"] {
+        assert_eq!(seconds(idle), 0.0, "{idle}: {result}");
+    }
+    assert!(result["seconds"].as_f64().expect("a number") < seconds("total"));
+
+    let (summary, table) = stdout.split_once("\ntime ").expect("a table");
+    assert!(summary.starts_with("Small\n"), "{stdout}");
+    let first = |line: &str| line.split("  ").next().unwrap_or_default().to_owned();
+    let rows: Vec<String> = table.lines().skip(1).take(9).map(first).collect();
+    let shown = [
+        "forward",
+        "adjoint",
+        "tangent",
+        "QP",
+        "linear algebra",
+        "start",
+        "I/O",
+        "other",
+        "total",
+    ];
+    assert_eq!(rows, shown, "{table}");
+    assert!(table.contains("\narithmetic: "), "{table}");
+
+    // Without being asked for it is in the document alone.
+    let quiet = bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    assert!(!quiet.contains("arithmetic"), "{quiet}");
+    let options = ["fit", "model.yaml", "--out", "run", "--json", "--timings"];
+    assert_eq!(bench.run_to(0, &options), bench.read("run/result.json"));
 }
 
 /// Results may go into a pipe that nobody reads to its end; progress is for terminals.
@@ -401,6 +505,14 @@ fn camera() {
     assert!((sigma.expect("a number") - 0.002).abs() < 3e-4, "{sigma:?}");
     let drift = scalar(&result, "drift of the displacement of photographs");
     assert!((drift - 0.002).abs() < 2e-4, "{drift}");
+}
+
+/// Nothing is simulated: one convex problem without an inequality that is met.
+#[test]
+fn moving_support() {
+    let (_, result) = fitted("moving-support", 0);
+    assert_eq!(result["outcome"]["status"], "converged");
+    assert_eq!(result["model"]["cost_kind"], "equation-error");
 }
 
 /// Two free records give the ratios and leave the scale; a force gives the scale as well.
