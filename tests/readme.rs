@@ -298,6 +298,7 @@ fn columns_keys_and_words_are_named() {
         "/outcome",
         "/cost",
         "/counts",
+        "/timings",
         "/functions/mass",
         "/constraints",
     ];

@@ -64,7 +64,11 @@ fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError 
 
 /// Refuses a grid that the machine has no memory for, before any is taken.
 fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<(), InputError> {
-    let (each, available) = (memory::per_node(file, purpose), memory::available());
+    let each = memory::per_node(file, purpose);
+    let (available, how) = match memory::available() {
+        Some(bytes) => (bytes, "available"),
+        None => (memory::ASSUMED, "assumed, as the system does not say"),
+    };
     let needed = nodes as f64 * each as f64;
     if needed <= available as f64 {
         return Ok(());
@@ -79,7 +83,7 @@ fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<
         memory::in_words(needed)
     ))
     .expected(format!(
-        "at most {} nodes: {} are available",
+        "at most {} nodes: {} are {how}",
         available / each as u64,
         memory::in_words(available as f64)
     )))

@@ -32,7 +32,7 @@ const MANY_FUNCTION: usize = 1500;
 const PROGRAMS: usize = 2;
 
 /// What is assumed to be available where the system does not say, bytes.
-const ASSUMED: u64 = 4_000_000_000;
+pub const ASSUMED: u64 = 4_000_000_000;
 
 /// Bytes per node that a run of the model may need.
 pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
@@ -114,10 +114,10 @@ fn has_programs(file: &ModelFile, functions: &[Slot]) -> bool {
     file.spec.constraints.is_some() || functions.iter().any(limited)
 }
 
-/// Bytes that a run may take: what the system says can be had without swapping.
-pub fn available() -> u64 {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    kilobytes(&text).map_or(ASSUMED, |kilobytes| kilobytes.saturating_mul(1024))
+/// Bytes that can be had without swapping, where the system says so (Linux does).
+pub fn available() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    Some(kilobytes(&text)?.saturating_mul(1024))
 }
 
 /// `MemAvailable` of Linux's `/proc/meminfo`.
