@@ -47,7 +47,7 @@ pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use figure::{Axis, Figure, Panel, Scale};
-pub use files::{OutputFolder, write_whole};
+pub use files::{Batch, OutputFolder, write_whole};
 pub use finished::FinishedRun;
 pub use journal::{Heading, JOURNAL, Journal};
 pub use mark::{Colour, Dash, Mark, Style};

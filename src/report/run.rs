@@ -89,7 +89,8 @@ impl Run<'_> {
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder, with_figures: bool) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
-        let mut write = |name: &str, text: &str| timed(&mut writing, || folder.write(name, text));
+        let mut batch = folder.batch();
+        let mut write = |name: &str, text: &str| timed(&mut writing, || batch.write(name, text));
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;
@@ -104,6 +105,7 @@ impl Run<'_> {
         for figure in figures {
             write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
+        timed(&mut writing, || batch.finish())?;
         Ok(writing)
     }
 

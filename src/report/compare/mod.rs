@@ -139,11 +139,13 @@ impl Comparison {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
+        let mut batch = folder.batch();
         for figure in figures::all(self) {
-            folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        folder.write("compare.csv", &self.to_csv())?;
-        folder.write("compare.html", &self.to_html())
+        batch.write("compare.csv", &self.to_csv())?;
+        batch.write("compare.html", &self.to_html())?;
+        batch.finish()
     }
 }
 

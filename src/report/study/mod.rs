@@ -27,10 +27,12 @@ impl StudyDocument {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
+        let mut batch = folder.batch();
         for figure in figures::all(self) {
-            folder.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        folder.write("study.html", &page::page(self))?;
-        folder.write("study.json", &json(self))
+        batch.write("study.html", &page::page(self))?;
+        batch.write("study.json", &json(self))?;
+        batch.finish()
     }
 }
