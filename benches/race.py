@@ -51,6 +51,10 @@ class Skip(Exception):
     """Why a row cannot be run here."""
 
 
+class TooSlow(Skip):
+    """A fit that was given up."""
+
+
 class Row:
     """One row of the table."""
 
@@ -113,8 +117,8 @@ def first_line(command):
 class Race:
     """What the rows share: the programs, the repetitions, what has been measured."""
 
-    def __init__(self, repetitions, quick):
-        self.repetitions, self.quick = repetitions, quick
+    def __init__(self, repetitions, quick, limit):
+        self.repetitions, self.quick, self.longest = repetitions, quick, limit
         self.kmcfit, self.measure_program = build()
         self.threads_known = None
         self.cache = {}
@@ -159,7 +163,10 @@ class Race:
         command = [self.kmcfit, "fit", model, "--out", out] + ([] if report else ["--no-report"])
         if threads is not None and self.knows_threads():
             command += ["--threads", threads]
-        _, trouble, code, wall = run(pinned(command) if threads == 1 else command)
+        try:
+            _, trouble, code, wall = run(pinned(command) if threads == 1 else command, timeout=self.longest)
+        except subprocess.TimeoutExpired:
+            raise TooSlow(f"kmcfit fit {name} was given up after {seconds(self.longest)}") from None
         document = out / "result.json"
         if not document.exists():
             raise Skip(f"kmcfit fit {name} ended with {code}: {trouble.strip()[-300:]}")
@@ -445,9 +452,15 @@ def smooth(race, row):
 
 def scaling(race, row):
     fits = {nodes: [] for nodes in (SCALING[:3] if race.quick else SCALING)}
+    given_up = []
     for _ in race.rounds():
-        for nodes in fits:
-            fits[nodes].append(race.fit(smooth_model(nodes), f"smooth-{nodes}"))
+        for nodes in [n for n in fits if n not in given_up]:
+            try:
+                fits[nodes].append(race.fit(smooth_model(nodes), f"smooth-{nodes}"))
+            except TooSlow as reason:
+                given_up.append(nodes)
+                row.notes.append(str(reason))
+    fits = {nodes: runs for nodes, runs in fits.items() if nodes not in given_up}
     time_of = {nodes: statistics.median(f["seconds"] for f in runs) for nodes, runs in fits.items()}
     ratios = {nodes: time_of[nodes] / nodes / (time_of[2000] / 2000) for nodes in fits}
     worst = {nodes: max(errors(runs[-1]).values()) for nodes, runs in fits.items()}
@@ -456,9 +469,10 @@ def scaling(race, row):
     row.ratio = "; ".join(f"{ratios[nodes]:.3g}" for nodes in fits if nodes != 2000) + " per node"
     accurate = all(error <= max(ACCURATE, 10 * worst[2000]) for error in worst.values())
     converged = all(f["outcome"]["status"] == "converged" for runs in fits.values() for f in runs)
-    row.met = accurate and converged and max(ratios.values()) <= 1.5
+    row.met = accurate and converged and max(ratios.values()) <= 1.5 and not given_up
     row.notes += [f"{nodes:,} nodes: {described(runs[-1])}; process {seconds(runs[-1]['wall'])}" for nodes, runs in fits.items()]
-    if race.quick:
+    row.result += "".join(f"; {nodes:,}: given up" for nodes in given_up)
+    if race.quick and row.met:
         row.met = None
         row.notes.append("quick: without 200,000 nodes")
 
@@ -644,6 +658,7 @@ def main():
     parser.add_argument("--rows", help=f"names or numbers, separated by commas: {', '.join(ROWS)}")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, starts and sizes")
     parser.add_argument("--repetitions", type=int, help="rounds of each row [default: 5, or 1 with --quick]")
+    parser.add_argument("--limit", type=float, default=600.0, help="give a fit up after so many seconds [default: 600]")
     parser.add_argument("--out", type=Path, help="folder for RESULTS.md and figures/")
     parser.add_argument("--no-figures", action="store_true", help="draw no figures")
     options = parser.parse_args()
@@ -660,7 +675,7 @@ def main():
     load = load_average()
     if load is not None and load > 0.5:
         print(f"note: the load is {load:.1f} already: other work makes the numbers noisy")
-    race = Race(repetitions, options.quick)
+    race = Race(repetitions, options.quick, options.limit)
     rows = []
     for row, fill in table(race):
         if row.name not in chosen:
