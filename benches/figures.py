@@ -96,8 +96,10 @@ class Figure:
             if not dashed:
                 out += [mark(solid, x, y, colour) for x, y in places]
                 x, y = places[-1] if line else places[0]
-                # Beside the last point where there is room to its left, else to its right.
+                # Above the last point of a line, towards the middle; above a point that stands alone.
                 anchor, shift = ("end", -2) if x > WIDTH / 2 else ("start", 10)
+                if not line:
+                    anchor, shift = "middle", 0
                 labels.append((x + shift, y - 12, anchor, colour, name))
                 solid += 1
         out += placed(labels)
@@ -110,7 +112,7 @@ def placed(labels):
     out, taken = [], []
     for x, y, anchor, colour, name in sorted(labels, key=lambda label: -label[1]):
         width = 7.6 * len(name)
-        left = x - width if anchor == "end" else x
+        left = x - {"end": 1.0, "middle": 0.5, "start": 0.0}[anchor] * width
         while any(abs(y - other) < 16 and left < end and begin < left + width for other, begin, end in taken):
             y -= 2
         taken.append((y, left, left + width))
