@@ -1,0 +1,184 @@
+//! The problems that are timed.
+#![allow(dead_code, reason = "each benchmark needs some of them")]
+
+use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::dynamics::{ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit::objective::{Channel, GradientKind, Weighting};
+use kmcfit::problem::{Experiment, Problem};
+use kmcfit::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit::study::multistart::{Multistart, Ranges};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Length of the paper's record, s.
+const DURATION: f64 = 25.0;
+/// The paper's initial state, m and m/s.
+const INITIAL: State = State {
+    displacement: 3.3,
+    velocity: 1.0,
+};
+/// Starts of a study lie within this factor of the start values: the default of `kmcfit study`.
+const SPREAD: f64 = 3.0;
+
+/// The paper's problem on `nodes` nodes: one free value per node for mass, damping and stiffness, the
+/// midpoint rule, the start (2, 1, 1), and readings that the same stepper made.
+pub fn paper(nodes: usize) -> Problem {
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let grid = oscillator.grid;
+    let weighting = Weighting::Integral {
+        spacing: grid.step(),
+    };
+    let readings = paper_readings(&oscillator);
+    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let list = vec![
+        CoefficientFunction::nodal(Quantity::Mass, vec![2.0; nodes]),
+        CoefficientFunction::nodal(Quantity::Damping, vec![1.0; nodes]),
+        CoefficientFunction::nodal(Quantity::Stiffness, vec![1.0; nodes]),
+    ];
+    let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
+    let record = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    Problem::new(oscillator, functions, vec![record])
+}
+
+fn paper_readings(oscillator: &Oscillator) -> Vec<f64> {
+    let nodes = oscillator.grid.nodes();
+    let truth = Device {
+        mass: (1..=nodes)
+            .map(|i| 1.0 - 0.5 * i as f64 / nodes as f64)
+            .collect(),
+        coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
+    };
+    let motion = oscillator.forward(&truth, INITIAL, None);
+    motion.expect("a motion").displacement
+}
+
+/// A model of `models/`, with some of its text replaced.
+///
+/// # Panics
+/// If the model is not there, or a text to replace is not in it.
+pub fn model(name: &str, changes: &[(&str, &str)]) -> Model {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{name}.yaml"));
+    let mut text = std::fs::read_to_string(&path).expect("a model file");
+    for (old, new) in changes {
+        assert!(text.contains(old), "{name}.yaml has no `{old}`");
+        text = text.replace(old, new);
+    }
+    let file = ModelFile::parse(&path, text).expect("a model");
+    build(&file, Purpose::Fit).expect("a model")
+}
+
+/// `models/paper-smooth.yaml` on `nodes` nodes.
+pub fn smooth(nodes: usize) -> Model {
+    let oscillator = paper(nodes).oscillator;
+    let mut table = String::from("t_s,y_m\n");
+    for (t, y) in oscillator
+        .grid
+        .times()
+        .iter()
+        .zip(paper_readings(&oscillator))
+    {
+        writeln!(table, "{t},{y}").expect("a string has room");
+    }
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("paper-{nodes}.csv"));
+    std::fs::write(&path, table).expect("a folder for temporary files");
+    let data = format!("data: {:?}", path.display().to_string());
+    model(
+        "paper-smooth",
+        &[
+            ("data: ../data/paper.csv", &data),
+            ("nodes: 2000", &format!("nodes: {nodes}")),
+            ("truth:", "# truth:"),
+        ],
+    )
+}
+
+/// Fits a model from its start.
+pub fn fitted(model: &Model) -> Fit {
+    fit_problem(&model.problem, &model.settings)
+}
+
+/// Fits a problem from its start.
+pub fn fit_problem(problem: &Problem, settings: &FitSettings) -> Fit {
+    fit(problem, &problem.start(), settings, &mut |_| {}).expect("a motion")
+}
+
+/// A study of `starts` starts of a model, none of which climbs the ladder, as `kmcfit study` makes it.
+pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
+    let level = |parameters: &[f64]| parameters.iter().sum::<f64>() / parameters.len() as f64;
+    let start = model.problem.start();
+    let ranges = model.problem.functions.ranges().iter();
+    let around = |at: f64| [at / SPREAD, at * SPREAD];
+    Multistart {
+        ranges: Ranges::Constants(ranges.map(|r| around(level(&start[r.clone()]))).collect()),
+        starts,
+        seed: 1,
+        threads,
+        ladder: false,
+        settings: model.settings.clone(),
+    }
+}
+
+/// A hardening spring under three sines, seen by a displacement and an acceleration sensor with
+/// `samples` readings each; mass, damping, stiffness and cubic stiffness are sought.
+pub fn duffing(samples: usize) -> (Problem, FitSettings) {
+    let grid = Grid::new(0.0, 0.001 * (samples - 1) as f64, samples).expect("a grid");
+    let times = grid.times();
+    let force: Vec<f64> = times
+        .iter()
+        .map(|t| 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin() + 2.0 * (9.7 * t + 2.0).sin())
+        .collect();
+    let excitation = Excitation::force_at_nodes(&force);
+    let oscillator = Oscillator {
+        grid,
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+    };
+    let rest = State {
+        displacement: 0.0,
+        velocity: 0.0,
+    };
+    let truth = Device {
+        mass: vec![1.0; samples],
+        coefficients: [1.2, 20.0, 15.0].map(|p| vec![p; samples]).to_vec(),
+    };
+    let motion = oscillator.forward(&truth, rest, Some(&excitation));
+    let motion = motion.expect("a motion");
+    let acceleration: Vec<f64> = (0..samples)
+        .map(|i| {
+            let (y, v) = (motion.displacement[i], motion.velocity[i]);
+            force[i] - 1.2 * v - 20.0 * y - 15.0 * y * y * y
+        })
+        .collect();
+    let list = vec![
+        CoefficientFunction::constant(Quantity::Mass, 1.2, samples),
+        CoefficientFunction::constant(Quantity::Damping, 1.0, samples),
+        CoefficientFunction::constant(Quantity::Stiffness, 18.0, samples),
+        CoefficientFunction::constant(Quantity::CubicStiffness, 12.0, samples),
+    ];
+    let functions = Functions::new(list, samples, grid.step()).expect("independent functions");
+    let channel = |kind, values, sigma| {
+        let weighting = Weighting::Sigma(sigma);
+        Channel::new(kind, times.clone(), values, weighting, &grid, samples).expect("readings")
+    };
+    let record = Experiment::free("three sines", rest, samples)
+        .with_excitation(excitation)
+        .with_channel(channel(
+            ChannelKind::Displacement,
+            motion.displacement,
+            0.01,
+        ))
+        .with_channel(channel(ChannelKind::Acceleration, acceleration, 0.05));
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Discrete,
+        stopping: Stopping::default(),
+        interrupt: None,
+    };
+    (Problem::new(oscillator, functions, vec![record]), settings)
+}

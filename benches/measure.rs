@@ -1,0 +1,157 @@
+//! Numbers for `benches/race.py` that no time of a benchmark says: what the machine can do at best, the
+//! memory of an evaluation, the throughput of a study. One line of JSON each:
+//!
+//! ```text
+//! measure limit                     ns of a multiply and a multiply-add that wait for each other
+//! measure triad                     memory bandwidth of one core, bytes/s
+//! measure evaluation NODES SECONDS  cost and discrete gradient of the paper's problem
+//! measure starts STARTS THREADS     a study of so many starts of models/knots.yaml
+//! ```
+
+mod common;
+
+use kmcfit::objective::GradientKind;
+use kmcfit::study::multistart::multistart;
+use std::hint::black_box;
+use std::time::Instant;
+
+/// Links of the chain whose latency is the limit of a sweep.
+const LINKS: u32 = 10_000_000;
+/// Elements of each array of the triad: far more than caches hold.
+const TRIAD: usize = 1 << 25;
+/// Repetitions of what is compared by its best.
+const REPETITIONS: usize = 7;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words.as_slice() {
+        ["limit"] => limit(),
+        ["triad"] => triad(),
+        ["evaluation", nodes, seconds] => evaluation(number(nodes), number(seconds)),
+        ["starts", starts, threads] => study(number(starts), number(threads)),
+        // `cargo bench` and `cargo test --benches` call every benchmark without such words.
+        _ => println!("measure: see benches/race.py"),
+    }
+}
+
+fn number<T: std::str::FromStr>(word: &str) -> T {
+    let Ok(number) = word.parse() else {
+        eprintln!("not a number: {word}");
+        std::process::exit(2);
+    };
+    number
+}
+
+/// What no step of a sweep can beat: its states wait for those of the step before through a multiply
+/// and a multiply-add.
+fn limit() {
+    let best = (0..REPETITIONS)
+        .map(|_| {
+            let clock = Instant::now();
+            black_box(chain(black_box(0.5), black_box(0.999_999), black_box(1e-7)));
+            clock.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    println!("{{\"ns_per_link\": {:.4}}}", best / f64::from(LINKS) * 1e9);
+}
+
+#[cfg(target_arch = "x86_64")]
+fn chain(x: f64, a: f64, b: f64) -> f64 {
+    #[target_feature(enable = "fma")]
+    fn fused(x: f64, a: f64, b: f64) -> f64 {
+        (0..LINKS).fold(x, |x, _| (x * a).mul_add(a, b))
+    }
+    match std::arch::is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has the feature.
+        true => unsafe { fused(x, a, b) },
+        false => (0..LINKS).fold(x, |x, _| x * a * a + b),
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn chain(x: f64, a: f64, b: f64) -> f64 {
+    (0..LINKS).fold(x, |x, _| (x * a).mul_add(a, b))
+}
+
+/// `a = b + s c` over arrays that no cache holds; 24 bytes an element are counted.
+fn triad() {
+    let (b, c) = (vec![1.0f64; TRIAD], vec![2.0f64; TRIAD]);
+    let mut a = vec![0.0f64; TRIAD];
+    let s = black_box(3.0);
+    let best = (0..REPETITIONS)
+        .map(|_| {
+            let clock = Instant::now();
+            for ((a, b), c) in a.iter_mut().zip(&b).zip(&c) {
+                *a = b + s * c;
+            }
+            black_box(&mut a);
+            clock.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    println!(
+        "{{\"bytes_per_second\": {:.6e}}}",
+        24.0 * TRIAD as f64 / best
+    );
+}
+
+/// Median times over as many evaluations as take `seconds`, and the memory at its peak.
+fn evaluation(nodes: usize, seconds: f64) {
+    let problem = common::paper(nodes);
+    let theta = problem.start();
+    let mut point = problem.workspace();
+    // The memory that it took to make the problem is not that of an evaluation.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    let (mut sweeps, mut gradients, mut both) = (Vec::new(), Vec::new(), Vec::new());
+    let start = Instant::now();
+    while both.len() < 5 || start.elapsed().as_secs_f64() < seconds {
+        let clock = Instant::now();
+        let ok = problem.evaluate_into(black_box(&theta), &mut point);
+        ok.expect("a motion");
+        let sweep = clock.elapsed().as_secs_f64();
+        black_box(problem.gradient(&theta, &point, GradientKind::Discrete));
+        let total = clock.elapsed().as_secs_f64();
+        sweeps.push(sweep);
+        gradients.push(total - sweep);
+        both.push(total);
+    }
+    println!(
+        "{{\"nodes\": {nodes}, \"evaluations\": {}, \"seconds\": {:.6e}, \"cost_seconds\": {:.6e}, \
+         \"gradient_seconds\": {:.6e}, \"cost\": {:.12e}, \"peak_bytes\": {}}}",
+        both.len(),
+        median(&mut both),
+        median(&mut sweeps),
+        median(&mut gradients),
+        point.cost,
+        peak_bytes().map_or("null".into(), |bytes| bytes.to_string()),
+    );
+}
+
+fn study(starts: usize, threads: usize) {
+    let model = common::model("knots", &[]);
+    let how = common::many_starts(&model, starts, threads);
+    let clock = Instant::now();
+    let found = multistart(&model.problem, &how);
+    let seconds = clock.elapsed().as_secs_f64();
+    let iterations = found.runs.iter().filter_map(|run| run.found.as_ref());
+    println!(
+        "{{\"starts\": {starts}, \"threads\": {threads}, \"seconds\": {seconds:.6e}, \
+         \"failures\": {}, \"iterations\": {}, \"lowest\": {:.6e}}}",
+        found.failures(),
+        iterations.map(|found| found.iterations).sum::<usize>(),
+        found.costs().first().copied().unwrap_or(f64::MAX),
+    );
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Peak of the resident memory; `None` where the system does not say.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM"))?;
+    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(1024 * kilobytes)
+}

@@ -1,0 +1,703 @@
+#!/usr/bin/env python3
+"""Races kmcfit against its peers in one sitting, and prints and writes a table of targets, met or missed.
+
+    python3 benches/race.py                     every row; writes benches/RESULTS.md and benches/figures/
+    python3 benches/race.py --rows knots,3      some rows, by name or number; writes to target/race
+    python3 benches/race.py --quick             fewer repetitions and starts; writes to target/race
+
+Needs nothing but Python and the Rust toolchain. The peers are looked for in the folder KMCFIT_SHARED (by
+default ../shared); a row whose peer cannot run is skipped and says what it needs.
+
+In each row kmcfit and its peer take turns, and medians are compared. Times of whole fits are those of the
+solver ("seconds" in result.json: no reading, no writing); the wall clock of the process is shown beside
+them. Peers count what they count themselves: neither imports, nor compilation, nor building a problem.
+Of several builds or settings of a peer the fastest counts.
+"""
+import argparse
+import csv
+import datetime
+import functools
+import json
+import os
+import platform
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import figures
+
+ROOT = Path(__file__).resolve().parent.parent
+WORK = ROOT / "target" / "race"
+SHARED = Path(os.environ.get("KMCFIT_SHARED", ROOT.parent / "shared"))
+ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up"]
+DURATION = 25.0
+SCALING = [2000, 8000, 40_000, 200_000]
+KNOTS = [4, 8, 16, 32, 64, 128, 256, 512, 1024]
+EVALUATIONS = [1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000]
+BYTES_PER_STEP = 200
+# The device behind the data of peers/duffing_scipy.py.
+DUFFING = {"mass": 1.0, "damping": 1.2, "stiffness": 20.0, "cubic_stiffness": 15.0}
+# A fit on more nodes is as accurate if its errors are within this of the device, or ten times those on 2000.
+ACCURATE = 1e-9
+# A round of a row begins only within so many seconds of its first.
+PATIENCE = 60.0
+
+
+class Skip(Exception):
+    """Why a row cannot be run here."""
+
+
+class TooSlow(Skip):
+    """A fit that was given up."""
+
+
+class Row:
+    """One row of the table."""
+
+    def __init__(self, name, what, peer, target):
+        self.name, self.what, self.peer, self.target = name, what, peer, target
+        self.peer_result = self.result = self.ratio = ""
+        self.met = self.skipped = None
+        self.notes = []
+
+    @property
+    def verdict(self):
+        return "skipped" if self.skipped else {True: "met", False: "missed", None: "not judged"}[self.met]
+
+    def cells(self):
+        number = str(ROWS.index(self.name) + 1)
+        return [number, self.what, self.peer_result or self.peer, self.result, self.ratio, self.target, self.verdict]
+
+
+# ---------------------------------------------------------------------------------------------- tools
+
+
+def run(command, **more):
+    """Output, exit code and wall clock of a command."""
+    clock = time.perf_counter()
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, cwd=ROOT, **more)
+    return done.stdout, done.stderr, done.returncode, time.perf_counter() - clock
+
+
+def pinned(command):
+    """The command on one core, where the system can do that."""
+    if not shutil.which("taskset") or not hasattr(os, "sched_getaffinity"):
+        return command
+    return ["taskset", "-c", str(max(os.sched_getaffinity(0))), *command]
+
+
+def seconds(value):
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e9:.3g} ns"
+
+
+def share(ours, peer):
+    return f"1/{peer / ours:.3g}" if ours < peer else f"{ours / peer:.3g} times"
+
+
+def spread(values):
+    """The median, and how far the values lie apart."""
+    middle = statistics.median(values)
+    return f"{seconds(middle)} ({seconds(min(values))} to {seconds(max(values))}, {len(values)} runs)"
+
+
+def first_line(command):
+    try:
+        return run(command)[0].strip().splitlines()[0]
+    except (OSError, IndexError):
+        return None
+
+
+class Race:
+    """What the rows share: the programs, the repetitions, what has been measured."""
+
+    def __init__(self, repetitions, quick, limit):
+        self.repetitions, self.quick, self.longest = repetitions, quick, limit
+        self.kmcfit, self.measure_program = build()
+        self.threads_known = None
+        self.cache = {}
+        self.data = {}
+
+    def rounds(self):
+        """As many rounds as asked for, unless they are long."""
+        clock = time.perf_counter()
+        for i in range(self.repetitions):
+            if i > 0 and time.perf_counter() - clock > PATIENCE:
+                return
+            yield i
+
+    def once(self, key, work):
+        if key not in self.cache:
+            try:
+                self.cache[key] = work()
+            except Skip as reason:
+                self.cache[key] = reason
+        if isinstance(self.cache[key], Skip):
+            raise self.cache[key]
+        return self.cache[key]
+
+    def measure(self, *words, one_core=True):
+        command = [self.measure_program, *words]
+        out, trouble, code, _ = run(pinned(command) if one_core else command)
+        if code != 0:
+            raise Skip(f"measure {' '.join(map(str, words))} failed: {trouble.strip()[-200:]}")
+        return json.loads(out)
+
+    def limit(self):
+        return self.once("limit", lambda: min(self.measure("limit")["ns_per_link"] for _ in range(3)))
+
+    def evaluation(self, nodes):
+        return self.measure("evaluation", nodes, 0.3 if self.quick else 1.0)
+
+    def fit(self, model, name, threads=None, report=False):
+        """Fits a model, on so many threads or as many as the program likes; its result document, with the
+        wall clock of the process."""
+        out = WORK / "runs" / name
+        shutil.rmtree(out, ignore_errors=True)
+        command = [self.kmcfit, "fit", model, "--out", out] + ([] if report else ["--no-report"])
+        if threads is not None and self.knows_threads():
+            command += ["--threads", threads]
+        try:
+            _, trouble, code, wall = run(pinned(command) if threads == 1 else command, timeout=self.longest)
+        except subprocess.TimeoutExpired:
+            raise TooSlow(f"kmcfit fit {name} was given up after {seconds(self.longest)}") from None
+        document = out / "result.json"
+        if not document.exists():
+            raise Skip(f"kmcfit fit {name} ended with {code}: {trouble.strip()[-300:]}")
+        return {**json.loads(document.read_text()), "wall": wall}
+
+    def knows_threads(self):
+        if self.threads_known is None:
+            self.threads_known = "--threads" in run([self.kmcfit, "fit", "--help"])[0]
+        return self.threads_known
+
+
+def build():
+    print("building …", flush=True)
+    subprocess.run(["cargo", "build", "--release", "--quiet"], cwd=ROOT, check=True)
+    command = ["cargo", "bench", "--quiet", "--bench", "measure", "--no-run", "--message-format=json"]
+    messages = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    artifacts = [json.loads(line) for line in messages.splitlines() if line.startswith("{")]
+    named = [a for a in artifacts if a.get("executable") and a.get("target", {}).get("name") == "measure"]
+    metadata = run(["cargo", "metadata", "--format-version", "1", "--no-deps"])[0]
+    target = Path(json.loads(metadata)["target_directory"])
+    program = target / "release" / ("kmcfit.exe" if os.name == "nt" else "kmcfit")
+    return program, named[-1]["executable"]
+
+
+def peer_file(name):
+    path = SHARED / "peers" / name
+    if not path.exists():
+        raise Skip(f"the peer {name} is not there: set KMCFIT_SHARED to the folder that has peers/{name}")
+    return path
+
+
+def python_peer(path, packages, *words, one_thread=False):
+    """Output of a peer in Python, with the threads that its linear algebra likes or with one; each run is a
+    process of its own."""
+    missing = [p for p in packages if not importable(p)]
+    if missing:
+        raise Skip(f"its peer needs {', '.join(missing)}: pip install {' '.join(missing)}")
+    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    environment = {**os.environ, **(threads if one_thread else {})}
+    out, trouble, code, _ = run([sys.executable, path, *words], env=environment)
+    if code != 0:
+        raise Skip(f"its peer failed: {trouble.strip()[-300:]}")
+    return out
+
+
+@functools.cache
+def importable(package):
+    return run([sys.executable, "-c", f"import {package}"])[2] == 0
+
+
+# What the linear algebra of a peer may do: on small problems its own threads cost it more than they bring.
+THREADS = {"threads as it likes": False, "one thread": True}
+
+
+def fastest(times):
+    """The name and the times of the fastest of several ways."""
+    name = min(times, key=lambda name: statistics.median(times[name]))
+    return name, times[name]
+
+
+def found(pattern, text):
+    match = re.search(pattern, text)
+    if not match:
+        raise Skip(f"the peer printed something else than expected: {text.strip()[-300:]}")
+    return [float(g) for g in match.groups()]
+
+
+# ------------------------------------------------------------------------------------- models and data
+
+
+def changed(name, label, changes):
+    """A model of models/ with some of its text replaced, in a folder of its own."""
+    text = (ROOT / "models" / f"{name}.yaml").read_text(encoding="utf-8")
+    changes = [("../data/", f"{(ROOT / 'data').as_posix()}/"), *changes]
+    for old, new in changes:
+        if old not in text:
+            raise Skip(f"models/{name}.yaml has no `{old}`")
+        text = text.replace(old, new)
+    path = WORK / f"{label}.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def paper_data(nodes):
+    """The paper's record on other grids: readings and true device, by the midpoint rule."""
+    readings, truth = WORK / f"paper-{nodes}.csv", WORK / f"paper-{nodes}-truth.csv"
+    if readings.exists() and truth.exists():
+        return readings, truth
+    dt = DURATION / (nodes - 1)
+    mass = [1 - 0.5 * (i + 1) / nodes for i in range(nodes)]
+    y, v = 3.3, 1.0
+    with open(readings, "w") as out, open(truth, "w") as device:
+        out.write("t_s,y_m\n")
+        device.write("t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m\n")
+        for i in range(nodes):
+            out.write(f"{i * dt!r},{y!r}\n")
+            device.write(f"{i * dt!r},{mass[i]!r},0.0,1.0\n")
+            if i + 1 < nodes:
+                middle_y, middle_v = y + 0.5 * dt * v, v - 0.5 * dt * y / mass[i]
+                y, v = y + dt * middle_v, v - dt * middle_y / (0.5 * (mass[i] + mass[i + 1]))
+    return readings, truth
+
+
+def smooth_model(nodes):
+    if nodes == 2000:
+        return ROOT / "models" / "paper-smooth.yaml"
+    readings, truth = paper_data(nodes)
+    return changed(
+        "paper-smooth",
+        f"smooth-{nodes}",
+        [
+            (f"{(ROOT / 'data').as_posix()}/paper.csv", readings.name),
+            (f"{(ROOT / 'data').as_posix()}/paper_truth.csv", truth.name),
+            ("nodes: 2000", f"nodes: {nodes}"),
+        ],
+    )
+
+
+def small_model():
+    readings, _ = paper_data(100)
+    path = WORK / "small.yaml"
+    path.write_text(
+        f"format: 1\nexperiments:\n  - {{data: {readings.name}, initial: {{displacement: 3.3, velocity: 1.0}}}}\n"
+        "grid: {method: midpoint}\nfunctions:\n"
+        "  mass:      {basis: polynomial, degree: 1, start: 2.0}\n"
+        "  damping:   {basis: constant, start: 1.0}\n  stiffness: {fixed: 1.0}\n"
+    )
+    return path
+
+
+def errors(document):
+    """The largest error of each function."""
+    return {name: f["truth_max_error"] for name, f in document["functions"].items() if "truth_max_error" in f}
+
+
+def described(document):
+    counts = document["counts"]
+    worst = ", ".join(f"{name} {error:.0e}" for name, error in sorted(errors(document).items()))
+    text = f"kmcfit {document['outcome']['status']}, J/J0 {document['cost']['ratio']:.1e}, {counts['iterations']} iterations"
+    return f"{text}; largest errors: {worst}" if worst else text
+
+
+def compare_fits(row, peer, fits, factor):
+    """Fills a row in which kmcfit should take 1/factor of the time of the peer's fastest way."""
+    way, fast = fastest(peer)
+    ours = [f["seconds"] for f in fits]
+    wall = statistics.median(f["wall"] for f in fits)
+    middle, theirs = statistics.median(ours), statistics.median(fast)
+    row.peer_result = f"{row.peer}: {seconds(theirs)}"
+    row.result = f"{seconds(middle)} (process {seconds(wall)})"
+    row.ratio = share(middle, theirs)
+    row.met = middle * factor <= theirs and all(f["outcome"]["status"] in ("converged", "completed") for f in fits)
+    row.notes += [f"peer{name and ', '}{name}: {spread(times)}" for name, times in peer.items()]
+    row.notes += [f"the peer's fastest way: {way}"] if len(peer) > 1 else []
+    row.notes += [f"kmcfit: {spread(ours)}", described(fits[-1])]
+
+
+# ------------------------------------------------------------------------------------------------ rows
+
+
+def jax_rounds(race):
+    """Rounds of what jax_nodal.py measures: an evaluation, and the fit by L-BFGS."""
+
+    def work():
+        peer = peer_file("jax_nodal.py")
+        model = changed("paper-lbfgs", "lbfgs", [("cost_ratio: 1e-6", "cost_ratio: 1e-4")])
+        steps, times, ours, fits = [], [], [], []
+        for _ in race.rounds():
+            out = python_peer(peer, ["numpy", "scipy", "jax", "optax"])
+            steps += found(r"value_and_grad ([\d.]+) us", out)
+            iterations, elapsed = found(r"optax lbfgs: .*J/J0<1e-4 at \((\d+), ([\d.e-]+)\)", out)
+            times.append(elapsed)
+            ours.append(race.evaluation(2000))
+            fits.append(race.fit(model, "lbfgs"))
+        return [s * 1e-6 for s in steps], times, iterations, ours, fits
+
+    return race.once("jax", work)
+
+
+def evaluation(race, row):
+    steps, _, _, ours, _ = jax_rounds(race)
+    theirs, mine = statistics.median(steps), statistics.median(o["seconds"] for o in ours)
+    limit = 2 * race.limit()
+    per_step = mine / 2000 * 1e9
+    race.data["peer_ns_per_step"] = theirs / 2000 * 1e9
+    row.peer_result = f"{row.peer}: {theirs / 2000 * 1e9:.3g} ns a step"
+    row.result = f"{per_step:.3g} ns a step; limit {limit:.3g} ns, so {100 * limit / per_step:.0f} % of it"
+    row.ratio = share(mine, theirs)
+    row.met = mine * 25 <= theirs
+    cost, gradient = (statistics.median(o[k] for o in ours) / 2000 * 1e9 for k in ("cost_seconds", "gradient_seconds"))
+    row.notes += [
+        f"peer {spread(steps)}; kmcfit {spread([o['seconds'] for o in ours])}",
+        f"cost {cost:.3g} ns a step, gradient {gradient:.3g} ns a step",
+        f"limit: two sweeps in which a step waits for the one before through a multiply and a multiply-add, {race.limit():.3g} ns here",
+    ]
+
+
+def million(race, row):
+    triad = max(race.measure("triad")["bytes_per_second"] for _ in range(2))
+    rounds = [(race.evaluation(2000), race.evaluation(1_000_000)) for _ in race.rounds()]
+    small, large = (statistics.median(r[i]["seconds"] / r[i]["nodes"] for r in rounds) for i in range(2))
+    row.peer_result = f"{row.peer}: {small * 1e9:.3g} ns a step"
+    row.result = f"{large * 1e9:.3g} ns a step"
+    row.ratio = f"{large / small:.3g} times"
+    row.met = large <= 1.3 * small
+    peaks = [r[1]["peak_bytes"] and (r[1]["peak_bytes"] - r[0]["peak_bytes"]) / 998_000 for r in rounds]
+    if all(peaks):
+        memory = statistics.median(peaks)
+        bandwidth = memory / large / triad
+        row.result += f"; {memory:.0f} bytes a step, {100 * bandwidth:.0f} % of the triad"
+        row.met = (row.met or bandwidth >= 0.8) and memory <= BYTES_PER_STEP
+        row.notes.append("the share of the triad counts each byte that an evaluation holds as moved once: more are moved")
+    row.notes.append(f"triad: {triad / 1e9:.3g} GB/s on one core, 24 bytes an element")
+
+
+def paper(race, row):
+    source = peer_file("paper_run.c")
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if not compiler:
+        raise Skip("its peer needs a C compiler")
+    flags = {"strict": ["-O2", "-ffp-contract=off"], "fast": ["-O3", "-march=native", "-ffast-math"]}
+    programs = {}
+    for name, words in flags.items():
+        programs[name] = WORK / f"paper_run_{name}"
+        if run([compiler, *words, source, "-o", programs[name], "-lm"])[2] != 0:
+            raise Skip(f"the {name} build of paper_run.c failed")
+    peers, one, two = {name: [] for name in programs}, [], []
+    for _ in race.rounds():
+        for name, program in programs.items():
+            peers[name] += found(r"seconds ([\d.]+)", run(pinned([program]))[0])
+        one.append(race.fit(ROOT / "models" / "paper.yaml", "paper", threads=1))
+        two.append(race.fit(ROOT / "models" / "paper.yaml", "paper-two", threads=2))
+    best = statistics.median(fastest(peers)[1])
+    single, double = (statistics.median(f["seconds"] for f in fits) for fits in (one, two))
+    row.peer_result = f"{row.peer}: {seconds(best)}"
+    walls = ", ".join(seconds(statistics.median(f["wall"] for f in fits)) for fits in (one, two))
+    row.result = f"{seconds(single)} on one core, {seconds(double)} on two (processes {walls})"
+    row.ratio = f"{share(single, best)}, {share(double, best)}"
+    same, told = history("paper")
+    also, _ = history("paper-two")
+    row.met = 8 * single <= best and 14 * double <= best and same is not False and also is not False
+    row.notes += [f"peer, {name} build: {spread(times)}" for name, times in peers.items()] + [told]
+    if not race.knows_threads():
+        row.notes.append("`kmcfit fit` has no option --threads: one core by taskset, two by all cores")
+    race.data["cores_paper"] = [(1, single), (2, double)]
+
+
+def history(name):
+    """Whether the run of this name has the reference history, to every digit of that."""
+    path = SHARED / "reference" / "paper_history.csv"
+    if not path.exists():
+        return None, "no reference history to compare with"
+    with open(path) as reference, open(WORK / "runs" / name / "history.csv") as ours:
+        expected, rows = list(csv.DictReader(reference)), list(csv.DictReader(ours))
+    names = {"cost_after": "cost", "cost_ratio": "cost_ratio", "gradient_norm_squared_ratio": "gradient_norm_squared_ratio"}
+    if len(expected) != len(rows):
+        return False, f"history: {len(rows)} rows instead of {len(expected)}"
+    for theirs, mine in zip(expected, rows):
+        for column, own in names.items():
+            if f"{float(mine[own]):.15g}" != theirs[column]:
+                return False, f"history: {column} in row {theirs['iteration']} is {mine[own]}, not {theirs[column]}"
+    return True, f"the {len(rows)} rows of the history are those of the reference to every printed digit"
+
+
+def lbfgs(race, row):
+    _, times, iterations, _, fits = jax_rounds(race)
+    compare_fits(row, {"": times}, fits, 50)
+    row.notes.append(f"the peer takes {iterations:.0f} iterations")
+
+
+def smooth(race, row):
+    peer = peer_file("casadi_nodal.py")
+    times, fits, accuracy = {name: [] for name in THREADS}, [], None
+    for _ in race.rounds():
+        for name, one in THREADS.items():
+            out = python_peer(peer, ["numpy", "casadi"], 2000, 1, one_thread=one)
+            times[name] += found(r"solve ([\d.]+)s", out)
+            accuracy = found(r"J/J0 (\S+) err m (\S+) k (\S+) c (\S+)", out)
+        fits.append(race.fit(smooth_model(2000), "smooth"))
+    compare_fits(row, times, fits, 10)
+    row.notes.append("peer: J/J0 {:.1e}; largest errors: mass {:.0e}, stiffness {:.0e}, damping {:.0e}".format(*accuracy))
+
+
+def scaling(race, row):
+    fits = {nodes: [] for nodes in (SCALING[:3] if race.quick else SCALING)}
+    given_up = []
+    for _ in race.rounds():
+        for nodes in [n for n in fits if n not in given_up]:
+            try:
+                fits[nodes].append(race.fit(smooth_model(nodes), f"smooth-{nodes}"))
+            except TooSlow as reason:
+                given_up.append(nodes)
+                row.notes.append(str(reason))
+    fits = {nodes: runs for nodes, runs in fits.items() if nodes not in given_up}
+    time_of = {nodes: statistics.median(f["seconds"] for f in runs) for nodes, runs in fits.items()}
+    ratios = {nodes: time_of[nodes] / nodes / (time_of[2000] / 2000) for nodes in fits}
+    worst = {nodes: max(errors(runs[-1]).values()) for nodes, runs in fits.items()}
+    row.peer_result = f"{row.peer}: {seconds(time_of[2000])}"
+    row.result = "; ".join(f"{nodes:,}: {seconds(time_of[nodes])}" for nodes in fits if nodes != 2000)
+    row.ratio = "; ".join(f"{ratios[nodes]:.3g}" for nodes in fits if nodes != 2000) + " per node"
+    accurate = all(error <= max(ACCURATE, 10 * worst[2000]) for error in worst.values())
+    converged = all(f["outcome"]["status"] == "converged" for runs in fits.values() for f in runs)
+    row.met = accurate and converged and max(ratios.values()) <= 1.5 and not given_up
+    row.notes += [f"{nodes:,} nodes: {described(runs[-1])}; process {seconds(runs[-1]['wall'])}" for nodes, runs in fits.items()]
+    row.result += "".join(f"; {nodes:,}: given up" for nodes in given_up)
+    if race.quick and row.met:
+        row.met = None
+        row.notes.append("quick: without 200,000 nodes")
+
+
+def knots(race, row):
+    peer = peer_file("scipy_knots.py")
+    times, fits = {name: [] for name in THREADS}, []
+    for _ in race.rounds():
+        for name, one in THREADS.items():
+            out = python_peer(peer, ["numpy", "scipy", "numba"], one_thread=one)
+            times[name] += found(r"scipy knots: ([\d.]+) s", out)
+        fits.append(race.fit(ROOT / "models" / "knots.yaml", "knots"))
+    compare_fits(row, times, fits, 50)
+    race.data["peer_knots"] = statistics.median(fastest(times)[1])
+
+
+def starts(race, row):
+    count = 40 if race.quick else 1000
+    program = [str(race.measure_program), "starts", str(count)]
+    together, alone = [], []
+    for _ in race.rounds():
+        clock = time.perf_counter()
+        two = [subprocess.Popen([*program, "1"], stdout=subprocess.PIPE, text=True, cwd=ROOT) for _ in range(2)]
+        documents = [json.loads(process.communicate()[0]) for process in two]
+        together.append(2 * count / max(d["seconds"] for d in documents))
+        wall = time.perf_counter() - clock
+        alone.append(race.measure("starts", count, 2, one_core=False))
+    single = race.measure("starts", count, 1, one_core=False)
+    two_threads = statistics.median(a["seconds"] for a in alone)
+    rate, reference = count / two_threads, statistics.median(together)
+    row.peer_result = f"{row.peer}: {reference:.3g} fits/s"
+    row.result = f"{rate:.3g} fits/s on two threads, {count / single['seconds']:.3g} on one"
+    row.ratio = f"{100 * rate / reference:.0f} %"
+    row.met = rate >= 0.9 * reference
+    row.notes += [
+        f"{count} starts a run, {len(alone)} rounds, the last two processes took {seconds(wall)}",
+        f"{alone[-1]['iterations']} iterations, {alone[-1]['failures']} starts led nowhere",
+    ]
+    race.data["cores_starts"] = [(1, single["seconds"] * 1000 / count), (2, two_threads * 1000 / count)]
+
+
+def duffing(race, row):
+    times, fits, cost = {}, [], None
+    for _ in race.rounds():
+        for threads, one in THREADS.items():
+            peer = ROOT / "benches" / "peers" / "duffing_scipy.py"
+            out = python_peer(peer, ["numpy", "scipy", "numba"], WORK, one_thread=one)
+            for name, value, j in re.findall(r"scipy duffing \((.*?)\): ([\d.]+) s, nfev \d+, J (\S+),", out):
+                times.setdefault(f"{name}, {threads}", []).append(float(value))
+                cost = min(float(j), cost or float(j))
+        fits.append(race.fit(WORK / "duffing_long.yaml", "duffing"))
+    compare_fits(row, times, fits, 10)
+    ours = fits[-1]["cost"]["final"]
+    row.met = row.met and abs(ours - cost) <= 1e-6 * cost
+    off = ", ".join(f"{q} {abs(fits[-1]['functions'][q]['min'] - true):.1e}" for q, true in DUFFING.items())
+    row.notes.append(f"J {cost:.8g} of the peer, {ours:.8g} of kmcfit, whose errors are: {off}")
+
+
+def start_up(race, row):
+    model, repetitions = small_model(), 5 if race.quick else 25
+    nothing, short, fit, figures_too = [], [], [], []
+    for _ in range(repetitions):
+        nothing.append(run(["true"])[3] if shutil.which("true") else 0.0)
+        short.append(run([race.kmcfit, "--help"])[3])
+        fit.append(race.fit(model, "small")["wall"])
+        figures_too.append(race.fit(model, "small-report", report=True)["wall"])
+    row.result = f"--help {seconds(statistics.median(short))}; fit {seconds(statistics.median(fit))}"
+    row.met = statistics.median(short) <= 10e-3 and statistics.median(fit) <= 30e-3
+    row.notes.append(
+        f"wall clock of the process, as Python sees it ({seconds(statistics.median(nothing))} for a program that does "
+        f"nothing); with figures {seconds(statistics.median(figures_too))}"
+    )
+
+
+def table(race):
+    """The rows of the issue: what, peer, target, and the function that fills them."""
+    return [
+        (Row("evaluation", "J and its discrete gradient, 2000 nodes", "JAX", "1/25"), evaluation),
+        (Row("million", "the same, 10⁶ nodes", "2000 nodes", "1.3 times, or 80 % of the triad; 200 bytes a step"), million),
+        (Row("paper", "the paper's 1000 iterations", "C, better of two builds", "1/8 on one core, 1/14 on two; the same history"), paper),
+        (Row("lbfgs", "nodal fit to J/J0 = 1e-4", "optax L-BFGS", "1/50"), lbfgs),
+        (Row("smooth", "positive, smooth, normalised, 2000 nodes", "CasADi and IPOPT", "1/10"), smooth),
+        (Row("scaling", "the same on more nodes", "2000 nodes", "as accurate; 1.5 per node"), scaling),
+        (Row("knots", "32 parameters on knots", "SciPy", "1/50"), knots),
+        (Row("starts", "a study of 1000 starts of it", "two processes", "90 % of their throughput"), starts),
+        (Row("duffing", "forced, nonlinear, 65,000 samples, two sensors", "SciPy and Numba", "1/10"), duffing),
+        (Row("start-up", "start-up", "", "--help 10 ms; fit of 100 readings 30 ms"), start_up),
+    ]
+
+
+# ---------------------------------------------------------------------------------------------- figures
+
+
+def draw(race, chosen, folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    if {"evaluation", "million"} & chosen:
+        sizes = EVALUATIONS[::3] if race.quick else EVALUATIONS
+        all_sizes = [race.evaluation(nodes) for nodes in sizes]
+        figure = figures.Figure("Cost and discrete gradient of the paper's problem", "time nodes N", "time per step, ns")
+        for name, key in (("cost and gradient", "seconds"), ("cost alone", "cost_seconds")):
+            figure.add(name, [(e["nodes"], e[key] / e["nodes"] * 1e9) for e in all_sizes])
+        figure.level("limit of two sequential sweeps", 2 * race.limit())
+        figure.level("JAX, N = 2000", race.data.get("peer_ns_per_step"))
+        figure.write(folder / "time-per-step.svg")
+    if "knots" in chosen:
+        points = []
+        for count in KNOTS[::3] if race.quick else KNOTS:
+            model = changed("knots", f"knots-{count}", [("knots: 11", f"knots: {count}")])
+            fits = [race.fit(model, f"knots-{count}") for _ in range(1 if race.quick else 3)]
+            points.append((3 * count - 1, statistics.median(f["seconds"] for f in fits)))
+            print(f"  {3 * count - 1} parameters: {seconds(points[-1][1])}, {fits[-1]['outcome']['status']}", flush=True)
+        figure = figures.Figure("A fit on knots, 2000 nodes", "parameters", "time of the solver, s")
+        figure.add("kmcfit", points)
+        if "peer_knots" in race.data:
+            figure.add("SciPy, 32 parameters", [(32, race.data["peer_knots"])], line=False)
+        figure.write(folder / "time-against-parameters.svg")
+    figure = figures.Figure("Time against cores (dotted: half the time on two)", "cores", "time, s", x_ticks=[1, 2])
+    for key, name in (("cores_starts", "1000 starts of the knots model"), ("cores_paper", "the paper's run")):
+        if key in race.data:
+            figure.add(name, race.data[key])
+            first = race.data[key][0][1]
+            figure.add("ideal", [(1, first), (2, first / 2)], dashed=True)
+    figure.write(folder / "time-against-cores.svg")
+
+
+# ----------------------------------------------------------------------------------------------- report
+
+
+def machine(load):
+    """What ran, without what names it."""
+    cpu = platform.processor() or platform.machine()
+    try:
+        cpu = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text()).group(1)
+        memory = int(re.search(r"MemTotal:\s*(\d+)", Path("/proc/meminfo").read_text()).group(1)) / 2**20
+    except (OSError, AttributeError):
+        memory = None
+    try:
+        system = re.search(r'PRETTY_NAME="(.*)"', Path("/etc/os-release").read_text()).group(1)
+    except (OSError, AttributeError):
+        system = platform.system()
+    packages = []
+    for package in ("numpy", "scipy", "jax", "optax", "numba", "casadi"):
+        code = f"import importlib.metadata as m; print(m.version({package!r}))"
+        version = first_line([sys.executable, "-c", code])
+        packages += [f"{package} {version}"] if version else []
+    return [
+        ("processor", f"{cpu}, {os.cpu_count()} cores"),
+        ("memory", f"{memory:.0f} GiB" if memory else "unknown"),
+        ("system", f"{system}, {platform.system()} {platform.release().split('-')[0]}"),
+        ("compilers", "; ".join(filter(None, [first_line(["rustc", "--version"]), first_line(["cc", "--version"])]))),
+        ("Python", "; ".join([platform.python_version(), *packages])),
+        ("date", datetime.date.today().isoformat()),
+        ("other work", "unknown" if load is None else f"load {load:.1f} before the race"),
+    ]
+
+
+def markdown(rows, about, repetitions, drawn):
+    heads = ["row", "what", "peer", "kmcfit", "ratio", "target", ""]
+    lines = ["# Results of the race", "", "Made by `python3 benches/race.py`; see [`NOTES.md`](NOTES.md).", ""]
+    lines += ["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in about), ""]
+    lines += [f"Medians of up to {repetitions} rounds in which kmcfit and its peer take turns.", ""]
+    lines += ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for row in rows:
+        cells = row.cells()
+        cells[-1] = f"**{cells[-1]}**" if row.verdict != "met" else cells[-1]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "## Row by row", ""]
+    for row in rows:
+        notes = [f"skipped: {row.skipped}"] if row.skipped else row.notes
+        lines.append(f"{ROWS.index(row.name) + 1}. `{row.name}`")
+        lines += [f"   - {note}" for note in notes]
+    if drawn:
+        lines += ["", "## Scaling", "", *(f"![{path.stem.replace('-', ' ')}](figures/{path.name})" for path in drawn)]
+    return "\n".join(lines) + "\n"
+
+
+def load_average():
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", help=f"names or numbers, separated by commas: {', '.join(ROWS)}")
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, starts and sizes")
+    parser.add_argument("--repetitions", type=int, help="rounds of each row [default: 5, or 1 with --quick]")
+    parser.add_argument("--limit", type=float, default=600.0, help="give a fit up after so many seconds [default: 600]")
+    parser.add_argument("--out", type=Path, help="folder for RESULTS.md and figures/")
+    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
+    options = parser.parse_args()
+    chosen = set(ROWS)
+    if options.rows:
+        words = options.rows.split(",")
+        chosen = {ROWS[int(w) - 1] if w.isdigit() and 0 < int(w) <= len(ROWS) else w for w in words}
+        if not chosen <= set(ROWS):
+            parser.error(f"no such row: {', '.join(sorted(chosen - set(ROWS)))}")
+    whole = chosen == set(ROWS) and not options.quick
+    out = options.out or (ROOT / "benches" if whole else WORK)
+    repetitions = options.repetitions or (1 if options.quick else 5)
+    WORK.mkdir(parents=True, exist_ok=True)
+    load = load_average()
+    if load is not None and load > 0.5:
+        print(f"note: the load is {load:.1f} already: other work makes the numbers noisy")
+    race = Race(repetitions, options.quick, options.limit)
+    rows = []
+    for row, fill in table(race):
+        if row.name not in chosen:
+            continue
+        print(f"\n{ROWS.index(row.name) + 1} {row.name}: {row.what}", flush=True)
+        try:
+            fill(race, row)
+        except (Skip, OSError, ValueError, KeyError) as reason:
+            row.skipped = str(reason) if isinstance(reason, Skip) else f"{type(reason).__name__}: {reason}"
+            print(f"  SKIPPED: {row.skipped}", flush=True)
+        else:
+            print(f"  {row.peer_result}\n  kmcfit: {row.result}\n  {row.ratio} (target {row.target}): {row.verdict}")
+            print("\n".join(f"  - {note}" for note in row.notes), flush=True)
+        rows.append(row)
+    folder = out / "figures"
+    if not options.no_figures:
+        print("\nfigures …", flush=True)
+        draw(race, chosen, folder)
+    text = markdown(rows, machine(load), repetitions, sorted(folder.glob("*.svg")))
+    (out / "RESULTS.md").write_text(text, encoding="utf-8")
+    print("\n" + text)
+
+
+if __name__ == "__main__":
+    main()
