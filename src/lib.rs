@@ -131,6 +131,7 @@ pub mod error;
 pub mod functions;
 pub mod identifiability;
 mod input;
+mod lanes;
 mod near;
 pub mod objective;
 pub mod observations;

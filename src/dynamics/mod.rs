@@ -11,6 +11,7 @@
 //! * [`adjoint::continuous`]: Eq. 13 of the paper, discretised as the paper does.
 
 pub mod adjoint;
+mod blocks;
 mod device;
 mod excitation;
 mod forward;
@@ -33,7 +34,8 @@ pub use tableau::Method;
 pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
 
-/// What the steppers compute with on this machine.
+/// What the blocks of linear motions are computed with on this processor: `AVX-512`, `AVX2` or `scalar`.
+/// All give the same bits.
 pub fn arithmetic() -> &'static str {
-    "scalar"
+    crate::lanes::name()
 }

@@ -5,6 +5,7 @@ use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::dynamics::{
     ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
 };
+use crate::lanes::sum::squared_distance;
 use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
 
 /// The readings of one sensor.
@@ -27,6 +28,8 @@ pub struct Channel {
     around: Vec<Surroundings>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
+    /// Whether reading `i` stands on node `i`.
+    on_every_node: bool,
 }
 
 /// The motion that a channel looks at.
@@ -76,9 +79,12 @@ impl Channel {
         };
         let places: Option<Vec<Place>> = times.iter().map(place).collect();
         let fits = times.len() == values.len() && !values.is_empty();
+        let places = places?;
+        let on_every_node = (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i));
         fits.then_some(Self {
             kind,
-            places: places?,
+            on_every_node,
+            places,
             times,
             observed: values,
             unfiltered: Vec::new(),
@@ -225,6 +231,7 @@ impl Channel {
         )?;
         Some(Self {
             places: unfiltered.places,
+            on_every_node: unfiltered.on_every_node,
             ..self.clone()
         })
     }
@@ -279,14 +286,22 @@ impl Channel {
         &self.filter
     }
 
+    /// Whether the readings are displacements of a plain sensor, and nothing is between model and
+    /// readings.
+    fn is_plain(&self) -> bool {
+        self.kind == ChannelKind::Displacement
+            && self.sensor == Sensor::default()
+            && self.base.is_empty()
+            && self.filter.is_empty()
+    }
+
     /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
     /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
     pub fn stride(&self) -> Option<usize> {
-        let plain = self.kind == ChannelKind::Displacement
-            && self.sensor == Sensor::default()
-            && self.base.is_empty()
-            && self.filter.is_empty();
-        if !plain || self.places[0].as_node() != Some(0) {
+        if self.is_plain() && self.on_every_node {
+            return Some(1);
+        }
+        if !self.is_plain() || self.places[0].as_node() != Some(0) {
             return None;
         }
         let stride = match self.places.get(1) {
@@ -351,6 +366,10 @@ impl Channel {
     /// [`Channel::predict`] into storage that is used again.
     pub fn predict_into(&self, view: View, out: &mut Vec<f64>) {
         out.clear();
+        if self.on_every_node && self.is_plain() {
+            out.extend_from_slice(&view.motion.displacement[..self.len()]);
+            return;
+        }
         if self.sensor == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
         } else {
@@ -402,6 +421,11 @@ impl Channel {
                 &filtered
             }
         };
+        if self.on_every_node && self.is_plain() {
+            let pairs = source.displacement.iter_mut().zip(slopes);
+            pairs.for_each(|(source, slope)| *source += slope);
+            return;
+        }
         let [gain, ..] = self.sensor.values(view.scalars);
         let indices = self.sensor.indices();
         let simple = self.kind == ChannelKind::Displacement && indices == [None; 3];
@@ -460,6 +484,21 @@ impl Channel {
             .sum()
     }
 
+    /// [`Channel::cost`], summed in lanes where the weights allow: the same to rounding.
+    pub fn cost_in_lanes(&self, predicted: &[f64]) -> f64 {
+        match (&self.weighting, self.loss) {
+            (Weighting::Integral { spacing }, _) => {
+                let at = |i: usize| (predicted[i] - self.observed[i]).powi(2);
+                let ends = at(0) + at(self.len() - 1);
+                spacing * (squared_distance(predicted, &self.observed) - 0.5 * ends)
+            }
+            (Weighting::Sigma(sigma) | Weighting::Estimated { sigma }, Loss::Squares) => {
+                squared_distance(predicted, &self.observed) / (sigma * sigma)
+            }
+            _ => self.cost(predicted),
+        }
+    }
+
     /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
     /// the difference of two rounded costs would be lost in their rounding.
     pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
@@ -479,6 +518,18 @@ impl Channel {
         pairs.map(difference).sum()
     }
 
+    /// The weights of the readings within and at both ends, if the cost is a sum of squares and all
+    /// within have the same.
+    pub fn uniform_weights(&self) -> Option<[f64; 2]> {
+        match (&self.weighting, self.loss) {
+            (Weighting::Integral { spacing }, _) => Some([*spacing, 0.5 * spacing]),
+            (Weighting::Sigma(sigma) | Weighting::Estimated { sigma }, Loss::Squares) => {
+                Some([1.0 / (sigma * sigma); 2])
+            }
+            _ => None,
+        }
+    }
+
     /// Weight of the residual `r` of reading `i` in the least-squares problem that has the gradient
     /// of the cost: `sum w r^2`.
     pub fn weight(&self, i: usize, r: f64) -> f64 {
@@ -491,6 +542,15 @@ impl Channel {
 
     /// `dJ/d model = 2 w r` of every reading.
     pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
+        if let Some([inner, ends]) = self.uniform_weights() {
+            let residuals = self.residuals(predicted);
+            let mut slopes: Vec<f64> = residuals.map(|r| 2.0 * inner * r).collect();
+            let last = self.len() - 1;
+            for i in [0, last] {
+                slopes[i] = 2.0 * ends * (predicted[i] - self.observed[i]);
+            }
+            return slopes;
+        }
         let residuals = self.residuals(predicted).enumerate();
         residuals
             .map(|(i, r)| 2.0 * self.weight(i, r) * r)

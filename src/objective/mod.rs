@@ -17,7 +17,9 @@ pub use sensor::Sensor;
 pub use verify::GradientError;
 pub use weighting::Weighting;
 
-use crate::dynamics::{Breakdown, Cause, Device, DeviceTangent, Place, State, Trajectory};
+use crate::dynamics::{
+    Breakdown, Cause, Device, DeviceTangent, Oscillator, Place, State, Trajectory,
+};
 use crate::problem::Problem;
 
 /// The cost at one point and everything that it was computed from.
@@ -39,6 +41,15 @@ pub struct Evaluation {
     pub trajectories: Vec<Trajectory>,
     /// What the model says of the readings, for each experiment and each of its channels.
     pub predictions: Vec<Vec<Vec<f64>>>,
+}
+
+/// In which order a motion and its cost are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    /// One step and one reading after the other.
+    Steps,
+    /// Several at once, where that is possible.
+    Blocks,
 }
 
 impl Evaluation {
@@ -91,10 +102,35 @@ impl Problem {
     /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
     /// error.
     ///
+    /// Linear free motion is computed in blocks of the record at once
+    /// ([`Oscillator::forward_in_blocks_into`](crate::dynamics::Oscillator::forward_in_blocks_into)).
+    ///
     /// # Errors
     /// As [`Problem::evaluate`].
     pub fn evaluate_into(
         &self,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.evaluate_by(Order::Blocks, theta, evaluation)
+    }
+
+    /// [`Problem::evaluate_into`] one step and one reading after the other, in the paper's order of
+    /// operations: its run depends on every bit.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    pub fn evaluate_in_order_into(
+        &self,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.evaluate_by(Order::Steps, theta, evaluation)
+    }
+
+    fn evaluate_by(
+        &self,
+        order: Order,
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
@@ -103,7 +139,7 @@ impl Problem {
             self.functions.device_into(theta, i + 1, own);
         }
         evaluation.scalars.copy_from_slice(self.scalars(theta));
-        self.evaluate_devices(evaluation)?;
+        self.motions(order, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         if !evaluation.cost.is_finite() {
@@ -118,6 +154,10 @@ impl Problem {
     /// # Errors
     /// A [`Breakdown`] if a motion does not exist.
     pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+        self.motions(Order::Blocks, evaluation)
+    }
+
+    fn motions(&self, order: Order, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
         evaluation.misfit = 0.0;
         for (e, experiment) in self.experiments.iter().enumerate() {
             let device = match experiment.device {
@@ -125,12 +165,13 @@ impl Problem {
                 own => &evaluation.own_devices[own - 1],
             };
             let motion = &mut evaluation.trajectories[e];
-            self.oscillator.forward_into(
-                device,
-                experiment.initial_state(&evaluation.scalars),
-                experiment.excitation.as_ref(),
-                motion,
-            )?;
+            let solve = match order {
+                Order::Steps => Oscillator::forward_into,
+                Order::Blocks => Oscillator::forward_in_blocks_into,
+            };
+            let initial = experiment.initial_state(&evaluation.scalars);
+            let excitation = experiment.excitation.as_ref();
+            solve(&self.oscillator, device, initial, excitation, motion)?;
             let view = View {
                 oscillator: &self.oscillator,
                 device,
@@ -144,7 +185,10 @@ impl Problem {
                 .zip(&mut evaluation.predictions[e]);
             for (channel, predicted) in predictions {
                 channel.predict_into(view, predicted);
-                evaluation.misfit += channel.cost(predicted);
+                evaluation.misfit += match order {
+                    Order::Steps => channel.cost(predicted),
+                    Order::Blocks => channel.cost_in_lanes(predicted),
+                };
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! A point of the search, and the counted and timed work that makes one.
 
-use super::FitSettings;
+use super::{FitSettings, Solver};
 use super::timings::{Timings, timed};
 use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Gradient, GradientKind};
@@ -34,6 +34,8 @@ pub struct Counts {
 pub(crate) struct Work<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
+    /// Whether every operation has its place: the paper's run depends on every bit.
+    in_order: bool,
     /// Most iterations of one quadratic program.
     pub program_iterations: u32,
     /// What the work took.
@@ -53,6 +55,8 @@ impl<'a, 'p> Work<'a, 'p> {
         Self {
             problem,
             kind: settings.gradient,
+            in_order: settings.solver == Solver::SteepestDescent
+                || settings.gradient == GradientKind::Continuous,
             program_iterations: settings.stopping.program_iterations,
             timings: Timings::default(),
         }
@@ -72,9 +76,10 @@ impl<'a, 'p> Work<'a, 'p> {
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
         *self.problem.counts.entry(FORWARD).or_insert(0) += 1;
-        let problem = self.problem();
-        timed(&mut self.timings.forward, || {
-            problem.evaluate_into(parameters, evaluation)
+        let (problem, in_order) = (self.problem(), self.in_order);
+        timed(&mut self.timings.forward, || match in_order {
+            true => problem.evaluate_in_order_into(parameters, evaluation),
+            false => problem.evaluate_into(parameters, evaluation),
         })
     }
 
