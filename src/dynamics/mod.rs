@@ -23,6 +23,7 @@ mod step_jacobian;
 mod tableau;
 mod tangent;
 mod term;
+mod trials;
 
 pub use device::{Device, State};
 pub use excitation::{Excitation, Stepwise};
@@ -33,6 +34,7 @@ pub use step_jacobian::{StateChange, StepJacobian};
 pub use tableau::Method;
 pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
+pub(crate) use trials::{Ray, Trials};
 
 /// What the blocks of linear motions are computed with on this processor: `AVX-512`, `AVX2` or `scalar`.
 /// All give the same bits.
