@@ -12,6 +12,9 @@ pub(crate) mod sum;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+#[cfg(test)]
+mod tests;
+
 use portable::Portable;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
@@ -152,4 +155,16 @@ pub(crate) fn name() -> &'static str {
         }
     }
     "scalar"
+}
+
+/// What a kernel gives with every arithmetic that this processor has.
+#[cfg(test)]
+pub(crate) fn on_each<K: Kernel>(kernel: impl Fn() -> K) -> Vec<K::Output> {
+    let mut outputs = vec![kernel().run(Portable)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        outputs.extend(x86::Avx2::find().map(|avx2| avx2.run(kernel())));
+        outputs.extend(x86::Avx512::find().map(|avx512| avx512.run(kernel())));
+    }
+    outputs
 }

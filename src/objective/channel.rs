@@ -5,7 +5,6 @@ use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::dynamics::{
     ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
 };
-use crate::lanes::sum::squared_distance;
 use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
 
 /// The readings of one sensor.
@@ -482,21 +481,6 @@ impl Channel {
                 None => self.weighting.weight(i, self.len()) * r * r,
             })
             .sum()
-    }
-
-    /// [`Channel::cost`], summed in lanes where the weights allow: the same to rounding.
-    pub fn cost_in_lanes(&self, predicted: &[f64]) -> f64 {
-        match (&self.weighting, self.loss) {
-            (Weighting::Integral { spacing }, _) => {
-                let at = |i: usize| (predicted[i] - self.observed[i]).powi(2);
-                let ends = at(0) + at(self.len() - 1);
-                spacing * (squared_distance(predicted, &self.observed) - 0.5 * ends)
-            }
-            (Weighting::Sigma(sigma) | Weighting::Estimated { sigma }, Loss::Squares) => {
-                squared_distance(predicted, &self.observed) / (sigma * sigma)
-            }
-            _ => self.cost(predicted),
-        }
     }
 
     /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,

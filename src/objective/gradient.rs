@@ -43,23 +43,20 @@ impl Problem {
     /// # Panics
     /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
-        let (euclidean, l2) = match kind {
+        let (mut euclidean, mut l2) = match kind {
             GradientKind::Discrete => {
-                let euclidean = self.euclidean_gradient(theta, evaluation);
+                let euclidean = self.discrete_gradient(evaluation);
                 let l2 = self.functions.gram_solve(&euclidean);
                 (euclidean, l2)
             }
-            GradientKind::Continuous => {
-                let (mut euclidean, mut l2) = self.continuous_gradient(evaluation);
-                if self.is_regularised() {
-                    let push = self.penalty_gradient(theta);
-                    let push_l2 = self.functions.gram_solve(&push);
-                    euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
-                    l2.iter_mut().zip(&push_l2).for_each(|(g, p)| *g += p);
-                }
-                (euclidean, l2)
-            }
+            GradientKind::Continuous => self.continuous_gradient(evaluation),
         };
+        if self.is_regularised() {
+            let push = self.penalty_gradient(theta);
+            let push_l2 = self.functions.gram_solve(&push);
+            euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
+            l2.iter_mut().zip(&push_l2).for_each(|(g, p)| *g += p);
+        }
         let norm_squared = self.functions.norm_squared(&l2);
         Gradient {
             euclidean,

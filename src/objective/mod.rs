@@ -186,10 +186,7 @@ impl Problem {
                 .zip(&mut evaluation.predictions[e]);
             for (channel, predicted) in predictions {
                 channel.predict_into(view, predicted);
-                evaluation.misfit += match order {
-                    Order::Steps => channel.cost(predicted),
-                    Order::Blocks => channel.cost_in_lanes(predicted),
-                };
+                evaluation.misfit += channel.cost(predicted);
             }
         }
         Ok(())

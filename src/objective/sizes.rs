@@ -4,7 +4,6 @@ use super::Evaluation;
 use crate::dynamics::quadrature::curvature;
 use crate::dynamics::{Term, Trajectory};
 use crate::functions::Design;
-use crate::lanes::sum::dot;
 use crate::problem::Problem;
 
 impl Problem {
@@ -26,7 +25,7 @@ impl Problem {
                 motions.map(of).sum::<f64>().sqrt()
             };
             let mass = largest(&device.mass);
-            let inertia = mass * squares(&|e| dot(&accelerations[e], &accelerations[e]));
+            let inertia = mass * squares(&|e| sum_of_squares(&accelerations[e]));
             let natural = |j: usize| {
                 let response = squares(&|e| {
                     let Trajectory {
@@ -34,8 +33,8 @@ impl Problem {
                         velocity: v,
                     } = &evaluation.trajectories[e];
                     match self.oscillator.terms[j] {
-                        Term::Damping => dot(v, v),
-                        Term::Stiffness => dot(y, y),
+                        Term::Damping => sum_of_squares(v),
+                        Term::Stiffness => sum_of_squares(y),
                         term => {
                             let pairs = y.iter().zip(v);
                             pairs.map(|(y, v)| term.phi(*y, *v).powi(2)).sum()
@@ -95,4 +94,8 @@ fn largest(f: &[f64]) -> f64 {
     }
     let rest = rest.iter().map(|p| p.abs());
     rest.chain(most).fold(0.0, f64::max)
+}
+
+fn sum_of_squares(f: &[f64]) -> f64 {
+    f.iter().map(|x| x * x).sum()
 }

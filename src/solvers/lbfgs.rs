@@ -13,6 +13,8 @@ use super::line_search::{Line, weak_wolfe};
 use super::point::Work;
 use super::{Descend, Point, Step};
 use crate::functions::{Functions, Quantity};
+use crate::lanes::sum::dot;
+use crate::lanes::{self, Elementwise};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use std::collections::VecDeque;
@@ -26,13 +28,43 @@ const LONGEST_LOG_STEP: f64 = 1.0;
 pub struct Lbfgs {
     memory: usize,
     pairs: VecDeque<Pair>,
+    /// The point that the last step led to.
+    here: Option<Here>,
 }
 
-/// A step `s` and the change `z` of the gradient along it, in coordinates.
+/// A vector of coordinates `x` and its dual `G x`: inner products are sums of products of the two.
+struct Vector {
+    primal: Vec<f64>,
+    dual: Vec<f64>,
+}
+
+/// A step `s` and the change `z` of the gradient along it.
 struct Pair {
-    s: Vec<f64>,
-    z: Vec<f64>,
+    s: Vector,
+    z: Vector,
     curvature: f64,
+}
+
+/// What is known of a point in coordinates.
+struct Here {
+    parameters: Vec<f64>,
+    logarithmic: Vec<bool>,
+    x: Vec<f64>,
+    gradient: Vector,
+}
+
+impl Vector {
+    /// `x^T G x'`.
+    fn inner(&self, primal: &[f64]) -> f64 {
+        dot(&self.dual, primal)
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        Self {
+            primal: difference(&self.primal, &other.primal),
+            dual: difference(&self.dual, &other.dual),
+        }
+    }
 }
 
 impl Lbfgs {
@@ -40,13 +72,14 @@ impl Lbfgs {
         Self {
             memory,
             pairs: VecDeque::with_capacity(memory),
+            here: None,
         }
     }
 
     fn attempt(&mut self, work: &mut Work, at: &Coordinates, point: &Point) -> Option<Step> {
-        let gradient = at.gradient(point);
-        let direction = work.algebra(|| self.direction(at, &gradient));
-        let slope = at.inner(&gradient, &direction);
+        let Here { x, gradient, .. } = self.here(at, point);
+        let direction = work.algebra(|| self.direction(&gradient.primal));
+        let slope = gradient.inner(&direction);
         if slope.is_nan() || slope >= 0.0 {
             return None;
         }
@@ -58,11 +91,10 @@ impl Lbfgs {
         };
         let mut trials = Trials {
             at,
-            x: at.forth(&point.parameters),
+            x,
             direction: &direction,
             spare: Some(work.problem().workspace()),
             candidate: None,
-            last: 0.0,
             accepted: None,
             work,
         };
@@ -73,8 +105,24 @@ impl Lbfgs {
             slope,
             first.min(longest),
         )?;
-        let (length, next) = trials.accepted?;
-        work.algebra(|| self.remember(at, point, &next, &gradient));
+        let Accepted {
+            length,
+            x: next_x,
+            point: next,
+            gradient: next_gradient,
+        } = trials.accepted?;
+        let x = trials.x;
+        work.algebra(|| {
+            let s = difference(&next_x, &x);
+            let dual = at.functions.gram_multiply(&s);
+            self.remember(Vector { primal: s, dual }, next_gradient.minus(&gradient));
+        });
+        self.here = Some(Here {
+            parameters: next.parameters.clone(),
+            logarithmic: at.logarithmic.clone(),
+            x: next_x,
+            gradient: next_gradient,
+        });
         Some(Step::Moved {
             point: Box::new(next),
             length,
@@ -82,11 +130,24 @@ impl Lbfgs {
         })
     }
 
-    fn remember(&mut self, at: &Coordinates, before: &Point, after: &Point, gradient: &[f64]) {
-        let s = difference(&at.forth(&after.parameters), &at.forth(&before.parameters));
-        let z = difference(&at.gradient(after), gradient);
-        let curvature = at.inner(&s, &z);
-        let scale = (at.inner(&s, &s) * at.inner(&z, &z)).sqrt();
+    /// The point in coordinates, as the last step left it if it is still the same.
+    fn here(&mut self, at: &Coordinates, point: &Point) -> Here {
+        let same =
+            |here: &Here| here.parameters == point.parameters && here.logarithmic == at.logarithmic;
+        match self.here.take().filter(same) {
+            Some(here) => here,
+            None => Here {
+                parameters: point.parameters.clone(),
+                logarithmic: at.logarithmic.clone(),
+                x: at.forth(&point.parameters),
+                gradient: at.gradient(point),
+            },
+        }
+    }
+
+    fn remember(&mut self, s: Vector, z: Vector) {
+        let curvature = s.inner(&z.primal);
+        let scale = (s.inner(&s.primal) * z.inner(&z.primal)).sqrt();
         if curvature > LOST_CURVATURE * scale {
             if self.pairs.len() == self.memory {
                 self.pairs.pop_front();
@@ -96,21 +157,21 @@ impl Lbfgs {
     }
 
     /// The two-loop recursion, `-H g`.
-    fn direction(&self, at: &Coordinates, gradient: &[f64]) -> Vec<f64> {
+    fn direction(&self, gradient: &[f64]) -> Vec<f64> {
         let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
         let mut weights = Vec::with_capacity(self.pairs.len());
         for pair in self.pairs.iter().rev() {
-            let weight = at.inner(&pair.s, &q) / pair.curvature;
-            add_scaled(&mut q, -weight, &pair.z);
+            let weight = pair.s.inner(&q) / pair.curvature;
+            add_scaled(&mut q, -weight, &pair.z.primal);
             weights.push(weight);
         }
         if let Some(last) = self.pairs.back() {
-            let scale = last.curvature / at.inner(&last.z, &last.z);
+            let scale = last.curvature / last.z.inner(&last.z.primal);
             q.iter_mut().for_each(|q| *q *= scale);
         }
         for (pair, weight) in self.pairs.iter().zip(weights.into_iter().rev()) {
-            let back = at.inner(&pair.z, &q) / pair.curvature;
-            add_scaled(&mut q, weight - back, &pair.s);
+            let back = pair.z.inner(&q) / pair.curvature;
+            add_scaled(&mut q, weight - back, &pair.s.primal);
         }
         q
     }
@@ -168,18 +229,16 @@ impl<'p> Coordinates<'p> {
             .collect()
     }
 
-    /// The L2 gradient in these coordinates.
-    fn gradient(&self, point: &Point) -> Vec<f64> {
-        let chained: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
+    /// The gradient in these coordinates: L2, and Euclidean as its dual.
+    fn gradient(&self, point: &Point) -> Vector {
+        let dual: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
             .zip(&self.logarithmic)
             .map(|((g, p), log)| if *log { g * p } else { *g })
             .collect();
-        self.functions.gram_solve(&chained)
-    }
-
-    fn inner(&self, a: &[f64], b: &[f64]) -> f64 {
-        let weighted = self.functions.gram_multiply(b);
-        a.iter().zip(&weighted).map(|(a, b)| a * b).sum()
+        Vector {
+            primal: self.functions.gram_solve(&dual),
+            dual,
+        }
     }
 
     fn largest_log_change(&self, direction: &[f64]) -> f64 {
@@ -198,28 +257,46 @@ struct Trials<'a, 'w, 'q, 'p> {
     x: Vec<f64>,
     direction: &'a [f64],
     spare: Option<Evaluation>,
-    candidate: Option<(Vec<f64>, Evaluation)>,
-    /// Step of the last trial.
-    last: f64,
-    /// The lowest trial that lowered the cost enough, and its step.
-    accepted: Option<(f64, Point)>,
+    candidate: Option<Candidate>,
+    /// The lowest trial that lowered the cost enough.
+    accepted: Option<Accepted>,
+}
+
+/// A trial with its cost alone.
+struct Candidate {
+    length: f64,
+    x: Vec<f64>,
+    parameters: Vec<f64>,
+    evaluation: Evaluation,
+}
+
+/// A trial with its gradient.
+struct Accepted {
+    length: f64,
+    x: Vec<f64>,
+    point: Point,
+    gradient: Vector,
 }
 
 impl Line for Trials<'_, '_, '_, '_> {
-    fn cost(&mut self, a: f64) -> Option<f64> {
-        self.last = a;
+    fn cost(&mut self, length: f64) -> Option<f64> {
         let mut x = self.x.clone();
-        add_scaled(&mut x, a, self.direction);
+        add_scaled(&mut x, length, self.direction);
         let parameters = self.at.back(&x);
         let mut evaluation = match (self.spare.take(), self.candidate.take()) {
             (Some(spare), _) => spare,
-            (None, Some((_, used))) => used,
+            (None, Some(used)) => used.evaluation,
             (None, None) => self.work.problem().workspace(),
         };
         match self.work.evaluate_into(&parameters, &mut evaluation) {
             Ok(()) => {
                 let cost = evaluation.cost;
-                self.candidate = Some((parameters, evaluation));
+                self.candidate = Some(Candidate {
+                    length,
+                    x,
+                    parameters,
+                    evaluation,
+                });
                 Some(cost)
             }
             Err(_) => {
@@ -230,14 +307,22 @@ impl Line for Trials<'_, '_, '_, '_> {
     }
 
     fn slope(&mut self) -> f64 {
-        let Some((parameters, evaluation)) = self.candidate.take() else {
+        let Some(candidate) = self.candidate.take() else {
             return f64::NAN;
         };
-        let point = self.work.complete(parameters, evaluation);
-        let slope = self.at.inner(&self.at.gradient(&point), self.direction);
-        let lowest = self.accepted.as_ref().map(|(_, p)| p.evaluation.cost);
+        let point = self
+            .work
+            .complete(candidate.parameters, candidate.evaluation);
+        let gradient = self.at.gradient(&point);
+        let slope = gradient.inner(self.direction);
+        let lowest = self.accepted.as_ref().map(|a| a.point.evaluation.cost);
         if lowest.is_none_or(|lowest| point.evaluation.cost < lowest) {
-            self.accepted = Some((self.last, point));
+            self.accepted = Some(Accepted {
+                length: candidate.length,
+                x: candidate.x,
+                point,
+                gradient,
+            });
         }
         slope
     }
@@ -248,5 +333,9 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 fn add_scaled(a: &mut [f64], factor: f64, b: &[f64]) {
-    a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+    lanes::run(Elementwise(|| {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a += factor * b;
+        }
+    }));
 }

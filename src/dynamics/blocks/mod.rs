@@ -16,6 +16,8 @@ mod forward;
 mod scratch;
 mod squares;
 mod step;
+#[cfg(test)]
+mod tests;
 mod tile;
 
 use super::{Device, Excitation, Method, Oscillator, State, Term, Trajectory};
