@@ -1,7 +1,7 @@
 //! A point of the search, and the counted and timed work that makes one.
 
-use super::timings::{Timings, timed};
 use super::{FitSettings, Solver};
+use super::timings::{Timings, timed};
 use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
