@@ -51,8 +51,8 @@
 //!    roughness and variation; [`dynamics`] turns those into a motion, its linearisation, its adjoints.
 //! 4. [`objective`] is the cost of the parameters and its gradient, from one motion per point.
 //! 5. [`constraints`] turns statements about the functions into rows and cones in the parameters.
-//! 6. [`qp`] solves the convex subproblems: a sparse factorisation where no inequality is met, Clarabel
-//!    where one is.
+//! 6. [`qp`] solves the convex subproblems: where no inequality is met by an elimination along time or
+//!    a sparse factorisation, Clarabel where one is.
 //! 7. [`solvers`] searches: steepest descent, L-BFGS, projected gradient, Gauss–Newton; the ladder of
 //!    starts, the choice of a weight; and the equation error, which simulates nothing.
 //! 8. [`diagnostics`] says whether what is left is noise, and which of two models to prefer.

@@ -45,6 +45,14 @@ impl Rows {
         self.right.push(right);
     }
 
+    /// Makes room for so many further rows and entries.
+    pub fn reserve(&mut self, rows: usize, entries: usize) {
+        self.starts.reserve(rows + 1);
+        self.right.reserve(rows);
+        self.columns.reserve(entries);
+        self.values.reserve(entries);
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.right.len()

@@ -129,6 +129,19 @@ impl Functions {
         &self.ranges
     }
 
+    /// The first node at which each parameter matters; the scalars matter from the beginning.
+    pub fn first_nodes(&self) -> Vec<u32> {
+        let mut first = vec![0; self.scalar_range().end];
+        for (function, range) in self.list.iter().zip(&self.ranges) {
+            let own = &mut first[range.clone()];
+            for i in (0..self.nodes).rev() {
+                let row = function.design.row(i);
+                row.for_each(|(j, _)| own[j] = i as u32);
+            }
+        }
+        first
+    }
+
     /// The start of the search.
     pub fn start(&self) -> Vec<f64> {
         let functions = self.list.iter().flat_map(|f| f.start.iter().copied());

@@ -17,16 +17,17 @@ impl Design {
     /// Columns and values of row `i`.
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let unit = matches!(self, Design::Identity).then_some((i, 1.0));
-        let sparse = match self {
-            Design::Sparse(matrix) => matrix.get_row(i),
-            _ => None,
+        let (columns, values) = match self {
+            Design::Sparse(matrix) => {
+                let range = matrix.row_offsets()[i]..matrix.row_offsets()[i + 1];
+                (
+                    &matrix.col_indices()[range.clone()],
+                    &matrix.values()[range],
+                )
+            }
+            _ => (&[][..], &[][..]),
         };
-        let entries = sparse.into_iter().flat_map(|row| {
-            let columns = row.col_indices().iter().copied();
-            columns
-                .zip(row.values().iter().copied())
-                .collect::<Vec<_>>()
-        });
+        let entries = columns.iter().copied().zip(values.iter().copied());
         unit.into_iter().chain(entries)
     }
 

@@ -1,5 +1,6 @@
 //! The convex subproblem and its plain solution.
 
+use super::chain;
 use super::factor::Symmetric;
 use crate::constraints::{Cone, Rows};
 
@@ -27,6 +28,9 @@ pub struct Subproblem {
     pub upper: Vec<f64>,
     /// Second-order cones.
     pub cones: Vec<Cone>,
+    /// Where the variables stand along a chain, time mostly, in which rows join near ones only; empty
+    /// if no such order is known, or not of all variables.
+    pub stations: Vec<u32>,
 }
 
 impl Subproblem {
@@ -43,6 +47,7 @@ impl Subproblem {
             inequalities: Rows::new(),
             upper: Vec::new(),
             cones: Vec::new(),
+            stations: Vec::new(),
         }
     }
 
@@ -83,7 +88,8 @@ impl Subproblem {
     /// The minimiser without the inequalities and cones; `None` if it cannot be found to
     /// [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
     ///
-    /// Solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
+    /// Variables with [`Subproblem::stations`] are eliminated along them. For others, or where that fails,
+    /// solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
     /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, so that `F^T F` is never formed.
     pub fn solve_plain(&self) -> Option<Vec<f64>> {
         if !self.absolute.is_empty() {
@@ -96,6 +102,11 @@ impl Subproblem {
     /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
     /// factorisation; absolute values are left out.
     pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        chain::minimise(self, targets).or_else(|| self.solve_by_factor(targets))
+    }
+
+    /// [`Subproblem::solve_plain_for`] by one symmetric factorisation.
+    fn solve_by_factor(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let solutions = self.solve_conditions(targets)?.into_iter();
         let variables = solutions.map(|mut solution| {
             solution.truncate(self.variables);
@@ -129,6 +140,39 @@ impl Subproblem {
         let exact = |(solution, residual)| (residual <= Self::PLAIN_RESIDUAL).then_some(solution);
         solutions.map(exact).collect()
     }
+
+    /// A plain minimum that satisfies the inequalities to `tolerance`, with those held as equalities that
+    /// `z`, a plain minimum itself, or one of the minima on the way breaks. None of them is let go again, so it
+    /// need not be the minimum under the inequalities. `None` if a few rounds do not get there, or
+    /// there are cones.
+    pub fn solve_held(&self, mut z: Vec<f64>, tolerance: f64) -> Option<Vec<f64>> {
+        if !self.cones.is_empty() {
+            return None;
+        }
+        let mut held = self.clone();
+        let mut taken = vec![false; self.inequalities.len()];
+        for _ in 0..Self::HOLDING_ROUNDS {
+            let mut inside = true;
+            for (i, value) in self.inequalities.multiply(&z).into_iter().enumerate() {
+                let slack = tolerance * self.inequalities.scale(i).max(f64::MIN_POSITIVE);
+                let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
+                if !taken[i] && (value < lower - slack || value > upper + slack) {
+                    let bound = if value < lower { lower } else { upper };
+                    held.equalities.push(self.inequalities.row(i), bound);
+                    taken[i] = true;
+                    inside = false;
+                }
+            }
+            if inside {
+                return Some(z);
+            }
+            z = held.solve_plain()?;
+        }
+        None
+    }
+
+    /// Most rounds of [`Subproblem::solve_held`]: what is not inside by then is left to a program.
+    const HOLDING_ROUNDS: usize = 10;
 
     /// The same problem in the variables `z_j / units_j`.
     #[must_use]

@@ -65,6 +65,7 @@ pub(super) fn from_motions(
 ) -> Result<Vec<f64>, ConicStatus> {
     let start = &with_initial_states(problem, start, motions);
     let mut sub = Subproblem::new(problem.parameters());
+    sub.stations = problem.functions.first_nodes();
     let mut experiments = Vec::new();
     for (experiment, motion) in problem.experiments.iter().zip(motions) {
         experiments.push(motion.as_ref().map(|motion| {

@@ -3,8 +3,8 @@
 //! Each iteration minimises the linearised cost plus `damping * J * sum_f 1/T integral (delta p_f /
 //! size of p_f)^2 dt` under the linearised constraints. The plain step, one sparse factorisation, is
 //! taken where it stays in the set; where it leaves a set of simple bounds, the clipped step is
-//! taken if it is nearly as good as the plain one, which no step in the set can beat; only
-//! otherwise a quadratic program is solved.
+//! taken if it is nearly as good as the plain one, which no step in the set can beat, or else the plain
+//! step with those bounds held that it meets; only otherwise a quadratic program is solved.
 
 mod dense;
 mod structured;
@@ -189,6 +189,16 @@ fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
                 return Answer::Step(Proposal {
                     parameters,
                     predicted,
+                });
+            }
+            let near = 0.1 * constraints::TOLERANCE;
+            let held = work.algebra(|| sub.solve_held(z.clone(), near));
+            if let Some(z) = held
+                && cost - sub.value(&z) >= CLIPPED * best
+            {
+                return Answer::Step(Proposal {
+                    parameters: moved(&z),
+                    predicted: cost - sub.value(&z),
                 });
             }
         }

@@ -2,11 +2,14 @@
 //! of nodes, for functions with many parameters.
 
 use crate::constraints::Rows;
-use crate::dynamics::{StepJacobian, Trajectory};
+use crate::dynamics::{ChannelKind, StepJacobian, Trajectory};
 use crate::objective::{Channel, Evaluation, View};
 use crate::problem::{Experiment, Problem};
 use crate::qp::Subproblem;
 use crate::signal::SecondOrder;
+
+/// Entries of a linearised step to make room for: three states, three functions at both ends.
+const ENTRIES: usize = 9;
 
 /// Every step of every experiment, linearised.
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
@@ -32,6 +35,11 @@ pub fn subproblem(
     let parameters = problem.parameters();
     let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
     let mut sub = Subproblem::new(parameters + states);
+    sub.stations = problem.functions.first_nodes();
+    for experiment in &problem.experiments {
+        let nodes = 1..experiment.nodes as u32;
+        sub.stations.extend(nodes.flat_map(|i| [i, i]));
+    }
     let mut base = parameters;
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
@@ -73,6 +81,7 @@ impl Columns<'_> {
 
     fn add_steps(&self, steps: &[StepJacobian], states: &Trajectory, equalities: &mut Rows) {
         let mut entries = Vec::new();
+        equalities.reserve(2 * steps.len(), 2 * steps.len() * ENTRIES);
         for (i, step) in steps.iter().enumerate() {
             let ends = [step.end.displacement, step.end.velocity];
             let next = [states.displacement[i + 1], states.velocity[i + 1]];
@@ -118,10 +127,16 @@ impl Columns<'_> {
 
     fn add_readings(&self, channel: &Channel, predicted: &[f64], view: View, sub: &mut Subproblem) {
         let [gain, ..] = channel.sensor().values(view.scalars);
-        let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(channel.len());
-        for (i, place) in channel.places().iter().enumerate() {
+        // A displacement at a node by a known sensor is the state itself.
+        let known = channel.sensor().indices().iter().all(Option::is_none);
+        let plain = known && channel.kind() == ChannelKind::Displacement;
+        let row = |i: usize, entries: &mut Vec<(usize, f64)>| {
+            let place = channel.places()[i];
+            if let Some(node) = plain.then(|| place.as_node()).flatten() {
+                entries.extend(self.state(node, 0).map(|index| (index, gain)));
+                return;
+            }
             let sensed = channel.sensed(view, i);
-            let mut entries = Vec::new();
             for (j, slope) in sensed.states.iter().enumerate() {
                 if *slope != 0.0 {
                     let index = self.state(place.step + j / 2, j % 2);
@@ -129,22 +144,29 @@ impl Columns<'_> {
                 }
             }
             let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
-            self.add_function_slopes(place.step, &slope, &mut entries);
+            self.add_function_slopes(place.step, &slope, entries);
             let factors = [sensed.value, 1.0, channel.age(i)];
             for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
                 entries.extend(index.map(|index| (self.scalar(index), factor)));
             }
-            rows.push(entries);
-        }
+        };
         let residuals = channel.residuals(predicted).enumerate();
         if channel.filter().is_empty() {
-            for ((i, r), row) in residuals.zip(rows) {
+            let mut entries = Vec::new();
+            for (i, r) in residuals {
+                entries.clear();
+                row(i, &mut entries);
                 let root = channel.weight(i, r).sqrt();
-                let row = row.into_iter().map(|(j, a)| (j, root * a));
+                let row = entries.iter().map(|(j, a)| (*j, root * a));
                 sub.residuals.push(row, -root * r);
             }
         } else {
-            let filtered = add_filter(channel.filter(), rows, sub);
+            let rows = (0..channel.len()).map(|i| {
+                let mut entries = Vec::new();
+                row(i, &mut entries);
+                entries
+            });
+            let filtered = add_filter(channel.filter(), rows.collect(), sub);
             for ((i, r), index) in residuals.zip(filtered) {
                 let root = channel.weight(i, r).sqrt();
                 sub.residuals.push([(index, root)], -root * r);
@@ -155,7 +177,8 @@ impl Columns<'_> {
 
 /// Adds the filtered changes of the predictions as unknowns: every section is a recurrence, run
 /// forward over the record for all sections and then backward, from rest. Returns the index of each
-/// filtered prediction.
+/// filtered prediction. Recurrences that run both ways leave the variables no order in which each
+/// follows from those before.
 fn add_filter(
     filter: &[SecondOrder],
     rows: Vec<Vec<(usize, f64)>>,
@@ -163,6 +186,7 @@ fn add_filter(
 ) -> Vec<usize> {
     let mut signal = rows;
     let mut indices = Vec::new();
+    sub.stations.clear();
     for backward in [false, true] {
         if backward {
             signal.reverse();

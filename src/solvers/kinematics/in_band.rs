@@ -81,6 +81,7 @@ impl Band {
         let n = series.first()?.len();
         let h = self.spacing;
         let mut sub = Subproblem::new(n);
+        sub.stations = (0..n as u32).collect();
         for i in 1..n - 1 {
             sub.residuals
                 .push([(i - 1, 1.0), (i, -2.0), (i + 1, 1.0)], 0.0);

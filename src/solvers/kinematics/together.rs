@@ -192,6 +192,7 @@ fn differences(x: f64, first: usize, step: f64) -> [Vec<f64>; 3] {
 /// The displacement at the nodes.
 fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Option<Vec<f64>> {
     let mut sub = Subproblem::new(nodes);
+    sub.stations = (0..nodes as u32).collect();
     let mut count = 0.0;
     for plain in channels {
         for (i, (place, value)) in plain.channel.places().iter().zip(&plain.values).enumerate() {

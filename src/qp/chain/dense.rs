@@ -1,0 +1,98 @@
+//! Small dense rows on top of each other.
+
+/// Rows of equal length.
+#[derive(Default)]
+pub struct Dense {
+    length: usize,
+    count: usize,
+    values: Vec<f64>,
+}
+
+impl Dense {
+    /// No rows, of `length` numbers each.
+    pub fn clear(&mut self, length: usize) {
+        self.length = length;
+        self.truncate(0);
+    }
+
+    pub fn truncate(&mut self, count: usize) {
+        self.count = count;
+        self.values.truncate(count * self.length);
+    }
+
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Adds a row of zeros.
+    pub fn add(&mut self) -> &mut [f64] {
+        let first = self.values.len();
+        self.count += 1;
+        self.values.resize(first + self.length, 0.0);
+        &mut self.values[first..]
+    }
+
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.values[i * self.length..(i + 1) * self.length]
+    }
+
+    pub fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self.values[i * self.length..(i + 1) * self.length]
+    }
+
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        // chunks_exact_mut does not take zero, the length before the first row.
+        self.values.chunks_exact_mut(self.length.max(1))
+    }
+
+    /// All rows but the last one, and that; there must be one.
+    pub fn split_last(&mut self) -> (impl Iterator<Item = &mut [f64]>, &[f64]) {
+        let last = (self.count - 1) * self.length;
+        let (rest, last) = self.values.split_at_mut(last);
+        (rest.chunks_exact_mut(self.length), last)
+    }
+
+    pub fn swap(&mut self, i: usize, j: usize) {
+        if i != j {
+            let (low, high) = (i.min(j), i.max(j));
+            let (head, tail) = self.values.split_at_mut(high * self.length);
+            head[low * self.length..][..self.length].swap_with_slice(&mut tail[..self.length]);
+        }
+    }
+
+    /// Reflects the rows `active`, of which the first becomes the only one with an entry in `column`
+    /// and of which none has an entry before it.
+    pub fn reflect(&mut self, active: &[usize], column: usize, sums: &mut Vec<f64>) {
+        let first = self.row(active[0])[column];
+        let squares = active.iter().map(|i| self.row(*i)[column].powi(2));
+        let norm = squares.sum::<f64>().sqrt();
+        let diagonal = if first > 0.0 { -norm } else { norm };
+        // I - v v' / (norm (norm + |first|)) with v the column less the diagonal in its first row.
+        let weight = 1.0 / (norm * (norm + first.abs()));
+        self.row_mut(active[0])[column] = first - diagonal;
+        sums.clear();
+        sums.resize(self.length - column - 1, 0.0);
+        for &i in active {
+            let (head, tail) = self.row(i)[column..].split_at(1);
+            let factor = weight * head[0];
+            for (sum, a) in sums.iter_mut().zip(tail) {
+                *sum += factor * a;
+            }
+        }
+        for &i in active {
+            let (head, tail) = self.row_mut(i)[column..].split_at_mut(1);
+            for (a, sum) in tail.iter_mut().zip(&*sums) {
+                *a -= head[0] * sum;
+            }
+            head[0] = 0.0;
+        }
+        self.row_mut(active[0])[column] = diagonal;
+    }
+}
+
+/// `row += factor * other`.
+pub fn add_multiple(row: &mut [f64], factor: f64, other: &[f64]) {
+    for (a, b) in row.iter_mut().zip(other) {
+        *a += factor * b;
+    }
+}
