@@ -295,6 +295,22 @@ impl Channel {
             && self.filter.is_empty()
     }
 
+    /// Whether all readings are displacements at nodes.
+    pub(super) fn is_displacement_at_nodes(&self) -> bool {
+        let all = || self.places.iter().all(|p| p.as_node().is_some());
+        self.kind == ChannelKind::Displacement && (self.on_every_node || all())
+    }
+
+    /// Whether reading `i` is the acceleration at node `i`.
+    pub(super) fn is_acceleration_on_nodes(&self) -> bool {
+        self.kind == ChannelKind::Acceleration && self.on_every_node
+    }
+
+    /// What the filter makes of a series over the readings.
+    pub(super) fn filtered(&self, series: &[f64]) -> Vec<f64> {
+        zero_phase(&self.filter, series)
+    }
+
     /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
     /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
     pub fn stride(&self) -> Option<usize> {

@@ -2,6 +2,7 @@
 
 mod channel;
 mod gradient;
+mod jacobian;
 mod loss;
 mod refine;
 mod sensor;
