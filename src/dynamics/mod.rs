@@ -18,6 +18,7 @@ mod forward;
 mod grid;
 mod maps;
 pub mod quadrature;
+mod rates;
 mod sense;
 mod sense_nodes;
 mod stages;
@@ -29,6 +30,7 @@ mod term;
 mod window;
 
 pub(crate) use maps::FUNCTIONS;
+pub(crate) use sense_nodes::Accelerations;
 pub(crate) use tangents::{Course, Slot, TILE, TILE_NODES, Tangents};
 
 pub use device::{Device, State};

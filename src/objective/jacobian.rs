@@ -22,6 +22,27 @@ impl Problem {
             }
             row += count;
         }
+        match jacobian.iter().fold(true, |all, x| all & x.is_finite()) {
+            true => jacobian,
+            false => self.jacobian_by_columns(evaluation),
+        }
+    }
+
+    /// One direction after the other: for numbers at the ends of their range, where the order of the
+    /// operations decides what is still finite.
+    fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut unit = vec![0.0; self.parameters()];
+        for (j, mut column) in jacobian.column_iter_mut().enumerate() {
+            unit[j] = 1.0;
+            let changes = self.predictions_tangent(evaluation, &unit);
+            unit[j] = 0.0;
+            let all = changes.iter().flatten().flatten();
+            column
+                .iter_mut()
+                .zip(all)
+                .for_each(|(a, change)| *a = *change);
+        }
         jacobian
     }
 }
