@@ -28,6 +28,7 @@ impl Maps {
 }
 
 /// Where the functions are looked at: the three [`Position`]s.
+#[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
 
 impl<A: Arithmetic> Places<A> {
@@ -91,6 +92,12 @@ fn by<A: Arithmetic, const S: usize>(
     let force = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
     let base = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
 
+    let nothing = Places([zero; 3]);
+    let mut functions = [nothing; MOST_TERMS];
+    for (places, values) in functions.iter_mut().zip(&rhs.device.coefficients) {
+        *places = Places::of(arithmetic, values, i);
+    }
+
     // Forwards: the stages, their slopes, and how the acceleration answers to each function.
     let y0 = Eight::load(arithmetic, &window::row(&motion.displacement, i));
     let v0 = Eight::load(arithmetic, &window::row(&motion.velocity, i));
@@ -109,8 +116,8 @@ fn by<A: Arithmetic, const S: usize>(
         v[s] = v_s;
         let per_mass = per_mass.at(position);
         let mut push = force.at(position);
-        for (j, term) in rhs.terms.iter().enumerate() {
-            let p = Places::of(arithmetic, &rhs.device.coefficients[j], i).at(position);
+        for (j, term) in rhs.terms.iter().enumerate().take(MOST_TERMS) {
+            let p = functions[j].at(position);
             let response = term.respond(arithmetic, y_s, v_s);
             push = push - p * response.phi;
             by_y[s] = by_y[s] - p * response.by_y;

@@ -38,17 +38,18 @@ impl Oscillator {
         let mut seen = Accelerations::NOTHING;
         let mut from = nodes.start;
         while from < nodes.end {
-            let mut driven = [[0.0; LANES]; 2];
-            for l in 0..LANES.min(nodes.end - from) {
-                let Surroundings { force, base } = around(from + l);
-                (driven[0][l], driven[1][l]) = (force, base);
+            let [mut forces, mut bases] = [[0.0; LANES]; 2];
+            let rows = forces.iter_mut().zip(&mut bases);
+            for (node, (to_force, to_base)) in (from..nodes.end).zip(rows) {
+                let Surroundings { force, base } = around(node);
+                (*to_force, *to_base) = (force, base);
             }
             lanes::run(Sense {
                 oscillator: self,
                 device,
                 states,
                 from,
-                driven,
+                driven: [forces, bases],
                 seen: &mut seen,
             });
             give(from, &seen);

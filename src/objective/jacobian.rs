@@ -22,7 +22,8 @@ impl Problem {
             }
             row += count;
         }
-        match jacobian.iter().fold(true, |all, x| all & x.is_finite()) {
+        let entries = jacobian.as_slice().iter();
+        match entries.fold(true, |all, x| all & x.is_finite()) {
             true => jacobian,
             false => self.jacobian_by_columns(evaluation),
         }

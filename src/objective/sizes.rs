@@ -17,23 +17,19 @@ impl Problem {
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.assemblies().iter().enumerate() {
             let device = evaluation.device_of(which);
-            let squares = |f: &dyn Fn(usize, usize) -> f64| -> f64 {
-                let takes_part = |e: &usize| self.experiments[*e].device == which;
-                let motions = (0..self.experiments.len()).filter(takes_part);
-                let each = motions.map(|e| {
-                    (0..self.experiments[e].nodes)
-                        .map(|i| f(e, i).powi(2))
-                        .sum::<f64>()
-                });
-                each.sum::<f64>().sqrt()
-            };
+            let motions =
+                || (0..self.experiments.len()).filter(|e| self.experiments[*e].device == which);
+            let squares = motions().map(|e| sum_of_squares(accelerations[e].iter().copied()));
             let mass = largest(&device.mass);
-            let inertia = mass * squares(&|e, i| accelerations[e][i]);
+            let inertia = mass * squares.sum::<f64>().sqrt();
             let natural = |j: usize| {
-                let response = squares(&|e, i| {
+                let term = self.oscillator.terms[j];
+                let squares = motions().map(|e| {
                     let motion = &evaluation.trajectories[e];
-                    self.oscillator.terms[j].phi(motion.displacement[i], motion.velocity[i])
+                    let states = motion.displacement.iter().zip(&motion.velocity);
+                    sum_of_squares(states.map(|(y, v)| term.phi(*y, *v)))
                 });
+                let response = squares.sum::<f64>().sqrt();
                 match response > 0.0 {
                     true => inertia / response,
                     false => 0.0,
@@ -74,4 +70,8 @@ impl Problem {
 
 fn largest(f: &[f64]) -> f64 {
     f.iter().fold(0.0f64, |most, p| most.max(p.abs()))
+}
+
+fn sum_of_squares(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|x| x * x).sum()
 }

@@ -23,17 +23,20 @@ impl Linearised {
         let mut residuals = Vec::with_capacity(problem.reading_count());
         for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
             for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-                let uniform = channel.uniform_weights();
-                let last = channel.len() - 1;
-                for (i, r) in channel.residuals(predicted).enumerate() {
-                    let weight = match uniform {
-                        Some([inner, _]) if 0 < i && i < last => inner,
-                        _ => channel.weight(i, r),
-                    };
-                    let root = weight.sqrt();
-                    roots.push(root);
-                    residuals.push(root * r);
+                let first = roots.len();
+                match channel.uniform_weights() {
+                    Some([inner, ends]) => {
+                        roots.resize(first + channel.len(), inner.sqrt());
+                        let last = roots.len() - 1;
+                        (roots[first], roots[last]) = (ends.sqrt(), ends.sqrt());
+                    }
+                    None => {
+                        let each = channel.residuals(predicted).enumerate();
+                        roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
+                    }
                 }
+                let weighted = channel.residuals(predicted).zip(&roots[first..]);
+                residuals.extend(weighted.map(|(r, root)| root * r));
             }
         }
         Self {
