@@ -63,11 +63,6 @@ impl Tangents {
         }
     }
 
-    /// What changes.
-    pub fn slots(&self) -> &[Slot] {
-        &self.slots
-    }
-
     /// The change of a slot's function at the nodes of the tile, along each direction of its group.
     pub fn changes_mut(&mut self, slot: usize) -> &mut [Row; TILE_NODES] {
         &mut self.changes[slot]
@@ -170,9 +165,8 @@ fn carry<A: Arithmetic>(
             }
         }
         let mut increment = push;
-        for end in 0..2 {
-            let [by_y, by_v] = &maps.growth[end];
-            increment[end] +=
+        for (increment, [by_y, by_v]) in increment.iter_mut().zip(&maps.growth) {
+            *increment +=
                 Eight::splat(arithmetic, by_y[l]) * y + Eight::splat(arithmetic, by_v[l]) * v;
         }
         y += increment[0];

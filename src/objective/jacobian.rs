@@ -376,13 +376,13 @@ impl Kernel for Answer<'_> {
         let gain = Eight::splat(arithmetic, self.gain);
         for g in 0..groups {
             let mut answers = [[0.0; LANES]; LANES];
-            for l in 0..self.glance.count {
+            for (l, row) in answers.iter_mut().enumerate().take(self.glance.count) {
                 let step = self.glance.steps[l];
                 let answer = match self.kind {
                     Kind::Nodes => Eight::load(arithmetic, &self.tangents.states(g)[step][0]),
                     Kind::Accelerations | Kind::Any => self.at_step(arithmetic, g, l),
                 };
-                answers[l] = (gain * answer).row();
+                *row = (gain * answer).row();
             }
             let answers = arithmetic.transpose(&answers);
             let columns = self.columns.chunks_exact_mut(self.height);

@@ -176,8 +176,8 @@ impl Reflector<'_> {
             return;
         };
         let mut sums = [Eight::splat(arithmetic, 0.0); J];
-        for h in 0..HIGH {
-            let x = Eight::load(arithmetic, &self.column[h]);
+        for (h, x) in self.column.iter().enumerate() {
+            let x = Eight::load(arithmetic, x);
             for j in 0..J {
                 sums[j] += x * Eight::load(arithmetic, &columns[j][h]);
             }
@@ -188,8 +188,8 @@ impl Reflector<'_> {
         }
         let lanes = arithmetic.transpose(&rows);
         let mut sum = Eight::load(arithmetic, &lanes[0]);
-        for l in 1..LANES {
-            sum += Eight::load(arithmetic, &lanes[l]);
+        for lane in &lanes[1..] {
+            sum += Eight::load(arithmetic, lane);
         }
         let sum = sum.row();
         let mut shares = [Eight::splat(arithmetic, 0.0); J];
@@ -198,8 +198,8 @@ impl Reflector<'_> {
             tops[j] -= share * self.top;
             shares[j] = Eight::splat(arithmetic, share);
         }
-        for h in 0..HIGH {
-            let x = Eight::load(arithmetic, &self.column[h]);
+        for (h, x) in self.column.iter().enumerate() {
+            let x = Eight::load(arithmetic, x);
             for j in 0..J {
                 columns[j][h] = (Eight::load(arithmetic, &columns[j][h]) - shares[j] * x).row();
             }
