@@ -95,36 +95,46 @@ fn triad() {
     );
 }
 
-/// Median times over as many evaluations as take `seconds`, and the memory at its peak.
+/// Median times over as many evaluations as take `seconds`, and the memory at the peak of those of
+/// cost and gradient together.
 fn evaluation(nodes: usize, seconds: f64) {
     let problem = common::paper(nodes);
     let theta = problem.start();
-    let mut point = problem.workspace();
+    let mut gradient = vec![0.0; theta.len()];
     // The memory that it took to make the problem is not that of an evaluation.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
-    let (mut sweeps, mut gradients, mut both) = (Vec::new(), Vec::new(), Vec::new());
-    let start = Instant::now();
-    while both.len() < 5 || start.elapsed().as_secs_f64() < seconds {
-        let clock = Instant::now();
+    let mut cost = f64::NAN;
+    let both = repeated(seconds, || {
+        cost = problem
+            .cost_and_gradient(black_box(&theta), &mut gradient)
+            .expect("a motion");
+    });
+    let peak = peak_bytes();
+    let mut point = problem.workspace();
+    let sweeps = repeated(0.3 * seconds, || {
         let ok = problem.evaluate_into(black_box(&theta), &mut point);
         ok.expect("a motion");
-        let sweep = clock.elapsed().as_secs_f64();
+    });
+    let gradients = repeated(0.3 * seconds, || {
         black_box(problem.gradient(&theta, &point, GradientKind::Discrete));
-        let total = clock.elapsed().as_secs_f64();
-        sweeps.push(sweep);
-        gradients.push(total - sweep);
-        both.push(total);
-    }
+    });
     println!(
-        "{{\"nodes\": {nodes}, \"evaluations\": {}, \"seconds\": {:.6e}, \"cost_seconds\": {:.6e}, \
-         \"gradient_seconds\": {:.6e}, \"cost\": {:.12e}, \"peak_bytes\": {}}}",
-        both.len(),
-        median(&mut both),
-        median(&mut sweeps),
-        median(&mut gradients),
-        point.cost,
-        peak_bytes().map_or("null".into(), |bytes| bytes.to_string()),
+        "{{\"nodes\": {nodes}, \"seconds\": {both:.6e}, \"cost_seconds\": {sweeps:.6e}, \
+         \"gradient_seconds\": {gradients:.6e}, \"cost\": {cost:.12e}, \"peak_bytes\": {}}}",
+        peak.map_or("null".into(), |bytes| bytes.to_string()),
     );
+}
+
+/// Median time of one call over as many as take `seconds`, at least five.
+fn repeated(seconds: f64, mut call: impl FnMut()) -> f64 {
+    let mut times = Vec::new();
+    let start = Instant::now();
+    while times.len() < 5 || start.elapsed().as_secs_f64() < seconds {
+        let clock = Instant::now();
+        call();
+        times.push(clock.elapsed().as_secs_f64());
+    }
+    median(&mut times)
 }
 
 fn study(starts: usize, threads: usize) {

@@ -27,6 +27,7 @@ mod tableau;
 mod tangent;
 mod tangents;
 mod term;
+mod trials;
 mod window;
 
 pub(crate) use maps::FUNCTIONS;
@@ -42,6 +43,7 @@ pub use step_jacobian::{StateChange, StepJacobian};
 pub use tableau::Method;
 pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
+pub(crate) use trials::{Ray, Trials};
 
 /// What the blocks of linear motions are computed with on this processor: `AVX-512`, `AVX2` or `scalar`.
 /// All give the same bits.

@@ -1,5 +1,7 @@
 //! Sums and differences on an equally spaced grid, in the paper's order of operations.
 
+use crate::lanes::{self, Elementwise};
+
 /// Trapezoid rule for values at the nodes: `dt/2 (f_0 + f_last)`, then the inner nodes in order.
 pub fn trapezoid(f: &[f64], dt: f64) -> f64 {
     let Some((&last, _)) = f.split_last() else {
@@ -37,10 +39,9 @@ pub fn trapezoid_weights_at(times: &[f64]) -> Vec<f64> {
 /// If there are fewer than two values.
 pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
     let last = f.len() - 1;
-    let mut d = Vec::with_capacity(f.len());
-    d.push((-f[0] + f[1]) / dt);
-    d.extend(f.windows(3).map(|w| 0.5 * (-w[0] + w[2]) / dt));
-    d.push((f[last] - f[last - 1]) / dt);
+    let mut d = inner(f, Difference::Slope(dt));
+    d[0] = (-f[0] + f[1]) / dt;
+    d[last] = (f[last] - f[last - 1]) / dt;
     d
 }
 
@@ -49,12 +50,48 @@ pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
 /// # Panics
 /// If there are fewer than three values.
 pub fn curvature(f: &[f64], dt: f64) -> Vec<f64> {
-    let second = |a: f64, b: f64, c: f64| (a - 2.0 * b + c) / dt / dt;
     let last = f.len() - 1;
-    let mut d = Vec::with_capacity(f.len());
-    d.push(second(f[0], f[1], f[2]));
-    d.extend(f.windows(3).map(|w| second(w[0], w[1], w[2])));
-    d.push(second(f[last], f[last - 1], f[last - 2]));
+    let mut d = inner(f, Difference::Curvature(dt));
+    d[0] = second(f[0], f[1], f[2], dt);
+    d[last] = second(f[last], f[last - 1], f[last - 2], dt);
+    d
+}
+
+/// The means of neighbours, one less than there are values.
+pub fn midpoints(f: &[f64]) -> Vec<f64> {
+    let mut means = vec![0.0; f.len().saturating_sub(1)];
+    lanes::run(Elementwise(|| {
+        for (mean, pair) in means.iter_mut().zip(f.windows(2)) {
+            *mean = (pair[1] + pair[0]) * 0.5;
+        }
+    }));
+    means
+}
+
+#[inline(always)]
+fn second(a: f64, b: f64, c: f64, dt: f64) -> f64 {
+    (a - 2.0 * b + c) / dt / dt
+}
+
+/// A difference of neighbours.
+#[derive(Clone, Copy)]
+enum Difference {
+    Slope(f64),
+    Curvature(f64),
+}
+
+/// A difference at all nodes but the ends.
+fn inner(f: &[f64], difference: Difference) -> Vec<f64> {
+    let mut d = vec![0.0; f.len()];
+    lanes::run(Elementwise(|| {
+        let inner = d[1..].iter_mut().zip(f.windows(3));
+        match difference {
+            Difference::Slope(dt) => inner.for_each(|(d, w)| *d = 0.5 * (-w[0] + w[2]) / dt),
+            Difference::Curvature(dt) => {
+                inner.for_each(|(d, w)| *d = second(w[0], w[1], w[2], dt));
+            }
+        }
+    }));
     d
 }
 

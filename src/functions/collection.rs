@@ -1,6 +1,6 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
-use super::{CoefficientFunction, Gram, Scalar};
+use super::{CoefficientFunction, Design, Gram, Scalar};
 use crate::dynamics::Device;
 use crate::dynamics::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
@@ -279,13 +279,19 @@ impl Functions {
     /// node, plus `T x^2` for each scalar: G^2 of the paper when `theta` is the L2 gradient.
     pub fn norm_squared(&self, theta: &[f64]) -> f64 {
         let mut squares = vec![0.0; self.nodes];
-        let mut values = vec![0.0; self.nodes];
+        let mut values = Vec::new();
         for (function, range) in self.list.iter().zip(&self.ranges) {
-            values.fill(0.0);
-            function
-                .design
-                .multiply_add(&theta[range.clone()], &mut values);
-            for (sum, value) in squares.iter_mut().zip(&values) {
+            let theta = &theta[range.clone()];
+            let values = match &function.design {
+                Design::Identity => theta,
+                design => {
+                    values.clear();
+                    values.resize(self.nodes, 0.0);
+                    design.multiply_add(theta, &mut values);
+                    &values
+                }
+            };
+            for (sum, value) in squares.iter_mut().zip(values) {
                 *sum += value * value;
             }
         }

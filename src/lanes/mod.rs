@@ -127,6 +127,19 @@ pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
+/// A plain loop over numbers that do not wait for each other, compiled for the widest arithmetic by
+/// the compiler itself.
+pub(crate) struct Elementwise<F: FnOnce()>(pub F);
+
+impl<F: FnOnce()> Kernel for Elementwise<F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, _: A) {
+        (self.0)();
+    }
+}
+
 /// The name of the arithmetic that [`run`] uses on this processor.
 pub(crate) fn name() -> &'static str {
     #[cfg(target_arch = "x86_64")]

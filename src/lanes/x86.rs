@@ -1,9 +1,9 @@
 //! Eight lanes on x86-64: one register of AVX-512 or two of AVX2.
 
 use super::{Arithmetic, Kernel, LANES, Row};
-use pulp::x86::{V3, V4};
 use pulp::NullaryFnOnce;
 use pulp::bytemuck::cast;
+use pulp::x86::{V3, V4};
 use std::arch::x86_64::{__m256d, __m512d};
 
 /// AVX-512.

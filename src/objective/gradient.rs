@@ -3,6 +3,7 @@
 use super::Evaluation;
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::dynamics::{Device, State, Trajectory, adjoint};
+use crate::functions::{CoefficientFunction, Design};
 use crate::problem::Problem;
 
 /// Which adjoint computes the gradient.
@@ -42,20 +43,23 @@ impl Problem {
     /// # Panics
     /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
-        let (mut euclidean, mut l2) = match kind {
+        let (euclidean, l2) = match kind {
             GradientKind::Discrete => {
-                let euclidean = self.discrete_gradient(evaluation);
+                let euclidean = self.euclidean_gradient(theta, evaluation);
                 let l2 = self.functions.gram_solve(&euclidean);
                 (euclidean, l2)
             }
-            GradientKind::Continuous => self.continuous_gradient(evaluation),
+            GradientKind::Continuous => {
+                let (mut euclidean, mut l2) = self.continuous_gradient(evaluation);
+                if self.is_regularised() {
+                    let push = self.penalty_gradient(theta);
+                    let push_l2 = self.functions.gram_solve(&push);
+                    euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
+                    l2.iter_mut().zip(&push_l2).for_each(|(g, p)| *g += p);
+                }
+                (euclidean, l2)
+            }
         };
-        if self.is_regularised() {
-            let push = self.penalty_gradient(theta);
-            let push_l2 = self.functions.gram_solve(&push);
-            euclidean.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
-            l2.iter_mut().zip(&push_l2).for_each(|(g, p)| *g += p);
-        }
         let norm_squared = self.functions.norm_squared(&l2);
         Gradient {
             euclidean,
@@ -64,7 +68,18 @@ impl Problem {
         }
     }
 
-    fn is_regularised(&self) -> bool {
+    /// `dJ/dtheta` by the discrete adjoint at an evaluated point.
+    pub fn euclidean_gradient(&self, theta: &[f64], evaluation: &Evaluation) -> Vec<f64> {
+        let mut gradient = self.discrete_gradient(evaluation);
+        if self.is_regularised() {
+            let push = self.penalty_gradient(theta);
+            gradient.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
+        }
+        gradient
+    }
+
+    /// Whether the cost has parts beside the misfit.
+    pub fn is_regularised(&self) -> bool {
         let priors = self.functions.scalars().iter().any(|s| s.prior.is_some());
         priors || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
     }
@@ -148,10 +163,23 @@ impl Problem {
             add(&mut nodal[experiment.device], &share.device);
             add_initial(experiment.sought, share.initial, &mut scalars);
         }
-        let mut euclidean = vec![0.0; self.parameters()];
-        euclidean[self.functions.scalar_range()].copy_from_slice(&scalars);
         let grid = &self.oscillator.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
+        let identity = |f: &CoefficientFunction| matches!(f.design, Design::Identity);
+        if let ([total], true) = (nodal.as_slice(), self.functions.iter().all(identity)) {
+            // One value per node: the functions themselves, without a round trip through the weights.
+            let mut l2 = Vec::with_capacity(self.parameters());
+            let mut euclidean = Vec::with_capacity(self.parameters());
+            for values in total.functions() {
+                l2.extend_from_slice(values);
+                euclidean.extend(values.iter().zip(&weights).map(|(g, w)| g * w));
+            }
+            l2.extend(scalars.iter().map(|g| g / grid.duration()));
+            euclidean.extend(&scalars);
+            return (euclidean, l2);
+        }
+        let mut euclidean = vec![0.0; self.parameters()];
+        euclidean[self.functions.scalar_range()].copy_from_slice(&scalars);
         for (which, total) in nodal.iter().enumerate() {
             let mut weighted = total.clone();
             for values in weighted.functions_mut() {
@@ -161,11 +189,11 @@ impl Problem {
                 .add_transpose(&weighted, which, &mut euclidean);
         }
         let mut l2 = self.functions.gram_solve(&euclidean);
-        // One value per node: the functions themselves, without a round trip through the weights.
+        // The same for those that have one.
         if let [total] = nodal.as_slice() {
             let parts = self.functions.iter().zip(self.functions.ranges());
             for ((function, range), values) in parts.zip(total.functions()) {
-                if matches!(function.design, crate::functions::Design::Identity) {
+                if matches!(function.design, Design::Identity) {
                     l2[range.clone()].copy_from_slice(values);
                 }
             }

@@ -1,6 +1,7 @@
 //! The cost of a parameter vector and its derivatives, from one trajectory per point.
 
 mod channel;
+mod cost_and_gradient;
 mod gradient;
 mod jacobian;
 mod loss;

@@ -2,6 +2,9 @@
 
 use super::Evaluation;
 use crate::dynamics::quadrature::curvature;
+use crate::dynamics::{Term, Trajectory};
+use crate::functions::Design;
+use crate::lanes::sum::dot;
 use crate::problem::Problem;
 
 impl Problem {
@@ -17,19 +20,28 @@ impl Problem {
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.assemblies().iter().enumerate() {
             let device = evaluation.device_of(which);
-            let motions =
-                || (0..self.experiments.len()).filter(|e| self.experiments[*e].device == which);
-            let squares = motions().map(|e| sum_of_squares(accelerations[e].iter().copied()));
+            let takes_part = |e: &usize| self.experiments[*e].device == which;
+            let squares = |of: &dyn Fn(usize) -> f64| -> f64 {
+                let motions = (0..self.experiments.len()).filter(takes_part);
+                motions.map(of).sum::<f64>().sqrt()
+            };
             let mass = largest(&device.mass);
-            let inertia = mass * squares.sum::<f64>().sqrt();
+            let inertia = mass * squares(&|e| dot(&accelerations[e], &accelerations[e]));
             let natural = |j: usize| {
-                let term = self.oscillator.terms[j];
-                let squares = motions().map(|e| {
-                    let motion = &evaluation.trajectories[e];
-                    let states = motion.displacement.iter().zip(&motion.velocity);
-                    sum_of_squares(states.map(|(y, v)| term.phi(*y, *v)))
+                let response = squares(&|e| {
+                    let Trajectory {
+                        displacement: y,
+                        velocity: v,
+                    } = &evaluation.trajectories[e];
+                    match self.oscillator.terms[j] {
+                        Term::Damping => dot(v, v),
+                        Term::Stiffness => dot(y, y),
+                        term => {
+                            let pairs = y.iter().zip(v);
+                            pairs.map(|(y, v)| term.phi(*y, *v).powi(2)).sum()
+                        }
+                    }
                 });
-                let response = squares.sum::<f64>().sqrt();
                 match response > 0.0 {
                     true => inertia / response,
                     false => 0.0,
@@ -54,11 +66,15 @@ impl Problem {
         let functions = parts.zip(self.natural_sizes(before));
         let mut most = 0.0f64;
         for ((function, range), size) in functions {
-            values.fill(0.0);
-            function
-                .design
-                .multiply_add(&delta[range.clone()], &mut values);
-            let change = largest(&values);
+            let delta = &delta[range.clone()];
+            let change = match &function.design {
+                Design::Identity => largest(delta),
+                design => {
+                    values.fill(0.0);
+                    design.multiply_add(delta, &mut values);
+                    largest(&values)
+                }
+            };
             if change != 0.0 {
                 most = most.max(change / size);
             }
@@ -69,9 +85,14 @@ impl Problem {
 }
 
 fn largest(f: &[f64]) -> f64 {
-    f.iter().fold(0.0f64, |most, p| most.max(p.abs()))
-}
-
-fn sum_of_squares(values: impl Iterator<Item = f64>) -> f64 {
-    values.map(|x| x * x).sum()
+    // Four at a time: one maximum would wait for itself.
+    let (fours, rest) = f.as_chunks::<4>();
+    let mut most = [0.0f64; 4];
+    for four in fours {
+        for (most, p) in most.iter_mut().zip(four) {
+            *most = most.max(p.abs());
+        }
+    }
+    let rest = rest.iter().map(|p| p.abs());
+    rest.chain(most).fold(0.0, f64::max)
 }

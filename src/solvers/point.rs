@@ -1,7 +1,7 @@
 //! A point of the search, and the counted and timed work that makes one.
 
-use super::{FitSettings, Solver};
 use super::timings::{Timings, timed};
+use super::{FitSettings, Solver};
 use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
@@ -81,6 +81,12 @@ impl<'a, 'p> Work<'a, 'p> {
             true => problem.evaluate_in_order_into(parameters, evaluation),
             false => problem.evaluate_into(parameters, evaluation),
         })
+    }
+
+    /// Several forward solves at once.
+    pub fn forwards<T>(&mut self, solves: u64, solve: impl FnOnce() -> T) -> T {
+        *self.problem.counts.entry(FORWARD).or_insert(0) += solves;
+        timed(&mut self.timings.forward, solve)
     }
 
     /// One adjoint solve at an evaluated point.

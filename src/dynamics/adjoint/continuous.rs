@@ -5,8 +5,9 @@
 //! falls with the step (about 2e-5 at 1000 nodes, 4e-6 at 2000). Kept to reproduce the paper and to
 //! show the difference; [`super::discrete`] has no floor.
 
-use crate::dynamics::quadrature::{curvature, midpoint, slope};
-use crate::dynamics::{Device, DeviceTangent, Excitation, Oscillator, State, Trajectory};
+use crate::dynamics::quadrature::{curvature, midpoints, slope};
+use crate::dynamics::{Device, DeviceTangent, Excitation, Oscillator, State, Term, Trajectory};
+use crate::lanes::{self, Elementwise};
 
 /// Gradient of `J = integral (y - y_obs)^2 dt` with respect to all functions, in the L2 inner
 /// product: functions of time at the nodes, not multiplied by quadrature weights.
@@ -33,29 +34,35 @@ pub fn gradient(
     let nodes = oscillator.grid.nodes();
     assert_eq!(trajectory.nodes(), nodes, "a motion over the whole grid");
     let dt = oscillator.grid.step();
-    let (z, first_slope) = adjoint_motion(oscillator, device, trajectory, observed);
+    let (c, k) = linearised_coefficients(oscillator, device, trajectory);
+    let steps = Steps::new(
+        dt,
+        [&device.mass, &c, &k],
+        &trajectory.displacement,
+        observed,
+    );
+    let (z, first_slope) = steps.adjoint_motion(dt);
     let mut acceleration = curvature(&trajectory.displacement, dt);
     if let Some(base) = excitation.and_then(|e| e.base.as_ref()) {
         let base = base.at_nodes();
         acceleration.iter_mut().zip(base).for_each(|(a, b)| *a += b);
     }
-    let against = |response: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        z.iter()
-            .enumerate()
-            .map(|(i, z)| -z * response(i))
-            .collect()
+    let against =
+        |response: &[f64]| -> Vec<f64> { z.iter().zip(response).map(|(z, x)| -z * x).collect() };
+    let motion = trajectory.displacement.iter().zip(&trajectory.velocity);
+    let by_term = |term: &Term| match term {
+        Term::Damping => against(&trajectory.velocity),
+        Term::Stiffness => against(&trajectory.displacement),
+        other => {
+            let response: Vec<f64> = motion.clone().map(|(y, v)| other.phi(*y, *v)).collect();
+            against(&response)
+        }
     };
-    let phi = |i: usize, j: usize| {
-        oscillator.terms[j].phi(trajectory.displacement[i], trajectory.velocity[i])
-    };
-    let (c, _) = linearised_coefficients(oscillator, device, trajectory);
     let momentum_slope = slope(&device.mass, dt)[0] * z[0] + device.mass[0] * first_slope;
     DeviceTangent {
         device: Device {
-            mass: against(&|i| acceleration[i]),
-            coefficients: (0..oscillator.terms.len())
-                .map(|j| against(&|i| phi(i, j)))
-                .collect(),
+            mass: against(&acceleration),
+            coefficients: oscillator.terms.iter().map(by_term).collect(),
         },
         initial: State {
             displacement: c[0] * z[0] - momentum_slope,
@@ -64,39 +71,86 @@ pub fn gradient(
     }
 }
 
-/// The adjoint displacement `z` at the nodes, and `z'` at the first.
-fn adjoint_motion(
-    oscillator: &Oscillator,
-    device: &Device,
-    trajectory: &Trajectory,
-    observed: &[f64],
-) -> (Vec<f64>, f64) {
-    let dt = oscillator.grid.step();
-    let (m, y) = (&device.mass, &trajectory.displacement);
-    let (c, k) = linearised_coefficients(oscillator, device, trajectory);
-    let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
-    let h = -dt;
-    let mut out = vec![0.0; y.len()];
-    let (mut z, mut w) = (0.0, 0.0);
-    for j in (0..y.len() - 1).rev() {
-        let i = j + 1;
-        let source = 2.0 * (y[i] - observed[i]);
-        let l1w = h
-            * (-w / m[i] * (2.0 * m1[i] - c[i]) - z / m[i] * (m2[i] - c1[i] + k[i])
-                + source / m[i]);
-        let l1z = h * w;
-        let (mh, ch, kh) = (midpoint(m, j), midpoint(&c, j), midpoint(&k, j));
-        let source = 2.0 * (midpoint(y, j) - midpoint(observed, j));
-        let (wh, zh) = (w + l1w * 0.5, z + l1z * 0.5);
-        let l2w = h
-            * (-wh / mh * (2.0 * midpoint(&m1, j) - ch)
-                - zh / mh * (midpoint(&m2, j) - midpoint(&c1, j) + kh)
-                + source / mh);
-        z += h * wh;
-        w += l2w;
-        out[j] = z;
+/// What a step back needs and does not wait for: in the order of the steps, at their right node and
+/// at mid-step.
+struct Steps {
+    /// `m`.
+    mass: [Vec<f64>; 2],
+    /// `2 m' - C`.
+    damping: [Vec<f64>; 2],
+    /// `m'' - C' + K`.
+    stiffness: [Vec<f64>; 2],
+    /// `2 (y - y_obs) / m`.
+    source: [Vec<f64>; 2],
+}
+
+impl Steps {
+    fn new(dt: f64, [m, c, k]: [&[f64]; 3], y: &[f64], observed: &[f64]) -> Self {
+        let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(c, dt));
+        let mass = [m[1..].to_vec(), midpoints(m)];
+        let damping = [
+            combined(&m1[1..], &c[1..], &c[1..], |m1, c, _| 2.0 * m1 - c),
+            combined(&midpoints(&m1), &midpoints(c), &mass[1], |m1, c, _| {
+                2.0 * m1 - c
+            }),
+        ];
+        let stiffness = [
+            combined(&m2[1..], &c1[1..], &k[1..], |m2, c1, k| m2 - c1 + k),
+            combined(
+                &midpoints(&m2),
+                &midpoints(&c1),
+                &midpoints(k),
+                |m2, c1, k| m2 - c1 + k,
+            ),
+        ];
+        let source = [
+            combined(&y[1..], &observed[1..], &mass[0], |y, o, m| {
+                2.0 * (y - o) / m
+            }),
+            combined(&midpoints(y), &midpoints(observed), &mass[1], |y, o, m| {
+                2.0 * (y - o) / m
+            }),
+        ];
+        Self {
+            mass,
+            damping,
+            stiffness,
+            source,
+        }
     }
-    (out, w)
+
+    /// The adjoint displacement `z` at the nodes, and `z'` at the first.
+    fn adjoint_motion(&self, dt: f64) -> (Vec<f64>, f64) {
+        let h = -dt;
+        let steps = self.mass[0].len();
+        let mut out = vec![0.0; steps + 1];
+        let (mut z, mut w) = (0.0, 0.0);
+        for j in (0..steps).rev() {
+            let slope = |at: usize, w: f64, z: f64| {
+                let m = self.mass[at][j];
+                -w / m * self.damping[at][j] - z / m * self.stiffness[at][j] + self.source[at][j]
+            };
+            let l1w = h * slope(0, w, z);
+            let l1z = h * w;
+            let (wh, zh) = (w + l1w * 0.5, z + l1z * 0.5);
+            let l2w = h * slope(1, wh, zh);
+            z += h * wh;
+            w += l2w;
+            out[j] = z;
+        }
+        (out, w)
+    }
+}
+
+/// `f` of three lists, element by element.
+fn combined(a: &[f64], b: &[f64], c: &[f64], f: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
+    let mut out = vec![0.0; a.len()];
+    lanes::run(Elementwise(|| {
+        for (((out, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
+            *out = f(*a, *b, *c);
+        }
+    }));
+    out
 }
 
 /// `(C, K)` at the nodes: what damping and stiffness the motion sees when it is disturbed.
@@ -106,6 +160,10 @@ fn linearised_coefficients(
     trajectory: &Trajectory,
 ) -> (Vec<f64>, Vec<f64>) {
     let nodes = trajectory.displacement.len();
+    if oscillator.terms == [Term::Damping, Term::Stiffness] {
+        let [c, k] = [0, 1].map(|j| device.coefficients[j].clone());
+        return (c, k);
+    }
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
     for (term, p) in oscillator.terms.iter().zip(&device.coefficients) {
         for i in 0..nodes {

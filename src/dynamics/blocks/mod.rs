@@ -202,3 +202,26 @@ impl lanes::Kernel for Within<'_> {
         self.0.iter().fold(true, |all, m| all & within(m))
     }
 }
+
+impl Oscillator {
+    /// `J = sum_i w_i (y_i - reading_i)^2` of the free motion of a device with the functions mass, damping,
+    /// stiffness, seen at every node, with the weights of the inner nodes and of both ends; its
+    /// gradient with respect to the functions overwrites `gradient`, that with respect to the initial
+    /// state is returned. `None` where the motion cannot be computed in blocks.
+    ///
+    /// # Panics
+    /// If a function, the readings or a part of the gradient has another length than the grid.
+    pub(crate) fn squares_in_blocks(
+        &self,
+        functions: [&[f64]; 3],
+        initial: State,
+        readings: &[f64],
+        weights: [f64; 2],
+        gradient: [&mut [f64]; 3],
+    ) -> Option<(f64, State)> {
+        let nodes = self.grid.nodes();
+        assert_eq!(readings.len(), nodes, "a reading a node");
+        let device = LinearDevice::new(self, functions, nodes)?;
+        Some(device.squares(initial, readings, weights, gradient))
+    }
+}

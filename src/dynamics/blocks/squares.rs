@@ -4,9 +4,9 @@ use super::LinearDevice;
 use super::adjoint::{collect, ends};
 use super::forward::starts;
 use super::scratch::{Ends, Maps, Scratch};
-use super::tile::{LONGEST, Tile};
+use super::tile::Tile;
 use crate::dynamics::State;
-use crate::lanes::{Arithmetic, Kernel};
+use crate::lanes::{Arithmetic, Kernel, LANES};
 
 /// `J = sum_i w_i (y_i - reading_i)^2` over all nodes and its gradient.
 ///
@@ -56,7 +56,7 @@ impl Kernel for Squares<'_> {
             sum += squares.iter().sum::<f64>();
             kept.push((maps, starts));
         }
-        let mut motion = [[0.0; 2]; 2 * crate::lanes::LANES];
+        let mut motion = [[0.0; 2]; 2 * LANES];
         for i in rest..=steps {
             motion[i - rest] = x;
             let r = x[0] - readings[i];
@@ -97,7 +97,3 @@ impl Kernel for Squares<'_> {
         (cost, initial)
     }
 }
-
-/// Most steps that are one tile, and therefore computed once.
-#[allow(dead_code)]
-pub(super) const ONE_TILE: usize = LONGEST * crate::lanes::LANES;

@@ -104,10 +104,7 @@ impl<T: Number> Rates<T> {
     pub fn forward(&self, [y, w]: [T; 2], of: Constants<T>) -> [T; 2] {
         let w_half = w - (self.beta * y + self.alpha * w);
         let y_half = y + of.half * w;
-        [
-            y + w_half,
-            w - (self.delta * y_half + self.gamma * w_half),
-        ]
+        [y + w_half, w - (self.delta * y_half + self.gamma * w_half)]
     }
 
     /// The transpose of [`Rates::forward`].
@@ -138,12 +135,7 @@ impl<T: Number> Rates<T> {
     /// half of what it gives at mid-step. `adjoint` belongs to the right node, `motion` to the
     /// left.
     #[inline(always)]
-    pub fn shares(
-        &self,
-        [y, w]: [T; 2],
-        adjoint: [T; 2],
-        of: Constants<T>,
-    ) -> ([T; 3], [T; 3]) {
+    pub fn shares(&self, [y, w]: [T; 2], adjoint: [T; 2], of: Constants<T>) -> ([T; 3], [T; 3]) {
         let slowing = self.beta * y + self.alpha * w;
         let w_half = w - slowing;
         let y_half = y + of.half * w;
@@ -153,7 +145,11 @@ impl<T: Number> Rates<T> {
         let (push, push_half) = (of.zero - pull, of.zero - pull_half);
         (
             [(pull + pull) * slowing, push * w, push * y],
-            [pull_half * slowing_half, push_half * w_half, push_half * y_half],
+            [
+                pull_half * slowing_half,
+                push_half * w_half,
+                push_half * y_half,
+            ],
         )
     }
 }

@@ -17,7 +17,12 @@ pub(super) struct Tile {
 
 impl Tile {
     /// The tiles of a record, in order, and the first node of the few steps that are left over.
-    pub fn cut(steps: usize) -> (impl DoubleEndedIterator<Item = Tile> + ExactSizeIterator, usize) {
+    pub fn cut(
+        steps: usize,
+    ) -> (
+        impl DoubleEndedIterator<Item = Tile> + ExactSizeIterator,
+        usize,
+    ) {
         let full = steps / (LANES * LONGEST);
         let after = full * LANES * LONGEST;
         let length = (steps - after) / (2 * LANES) * 2;

@@ -1,0 +1,250 @@
+//! The costs of many devices along a ray, one a lane: the paper's trial steps.
+//!
+//! Every lane does the operations of [`Oscillator::forward`](super::Oscillator::forward) and of the
+//! integral cost in their order, so that its cost has the bits that it would have by itself.
+
+use super::{State, Trajectory};
+use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
+
+/// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
+#[derive(Clone, Copy)]
+pub(crate) struct Ray<'a> {
+    /// Mass, damping, stiffness at the nodes.
+    pub functions: [&'a [f64]; 3],
+    /// What is taken away from them, per unit of `a`.
+    pub direction: [&'a [f64]; 3],
+    /// State at the first node.
+    pub initial: State,
+    /// Displacements read at the nodes, m.
+    pub readings: &'a [f64],
+    /// Step, s.
+    pub step: f64,
+    /// Spacing of the readings, s: the step, as the record says it.
+    pub spacing: f64,
+}
+
+/// Most rows at once: enough that the divisions of one row hide behind those of the others, and few
+/// enough for the registers.
+const ROWS: usize = 4;
+
+/// Trials along a ray, and their motions: storage that is used again and again.
+#[derive(Default)]
+pub(crate) struct Trials {
+    /// Trials before the first that has mass everywhere.
+    without_mass: usize,
+    batches: Vec<Batch>,
+}
+
+/// Some rows of trials.
+#[derive(Default)]
+struct Batch {
+    lengths: Vec<Row>,
+    /// Displacements and velocities, the rows of one node after those of the node before.
+    motion: [Vec<Row>; 2],
+    costs: Vec<Row>,
+}
+
+impl Trials {
+    /// The cost `integral (y - y_obs)^2 dt` at every one of `lengths`, which fall; `None` where the mass is
+    /// not positive or the motion leaves the finite numbers. As many threads work as there are
+    /// batches and processors; the results do not depend on it.
+    pub fn costs(&mut self, ray: Ray, lengths: &[f64]) -> Vec<Option<f64>> {
+        self.without_mass = ray.first_with_mass(lengths);
+        let lengths = &lengths[self.without_mass..];
+        let rows: Vec<Row> = lengths
+            .chunks(LANES)
+            .map(|part| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0])))
+            .collect();
+        let count = rows.len().div_ceil(ROWS).max(2.min(rows.len()));
+        self.batches.resize_with(count, Batch::default);
+        for (b, batch) in self.batches.iter_mut().enumerate() {
+            let share = b * rows.len() / count..(b + 1) * rows.len() / count;
+            batch.lengths.clear();
+            batch.lengths.extend_from_slice(&rows[share]);
+        }
+        self.batches.par_iter_mut().for_each(|batch| batch.run(ray));
+        let lanes = self.batches.iter().flat_map(|b| b.costs.as_flattened());
+        let finite = |cost: &f64| cost.is_finite().then_some(*cost);
+        std::iter::repeat_n(None, self.without_mass)
+            .chain(lanes.take(lengths.len()).map(finite))
+            .collect()
+    }
+
+    /// The motion of trial `which` of the last call.
+    pub fn motion_into(&self, which: usize, trajectory: &mut Trajectory) {
+        let (mut row, lane) = {
+            let lane = which - self.without_mass;
+            (lane / LANES, lane % LANES)
+        };
+        for batch in &self.batches {
+            let rows = batch.lengths.len();
+            if row < rows {
+                let [y, v] = &batch.motion;
+                let of_lane = |rows: &[Row], i: usize| rows[i][lane];
+                for (i, (to_y, to_v)) in (trajectory
+                    .displacement
+                    .iter_mut()
+                    .zip(&mut trajectory.velocity))
+                .enumerate()
+                {
+                    *to_y = of_lane(y, i * rows + row);
+                    *to_v = of_lane(v, i * rows + row);
+                }
+                return;
+            }
+            row -= rows;
+        }
+    }
+}
+
+impl Batch {
+    fn run(&mut self, ray: Ray) {
+        match self.lengths.len() {
+            1 => self.of_rows::<1>(ray),
+            2 => self.of_rows::<2>(ray),
+            3 => self.of_rows::<3>(ray),
+            _ => self.of_rows::<ROWS>(ray),
+        }
+    }
+
+    fn of_rows<const R: usize>(&mut self, ray: Ray) {
+        let mut lengths = [[0.0; LANES]; R];
+        lengths.copy_from_slice(&self.lengths);
+        let [y, v] = &mut self.motion;
+        for rows in [&mut *y, &mut *v] {
+            rows.resize(R * ray.readings.len(), [0.0; LANES]);
+        }
+        let costs = lanes::run(Rows {
+            ray,
+            lengths,
+            motion: [y.as_chunks_mut().0, v.as_chunks_mut().0],
+        });
+        self.costs.clear();
+        self.costs.extend_from_slice(&costs);
+    }
+}
+
+impl Ray<'_> {
+    /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
+    /// after rounding.
+    fn first_with_mass(self, lengths: &[f64]) -> usize {
+        let has_mass = |a: &f64| {
+            let mut pairs = self.functions[0].iter().zip(self.direction[0]);
+            pairs.all(|(p, g)| p - a * g > 0.0)
+        };
+        lengths.iter().position(has_mass).unwrap_or(lengths.len())
+    }
+}
+
+/// `R` rows of devices.
+struct Rows<'a, const R: usize> {
+    ray: Ray<'a>,
+    lengths: [Row; R],
+    motion: [&'a mut [[Row; R]]; 2],
+}
+
+/// Mass, damping and stiffness of a row of devices.
+#[derive(Clone, Copy)]
+struct Values<A: Arithmetic>([Eight<A>; 3]);
+
+impl<A: Arithmetic> Values<A> {
+    #[inline(always)]
+    fn at(ray: &Ray, arithmetic: A, length: Eight<A>, i: usize) -> Self {
+        let mut values = [length; 3];
+        for f in 0..3 {
+            let p = Eight::splat(arithmetic, ray.functions[f][i]);
+            let g = Eight::splat(arithmetic, ray.direction[f][i]);
+            values[f] = p - length * g;
+        }
+        Self(values)
+    }
+
+    #[inline(always)]
+    fn middle(self, right: Self, half: Eight<A>) -> Self {
+        let mut values = self.0;
+        for f in 0..3 {
+            values[f] = (right.0[f] + self.0[f]) * half;
+        }
+        Self(values)
+    }
+
+    /// `y'' = -k y/m - c v/m`.
+    #[inline(always)]
+    fn acceleration(self, y: Eight<A>, v: Eight<A>, zero: Eight<A>) -> Eight<A> {
+        let [m, c, k] = self.0;
+        zero - k * y / m - c * v / m
+    }
+}
+
+impl<const R: usize> Kernel for Rows<'_, R> {
+    type Output = [Row; R];
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> [Row; R] {
+        let Rows {
+            ray,
+            lengths,
+            motion: [displacement, velocity],
+        } = self;
+        let zero = Eight::splat(arithmetic, 0.0);
+        let half = Eight::splat(arithmetic, 0.5);
+        let dt = Eight::splat(arithmetic, ray.step);
+        let nodes = ray.readings.len();
+
+        let mut y = [Eight::splat(arithmetic, ray.initial.displacement); R];
+        let mut v = [Eight::splat(arithmetic, ray.initial.velocity); R];
+        let mut left = [Values([zero; 3]); R];
+        for r in 0..R {
+            left[r] = Values::at(&ray, arithmetic, Eight::load(arithmetic, &lengths[r]), 0);
+        }
+        for i in 0..nodes - 1 {
+            for r in 0..R {
+                displacement[i][r] = y[r].row();
+                velocity[i][r] = v[r].row();
+                let length = Eight::load(arithmetic, &lengths[r]);
+                let right = Values::at(&ray, arithmetic, length, i + 1);
+                let a = left[r].acceleration(y[r], v[r], zero);
+                let (y_half, v_half) = (y[r] + dt * v[r] * half, v[r] + dt * a * half);
+                let middle = left[r].middle(right, half);
+                let a_half = middle.acceleration(y_half, v_half, zero);
+                y[r] += dt * v_half;
+                v[r] += dt * a_half;
+                left[r] = right;
+            }
+        }
+        for r in 0..R {
+            displacement[nodes - 1][r] = y[r].row();
+            velocity[nodes - 1][r] = v[r].row();
+        }
+
+        let (weight, two) = (
+            Eight::splat(arithmetic, ray.spacing * 0.5),
+            Eight::splat(arithmetic, 2.0),
+        );
+        let (first, last) = (
+            Eight::splat(arithmetic, ray.readings[0]),
+            Eight::splat(arithmetic, ray.readings[nodes - 1]),
+        );
+        let mut sums = [zero; R];
+        for r in 0..R {
+            let at_first = Eight::load(arithmetic, &displacement[0][r]) - first;
+            let at_last = y[r] - last;
+            // Not a number where the motion is not finite.
+            let unmoved = (y[r] - y[r]) + (v[r] - v[r]);
+            sums[r] = weight * (at_first * at_first + at_last * at_last) + unmoved;
+        }
+        for i in 1..nodes - 1 {
+            let reading = Eight::splat(arithmetic, ray.readings[i]);
+            for r in 0..R {
+                let residual = Eight::load(arithmetic, &displacement[i][r]) - reading;
+                sums[r] += weight * (two * (residual * residual));
+            }
+        }
+        let mut costs = [[0.0; LANES]; R];
+        for r in 0..R {
+            costs[r] = sums[r].row();
+        }
+        costs
+    }
+}

@@ -1,0 +1,84 @@
+//! The cost and its gradient and nothing else.
+
+use crate::dynamics::{Breakdown, Excitation};
+use crate::functions::Design;
+use crate::objective::Channel;
+use crate::problem::{Experiment, Problem};
+
+impl Problem {
+    /// The cost `J` at `theta`, and its Euclidean gradient `dJ/dtheta` by the discrete adjoint into
+    /// `gradient`: what an optimiser of one's own asks for.
+    ///
+    /// One record of a device with one value a node, in linear free motion by the midpoint rule and
+    /// seen at every node, is never written down: forward and adjoint solve run in blocks of the
+    /// record at once, and memory is what `theta` and `gradient` take. Everything else is
+    /// [`Problem::evaluate`] and [`Problem::gradient`].
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    ///
+    /// # Panics
+    /// If `theta` or `gradient` has another length than the parameters.
+    pub fn cost_and_gradient(&self, theta: &[f64], gradient: &mut [f64]) -> Result<f64, Breakdown> {
+        assert_eq!(theta.len(), self.parameters(), "one number per parameter");
+        assert_eq!(gradient.len(), self.parameters(), "one slope per parameter");
+        if let Some(misfit) = self.squares_in_blocks(theta, gradient) {
+            if self.is_regularised() {
+                let push = self.penalty_gradient(theta);
+                gradient.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
+            }
+            return Ok(misfit + self.regularisation(theta));
+        }
+        let evaluation = self.evaluate(theta)?;
+        gradient.copy_from_slice(&self.euclidean_gradient(theta, &evaluation));
+        Ok(evaluation.cost)
+    }
+
+    /// The misfit and its gradient where both can be had in blocks; `None` where not, or where they leave the
+    /// finite numbers.
+    fn squares_in_blocks(&self, theta: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        let (experiment, channel, weights) = self.one_full_record()?;
+        let nodes = experiment.nodes;
+        if theta.len() != 3 * nodes {
+            return None;
+        }
+        let (mass, others) = theta.split_at(nodes);
+        let (damping, stiffness) = others.split_at(nodes);
+        let (by_mass, others) = gradient.split_at_mut(nodes);
+        let (by_damping, by_stiffness) = others.split_at_mut(nodes);
+        let (cost, initial) = self.oscillator.squares_in_blocks(
+            [mass, damping, stiffness],
+            experiment.initial,
+            channel.observed(),
+            weights,
+            [by_mass, by_damping, by_stiffness],
+        )?;
+        let finite =
+            cost.is_finite() && initial.displacement.is_finite() && initial.velocity.is_finite();
+        finite.then_some(cost)
+    }
+
+    /// The only record, with its channel and the weights of its readings, if it is of free motion, has a
+    /// reading at every node, and every function of its device has one value a node.
+    pub(crate) fn one_full_record(&self) -> Option<(&Experiment, &Channel, [f64; 2])> {
+        let [experiment] = self.experiments.as_slice() else {
+            return None;
+        };
+        let [channel] = experiment.channels.as_slice() else {
+            return None;
+        };
+        let nodes = self.oscillator.grid.nodes();
+        let mut designs = self.functions.iter().map(|f| &f.design);
+        let plain = experiment.nodes == nodes
+            && channel.len() == nodes
+            && channel.stride() == Some(1)
+            && self.functions.scalars().is_empty()
+            && self.functions.assemblies().len() == 1
+            && designs.all(|d| matches!(d, Design::Identity))
+            && experiment
+                .excitation
+                .as_ref()
+                .is_none_or(Excitation::is_zero);
+        plain.then_some((experiment, channel, channel.uniform_weights()?))
+    }
+}
