@@ -313,6 +313,34 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
+
+    /// Several directions at once against one at a time; records longer than a tile among them.
+    #[test]
+    fn the_jacobian_of_the_predictions_is_that_of_single_tangents(
+        methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],
+        nodes in prop_oneof![4usize..14, 60..70usize],
+        seed in any::<u64>(),
+    ) {
+        let case = case(methods, nodes, seed);
+        let (problem, theta) = (case.problem(), case.theta());
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let jacobian = problem.predictions_jacobian(&evaluation);
+        let mut unit = vec![0.0; theta.len()];
+        for j in 0..theta.len() {
+            unit[j] = 1.0;
+            let change = problem.predictions_tangent(&evaluation, &unit);
+            unit[j] = 0.0;
+            let column: Vec<f64> = change.into_iter().flatten().flatten().collect();
+            let size = column.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+            for (a, b) in jacobian.column(j).iter().zip(&column) {
+                prop_assert!((a - b).abs() <= 1e-12 * size, "{j}: {a} is not {b}");
+            }
+        }
+    }
+}
+
 fn index_of_prior(problem: &Problem) -> usize {
     problem.functions.scalar_range().start + 1
 }

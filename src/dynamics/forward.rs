@@ -1,6 +1,7 @@
 //! The forward solve.
 
 use super::blocks::LinearDevice;
+use super::rates;
 use super::stages::{Rhs, advance};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{Device, Excitation, Grid, Method, State, Term};
@@ -132,8 +133,9 @@ impl Oscillator {
     }
 
     /// [`Oscillator::forward_into`] as fast as it goes: linear free motion by the midpoint rule is
-    /// computed in eight blocks of the record at once, which changes it by rounding; everything else,
-    /// and what leaves the finite numbers on the way, one step after the other.
+    /// computed in eight blocks of the record at once, everything else with quotients that are made
+    /// ahead, which both change it by rounding; what leaves the finite numbers on the way, as
+    /// [`Oscillator::forward_into`] does it.
     ///
     /// # Errors
     /// As [`Oscillator::forward`].
@@ -149,6 +151,11 @@ impl Oscillator {
             if trajectory.ends_finite() {
                 return Ok(());
             }
+        }
+        self.require_positive_mass(device)?;
+        let rhs = self.rhs(device, excitation, trajectory.nodes());
+        if rates::forward(rhs, self.method, initial, trajectory) && trajectory.ends_finite() {
+            return Ok(());
         }
         self.forward_into(device, initial, excitation, trajectory)
     }

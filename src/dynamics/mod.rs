@@ -16,14 +16,23 @@ mod device;
 mod excitation;
 mod forward;
 mod grid;
+mod maps;
 pub mod quadrature;
+mod rates;
 mod sense;
+mod sense_nodes;
 mod stages;
 mod step_jacobian;
 mod tableau;
 mod tangent;
+mod tangents;
 mod term;
 mod trials;
+mod window;
+
+pub(crate) use maps::FUNCTIONS;
+pub(crate) use sense_nodes::Accelerations;
+pub(crate) use tangents::{Course, Slot, TILE, TILE_NODES, Tangents};
 
 pub use device::{Device, State};
 pub use excitation::{Excitation, Stepwise};

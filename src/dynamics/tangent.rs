@@ -13,6 +13,17 @@ pub struct DeviceTangent {
     pub initial: State,
 }
 
+impl DeviceTangent {
+    pub(super) fn is_finite(&self) -> bool {
+        let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
+        let State {
+            displacement,
+            velocity,
+        } = self.initial;
+        self.device.functions().all(finite) && displacement.is_finite() && velocity.is_finite()
+    }
+}
+
 impl Oscillator {
     /// Directional derivative of [`Oscillator::forward`] at `trajectory` (which must be the motion of
     /// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit

@@ -36,6 +36,10 @@ impl Design {
         match self {
             Design::Empty => {}
             Design::Identity => values.iter_mut().zip(theta).for_each(|(v, t)| *v += t),
+            Design::Sparse(matrix) if is_column(matrix) => {
+                let pairs = values.iter_mut().zip(matrix.values());
+                pairs.for_each(|(value, b)| *value += b * theta[0]);
+            }
             Design::Sparse(matrix) => {
                 for (row, value) in matrix.row_iter().zip(values) {
                     let columns = row.col_indices().iter().zip(row.values());
@@ -57,6 +61,10 @@ impl Design {
         match self {
             Design::Empty => {}
             Design::Identity => out.iter_mut().zip(nodal).for_each(|(o, n)| *o += n),
+            Design::Sparse(matrix) if is_column(matrix) => {
+                let pairs = matrix.values().iter().zip(nodal);
+                out[0] = pairs.fold(out[0], |sum, (b, value)| sum + b * value);
+            }
             Design::Sparse(matrix) => {
                 for (row, value) in matrix.row_iter().zip(nodal) {
                     for (&j, b) in row.col_indices().iter().zip(row.values()) {
@@ -73,4 +81,9 @@ impl Design {
         (0..nodes).for_each(|i| entries.push(i, 0, 1.0));
         Design::Sparse(CsrMatrix::from(&entries))
     }
+}
+
+/// Whether a matrix has one column, without gaps: its values are all there is to it.
+fn is_column(matrix: &CsrMatrix<f64>) -> bool {
+    matrix.ncols() == 1 && matrix.nnz() == matrix.nrows()
 }

@@ -3,8 +3,10 @@
 use super::{Loss, Sensor, Weighting};
 use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
+    Accelerations, ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings,
+    Trajectory,
 };
+use crate::lanes::LANES;
 use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
 
 /// The readings of one sensor.
@@ -294,6 +296,22 @@ impl Channel {
             && self.filter.is_empty()
     }
 
+    /// Whether all readings are displacements at nodes.
+    pub(super) fn is_displacement_at_nodes(&self) -> bool {
+        let all = || self.places.iter().all(|p| p.as_node().is_some());
+        self.kind == ChannelKind::Displacement && (self.on_every_node || all())
+    }
+
+    /// Whether reading `i` is the acceleration at node `i`.
+    pub(super) fn is_acceleration_on_nodes(&self) -> bool {
+        self.kind == ChannelKind::Acceleration && self.on_every_node
+    }
+
+    /// What the filter makes of a series over the readings.
+    pub(super) fn filtered(&self, series: &[f64]) -> Vec<f64> {
+        zero_phase(&self.filter, series)
+    }
+
     /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
     /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
     pub fn stride(&self) -> Option<usize> {
@@ -369,7 +387,12 @@ impl Channel {
             out.extend_from_slice(&view.motion.displacement[..self.len()]);
             return;
         }
-        if self.sensor == Sensor::default() {
+        if self.is_acceleration_on_nodes() {
+            let [gain, offset, drift] = self.sensor.values(view.scalars);
+            self.accelerations(view, |i, l, seen| {
+                out.push(gain * (seen.value[l] + self.base_at(i)) + offset + drift * self.age(i));
+            });
+        } else if self.sensor == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
         } else {
             let [gain, offset, drift] = self.sensor.values(view.scalars);
@@ -427,6 +450,20 @@ impl Channel {
         }
         let [gain, ..] = self.sensor.values(view.scalars);
         let indices = self.sensor.indices();
+        if self.is_acceleration_on_nodes() {
+            let (by_y, by_v) = (&mut source.displacement, &mut source.velocity);
+            self.accelerations(view, |i, l, seen| {
+                let slope = slopes[i];
+                by_y[i] += gain * slope * seen.states[0][l];
+                by_v[i] += gain * slope * seen.states[1][l];
+                for (values, by) in direct.functions_mut().zip(&seen.functions) {
+                    values[i] += gain * slope * by[l];
+                }
+                let factors = [seen.value[l] + self.base_at(i), 1.0, self.age(i)];
+                add_to_scalars(indices, factors, slope, scalars);
+            });
+            return;
+        }
         let simple = self.kind == ChannelKind::Displacement && indices == [None; 3];
         for (i, slope) in slopes.iter().enumerate() {
             let place = self.places[i];
@@ -437,12 +474,21 @@ impl Channel {
             let sensed = self.sensed(view, i);
             spread(&sensed, place.step, gain * slope, source, direct);
             let factors = [sensed.value, 1.0, self.age(i)];
-            for (index, factor) in indices.iter().zip(factors) {
-                if let Some(index) = index {
-                    scalars[*index] += slope * factor;
-                }
-            }
+            add_to_scalars(indices, factors, *slope, scalars);
         }
+    }
+
+    /// Calls `each` with every reading, its lane, and the accelerations at eight nodes, for readings that
+    /// are accelerations on the nodes.
+    fn accelerations(&self, view: View, mut each: impl FnMut(usize, usize, &Accelerations)) {
+        let count = self.len();
+        let around = |i| self.around_reading(view.excitation, i);
+        let oscillator = view.oscillator;
+        oscillator.accelerations(view.device, view.motion, 0..count, around, |from, seen| {
+            for l in 0..LANES.min(count - from) {
+                each(from + l, l, seen);
+            }
+        });
     }
 
     /// Whether the predictions depend on the functions also at fixed states.
@@ -565,6 +611,15 @@ fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
         }
     }
     change
+}
+
+/// Adds what gain, offset and drift are worth.
+fn add_to_scalars(indices: [Option<usize>; 3], factors: [f64; 3], slope: f64, scalars: &mut [f64]) {
+    for (index, factor) in indices.into_iter().zip(factors) {
+        if let Some(index) = index {
+            scalars[index] += slope * factor;
+        }
+    }
 }
 
 /// Transpose of [`answer`].

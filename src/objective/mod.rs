@@ -3,6 +3,7 @@
 mod channel;
 mod cost_and_gradient;
 mod gradient;
+mod jacobian;
 mod loss;
 mod refine;
 mod sensor;

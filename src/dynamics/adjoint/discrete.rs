@@ -1,5 +1,6 @@
 //! The discrete adjoint: the exact transpose of [`Oscillator::tangent`], stage by stage.
 
+use super::in_lanes;
 use crate::dynamics::blocks::LinearDevice;
 use crate::dynamics::stages::{Rhs, Stages};
 use crate::dynamics::tableau::{MIDPOINT, RK4, Tableau};
@@ -16,7 +17,8 @@ use crate::dynamics::{Device, DeviceTangent, Excitation, Method, Oscillator, Sta
 /// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 ///
-/// Linear free motion by the midpoint rule goes back in eight blocks of the record at once.
+/// Linear free motion by the midpoint rule goes back in eight blocks of the record at once; the steps of
+/// any other are linearised eight at a time.
 pub fn gradient(
     oscillator: &Oscillator,
     device: &Device,
@@ -35,7 +37,12 @@ pub fn gradient(
             };
         }
     }
-    gradient_in_order(oscillator, device, excitation, trajectory, source)
+    let rhs = oscillator.rhs(device, excitation, nodes);
+    let gradient = in_lanes::gradient(rhs, oscillator.method, trajectory, source);
+    match gradient.is_finite() {
+        true => gradient,
+        false => gradient_in_order(oscillator, device, excitation, trajectory, source),
+    }
 }
 
 /// [`gradient`], one step after the other whatever the device.

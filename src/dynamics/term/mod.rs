@@ -3,6 +3,7 @@
 mod coulomb_friction;
 mod cubic_stiffness;
 mod damping;
+mod lanes;
 mod offset;
 mod quadratic_damping;
 mod stiffness;

@@ -8,6 +8,7 @@
 
 mod dense;
 mod structured;
+mod triangle;
 
 pub(crate) use dense::weighted_jacobian;
 
@@ -293,8 +294,8 @@ pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Sub
 fn timed_readings(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Subproblem {
     let (tangent, algebra) = (&mut timings.tangent, &mut timings.linear_algebra);
     if problem.parameters() <= FEW_PARAMETERS {
-        let (jacobian, residuals) = timed(tangent, || weighted_jacobian(problem, evaluation));
-        timed(algebra, || dense::subproblem(jacobian, residuals))
+        let linearised = timed(tangent, || dense::Linearised::at(problem, evaluation));
+        timed(algebra, || linearised.subproblem())
     } else {
         let steps = timed(tangent, || structured::steps(problem, evaluation));
         timed(algebra, || {

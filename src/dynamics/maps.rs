@@ -1,0 +1,176 @@
+//! Eight steps linearised at once: the motion is known, so no step waits for the one before.
+
+use super::stages::Rhs;
+use super::tableau::{MIDPOINT, Position, RK4, Tableau};
+use super::{MOST_TERMS, Method, Trajectory, window};
+use crate::lanes::{Arithmetic, Eight, LANES, Row};
+
+/// Most functions of a device: the mass and one for each term.
+pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
+
+/// How the states at the right nodes of eight steps answer, one step a lane. The first index is the
+/// one of the right node's state (displacement, velocity).
+pub(super) struct Maps {
+    /// To displacement and velocity at the left node, less the identity.
+    pub growth: [[Row; 2]; 2],
+    /// To each function's value at the left node, mass first.
+    pub left: [[Row; 2]; FUNCTIONS],
+    /// To each function's value at the right node.
+    pub right: [[Row; 2]; FUNCTIONS],
+}
+
+impl Maps {
+    pub const NOTHING: Self = Self {
+        growth: [[[0.0; LANES]; 2]; 2],
+        left: [[[0.0; LANES]; 2]; FUNCTIONS],
+        right: [[[0.0; LANES]; 2]; FUNCTIONS],
+    };
+}
+
+/// Where the functions are looked at: the three [`Position`]s.
+#[derive(Clone, Copy)]
+struct Places<A: Arithmetic>([Eight<A>; 3]);
+
+impl<A: Arithmetic> Places<A> {
+    #[inline(always)]
+    fn of(arithmetic: A, values: &[f64], i: usize) -> Self {
+        let left = Eight::load(arithmetic, &window::row(values, i));
+        let right = Eight::load(arithmetic, &window::row(values, i + 1));
+        let middle = (right + left) * Eight::splat(arithmetic, 0.5);
+        Self([left, middle, right])
+    }
+
+    #[inline(always)]
+    fn stepwise(arithmetic: A, part: Option<&super::Stepwise>, i: usize) -> Self {
+        let [left, middle, right] = window::stepwise(part, i);
+        Self([
+            Eight::load(arithmetic, &left),
+            Eight::load(arithmetic, &middle),
+            Eight::load(arithmetic, &right),
+        ])
+    }
+
+    #[inline(always)]
+    fn at(&self, position: Position) -> Eight<A> {
+        self.0[position as usize]
+    }
+}
+
+/// Linearises the steps `i` to `i + 7` of a motion, for the functions that are `wanted`.
+#[inline(always)]
+pub(super) fn linearise<A: Arithmetic>(
+    arithmetic: A,
+    method: Method,
+    rhs: &Rhs,
+    motion: &Trajectory,
+    i: usize,
+    wanted: &[bool; FUNCTIONS],
+    maps: &mut Maps,
+) {
+    match method {
+        Method::Midpoint => by(arithmetic, &MIDPOINT, rhs, motion, i, wanted, maps),
+        Method::Rk4 => by(arithmetic, &RK4, rhs, motion, i, wanted, maps),
+    }
+}
+
+#[inline(always)]
+fn by<A: Arithmetic, const S: usize>(
+    arithmetic: A,
+    tableau: &Tableau<S>,
+    rhs: &Rhs,
+    motion: &Trajectory,
+    i: usize,
+    wanted: &[bool; FUNCTIONS],
+    maps: &mut Maps,
+) {
+    let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
+    let dt = rhs.dt;
+    let mut per_mass = Places::of(arithmetic, &rhs.device.mass, i);
+    for place in &mut per_mass.0 {
+        *place = one / *place;
+    }
+    let force = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
+    let base = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
+
+    let nothing = Places([zero; 3]);
+    let mut functions = [nothing; MOST_TERMS];
+    for (places, values) in functions.iter_mut().zip(&rhs.device.coefficients) {
+        *places = Places::of(arithmetic, values, i);
+    }
+
+    // Forwards: the stages, their slopes, and how the acceleration answers to each function.
+    let y0 = Eight::load(arithmetic, &window::row(&motion.displacement, i));
+    let v0 = Eight::load(arithmetic, &window::row(&motion.velocity, i));
+    let [mut v, mut a, mut by_y, mut by_v] = [[zero; S]; 4];
+    let mut answers = [[zero; FUNCTIONS]; S];
+    for s in 0..S {
+        let position = tableau.position[s];
+        let (mut y_s, mut v_s) = (y0, v0);
+        for r in 0..s {
+            if tableau.a[s][r] != 0.0 {
+                let h = Eight::splat(arithmetic, dt * tableau.a[s][r]);
+                y_s += h * v[r];
+                v_s += h * a[r];
+            }
+        }
+        v[s] = v_s;
+        let per_mass = per_mass.at(position);
+        let mut push = force.at(position);
+        for (j, term) in rhs.terms.iter().enumerate().take(MOST_TERMS) {
+            let p = functions[j].at(position);
+            let response = term.respond(arithmetic, y_s, v_s);
+            push = push - p * response.phi;
+            by_y[s] = by_y[s] - p * response.by_y;
+            by_v[s] = by_v[s] - p * response.by_v;
+            answers[s][j + 1] = -response.phi * per_mass;
+        }
+        let inertia = push * per_mass;
+        a[s] = inertia - base.at(position);
+        by_y[s] = by_y[s] * per_mass;
+        by_v[s] = by_v[s] * per_mass;
+        answers[s][0] = -inertia * per_mass;
+    }
+
+    // Backwards, from each component of the state at the right node.
+    for end in 0..2 {
+        let [mut y_bar, mut v_bar, mut a_bar] = [[zero; S]; 3];
+        let [mut to_y, mut to_v] = [zero; 2];
+        for s in (0..S).rev() {
+            let weight = Eight::splat(arithmetic, dt * tableau.b[s]);
+            if end == 0 {
+                v_bar[s] = weight;
+            } else {
+                a_bar[s] = weight;
+            }
+            for r in s + 1..S {
+                if tableau.a[r][s] != 0.0 {
+                    let h = Eight::splat(arithmetic, dt * tableau.a[r][s]);
+                    a_bar[s] += h * v_bar[r];
+                    v_bar[s] += h * y_bar[r];
+                }
+            }
+            v_bar[s] += by_v[s] * a_bar[s];
+            y_bar[s] = by_y[s] * a_bar[s];
+            to_y += y_bar[s];
+            to_v += v_bar[s];
+        }
+        maps.growth[end] = [to_y.row(), to_v.row()];
+        for f in 0..=rhs.terms.len() {
+            if !wanted[f] {
+                continue;
+            }
+            let [mut left, mut middle, mut right] = [zero; 3];
+            for s in 0..S {
+                let answer = a_bar[s] * answers[s][f];
+                match tableau.position[s] {
+                    Position::Left => left += answer,
+                    Position::Middle => middle += answer,
+                    Position::Right => right += answer,
+                }
+            }
+            middle = middle * Eight::splat(arithmetic, 0.5);
+            maps.left[f][end] = (left + middle).row();
+            maps.right[f][end] = (right + middle).row();
+        }
+    }
+}

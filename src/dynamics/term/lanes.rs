@@ -1,0 +1,63 @@
+//! The responses in eight lanes.
+
+use super::Term;
+use crate::lanes::{Arithmetic, Eight, LANES};
+
+/// A response and its derivatives with respect to displacement and velocity.
+pub(in crate::dynamics) struct Response<A: Arithmetic> {
+    pub phi: Eight<A>,
+    pub by_y: Eight<A>,
+    pub by_v: Eight<A>,
+}
+
+impl Term {
+    /// [`Term::phi`] and [`Term::partials`] at eight states.
+    #[inline(always)]
+    pub(in crate::dynamics) fn respond<A: Arithmetic>(
+        self,
+        arithmetic: A,
+        y: Eight<A>,
+        v: Eight<A>,
+    ) -> Response<A> {
+        let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
+        match self {
+            Term::Damping => Response {
+                phi: v,
+                by_y: zero,
+                by_v: one,
+            },
+            Term::Stiffness => Response {
+                phi: y,
+                by_y: one,
+                by_v: zero,
+            },
+            Term::CubicStiffness => {
+                let square = y * y;
+                Response {
+                    phi: square * y,
+                    by_y: Eight::splat(arithmetic, 3.0) * square,
+                    by_v: zero,
+                }
+            }
+            Term::QuadraticDamping | Term::CoulombFriction { .. } | Term::Offset => {
+                self.one_by_one(arithmetic, y, v)
+            }
+        }
+    }
+
+    /// Absolute values and square roots, lane by lane.
+    #[inline(always)]
+    fn one_by_one<A: Arithmetic>(self, arithmetic: A, y: Eight<A>, v: Eight<A>) -> Response<A> {
+        let (y, v) = (y.row(), v.row());
+        let [mut phi, mut by_y, mut by_v] = [[0.0; LANES]; 3];
+        for l in 0..LANES {
+            phi[l] = self.phi(y[l], v[l]);
+            (by_y[l], by_v[l]) = self.partials(y[l], v[l]);
+        }
+        Response {
+            phi: Eight::load(arithmetic, &phi),
+            by_y: Eight::load(arithmetic, &by_y),
+            by_v: Eight::load(arithmetic, &by_v),
+        }
+    }
+}
