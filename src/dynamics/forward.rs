@@ -133,9 +133,9 @@ impl Oscillator {
     }
 
     /// [`Oscillator::forward_into`] as fast as it goes: linear free motion by the midpoint rule is
-    /// computed in eight blocks of the record at once, everything else with quotients that are made
-    /// ahead, which both change it by rounding; what leaves the finite numbers on the way, as
-    /// [`Oscillator::forward_into`] does it.
+    /// computed in eight blocks of the record at once, forced or nonlinear motion with quotients that are
+    /// made ahead, which both change it by rounding; everything else, and what leaves the finite numbers
+    /// on the way, as [`Oscillator::forward_into`] does it.
     ///
     /// # Errors
     /// As [`Oscillator::forward`].
@@ -154,7 +154,12 @@ impl Oscillator {
         }
         self.require_positive_mass(device)?;
         let rhs = self.rhs(device, excitation, trajectory.nodes());
-        if rates::forward(rhs, self.method, initial, trajectory) && trajectory.ends_finite() {
+        // Linear free motion of any other kind keeps its order: how far descents along the gradient alone
+        // come in so many iterations depends on it.
+        if !rhs.is_linear_and_free()
+            && rates::forward(rhs, self.method, initial, trajectory)
+            && trajectory.ends_finite()
+        {
             return Ok(());
         }
         self.forward_into(device, initial, excitation, trajectory)

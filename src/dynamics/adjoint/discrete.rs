@@ -17,8 +17,8 @@ use crate::dynamics::{Device, DeviceTangent, Excitation, Method, Oscillator, Sta
 /// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 ///
-/// Linear free motion by the midpoint rule goes back in eight blocks of the record at once; the steps of
-/// any other are linearised eight at a time.
+/// Linear free motion by the midpoint rule goes back in eight blocks of the record at once; the
+/// steps of forced or nonlinear motion are linearised eight at a time.
 pub fn gradient(
     oscillator: &Oscillator,
     device: &Device,
@@ -38,11 +38,13 @@ pub fn gradient(
         }
     }
     let rhs = oscillator.rhs(device, excitation, nodes);
-    let gradient = in_lanes::gradient(rhs, oscillator.method, trajectory, source);
-    match gradient.is_finite() {
-        true => gradient,
-        false => gradient_in_order(oscillator, device, excitation, trajectory, source),
+    if !rhs.is_linear_and_free() {
+        let gradient = in_lanes::gradient(rhs, oscillator.method, trajectory, source);
+        if gradient.is_finite() {
+            return gradient;
+        }
     }
+    gradient_in_order(oscillator, device, excitation, trajectory, source)
 }
 
 /// [`gradient`], one step after the other whatever the device.
