@@ -152,10 +152,13 @@ impl<A: Arithmetic> Values<A> {
     #[inline(always)]
     fn at(ray: &Ray, arithmetic: A, length: Eight<A>, i: usize) -> Self {
         let mut values = [length; 3];
-        for f in 0..3 {
-            let p = Eight::splat(arithmetic, ray.functions[f][i]);
-            let g = Eight::splat(arithmetic, ray.direction[f][i]);
-            values[f] = p - length * g;
+        let pairs = ray.functions.iter().zip(&ray.direction);
+        for (value, (p, g)) in values.iter_mut().zip(pairs) {
+            let (p, g) = (
+                Eight::splat(arithmetic, p[i]),
+                Eight::splat(arithmetic, g[i]),
+            );
+            *value = p - length * g;
         }
         Self(values)
     }
@@ -163,8 +166,8 @@ impl<A: Arithmetic> Values<A> {
     #[inline(always)]
     fn middle(self, right: Self, half: Eight<A>) -> Self {
         let mut values = self.0;
-        for f in 0..3 {
-            values[f] = (right.0[f] + self.0[f]) * half;
+        for (value, right) in values.iter_mut().zip(right.0) {
+            *value = (right + *value) * half;
         }
         Self(values)
     }
@@ -230,14 +233,15 @@ impl<const R: usize> Kernel for Rows<'_, R> {
         for r in 0..R {
             let at_first = Eight::load(arithmetic, &displacement[0][r]) - first;
             let at_last = y[r] - last;
-            // Not a number where the motion is not finite.
-            let unmoved = (y[r] - y[r]) + (v[r] - v[r]);
-            sums[r] = weight * (at_first * at_first + at_last * at_last) + unmoved;
+            // Zero, and not a number where the motion is not finite.
+            let nothing = zero * y[r] + zero * v[r];
+            sums[r] = weight * (at_first * at_first + at_last * at_last) + nothing;
         }
-        for i in 1..nodes - 1 {
-            let reading = Eight::splat(arithmetic, ray.readings[i]);
+        let inner = displacement.iter().zip(ray.readings);
+        for (rows, reading) in inner.take(nodes - 1).skip(1) {
+            let reading = Eight::splat(arithmetic, *reading);
             for r in 0..R {
-                let residual = Eight::load(arithmetic, &displacement[i][r]) - reading;
+                let residual = Eight::load(arithmetic, &rows[r]) - reading;
                 sums[r] += weight * (two * (residual * residual));
             }
         }

@@ -8,8 +8,6 @@ use std::cell::RefCell;
 /// One row a node.
 type Rows = [Row; LONGEST + 1];
 
-const EMPTY: Rows = [[0.0; LANES]; LONGEST + 1];
-
 /// A state in every lane, at the ends of both halves.
 pub(super) type Ends = [[Row; 2]; 2];
 
@@ -32,13 +30,20 @@ pub(super) struct Scratch {
 }
 
 thread_local! {
-    static SCRATCH: RefCell<Box<Scratch>> = RefCell::new(Box::new(Scratch {
-        functions: [EMPTY; 3],
-        rates: [EMPTY; 6],
-        motion: [EMPTY; 2],
-        source: [EMPTY; 2],
-        gradient: [EMPTY; 3],
-    }));
+    static SCRATCH: RefCell<Box<Scratch>> = RefCell::default();
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = [[0.0; LANES]; LONGEST + 1];
+        Self {
+            functions: [empty; 3],
+            rates: [empty; 6],
+            motion: [empty; 2],
+            source: [empty; 2],
+            gradient: [empty; 3],
+        }
+    }
 }
 
 /// Does something with this thread's scratch.

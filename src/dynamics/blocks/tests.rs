@@ -215,7 +215,12 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
     oscillator
         .forward_in_blocks_into(&tiny, INITIAL, None, &mut motion)
         .unwrap();
-    assert_eq!(motion, oscillator.forward(&tiny, INITIAL, None).unwrap());
+    let expected = oscillator.forward(&tiny, INITIAL, None).unwrap();
+    let error = distance(&motion.displacement, &expected.displacement);
+    assert!(
+        error < ROUNDING * largest(&expected.displacement),
+        "{error:e}"
+    );
 
     let mut stiff = device(nodes);
     stiff.coefficients[1].fill(1e30);
