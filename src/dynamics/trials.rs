@@ -5,7 +5,6 @@
 
 use super::{State, Trajectory};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
-use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
 
 /// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
 #[derive(Clone, Copy)]
@@ -47,8 +46,7 @@ struct Batch {
 
 impl Trials {
     /// The cost `integral (y - y_obs)^2 dt` at every one of `lengths`, which fall; `None` where the mass is
-    /// not positive or the motion leaves the finite numbers. As many threads work as there are
-    /// batches and processors; the results do not depend on it.
+    /// not positive or the motion leaves the finite numbers.
     pub fn costs(&mut self, ray: Ray, lengths: &[f64]) -> Vec<Option<f64>> {
         self.without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[self.without_mass..];
@@ -56,14 +54,14 @@ impl Trials {
             .chunks(LANES)
             .map(|part| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0])))
             .collect();
-        let count = rows.len().div_ceil(ROWS).max(2.min(rows.len()));
+        let count = rows.len().div_ceil(ROWS);
         self.batches.resize_with(count, Batch::default);
         for (b, batch) in self.batches.iter_mut().enumerate() {
             let share = b * rows.len() / count..(b + 1) * rows.len() / count;
             batch.lengths.clear();
             batch.lengths.extend_from_slice(&rows[share]);
         }
-        self.batches.par_iter_mut().for_each(|batch| batch.run(ray));
+        self.batches.iter_mut().for_each(|batch| batch.run(ray));
         let lanes = self.batches.iter().flat_map(|b| b.costs.as_flattened());
         let finite = |cost: &f64| cost.is_finite().then_some(*cost);
         std::iter::repeat_n(None, self.without_mass)
