@@ -2,7 +2,7 @@
 
 mod common;
 
-use kmcfit::constraints::Statement;
+use kmcfit::constraints::{RowGroup, Statement};
 use kmcfit::dynamics::{Device, Method};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit::objective::GradientKind;
@@ -88,4 +88,36 @@ fn a_cap_that_is_not_reached_is_not_reported() {
     .unwrap();
     assert!((found.best.parameters[0] - 0.8).abs() < 1e-9);
     assert!(active_constraints(&problem, &found.best).is_empty());
+}
+
+/// `-2 c >= -0.8` stops c at 0.4: where the bound gives way by d, c grows by d/2. The wider bound
+/// on the same parameter is not near.
+#[test]
+fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
+    let mut problem = capped(0.2);
+    problem.constraints = Default::default();
+    let mut wide = RowGroup::new("c <= 0.5");
+    wide.push(
+        [(0, 1.0)],
+        [f64::NEG_INFINITY, 0.5],
+        [0.0, common::DURATION],
+    );
+    let mut tight = RowGroup::new("-2 c >= -0.8");
+    tight.push([(0, -2.0)], [-0.8, f64::INFINITY], [0.0, common::DURATION]);
+    problem.constraints.groups = vec![wide, tight];
+    let start = problem.functions.start();
+    let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
+    assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
+    let active = active_constraints(&problem, &found.best);
+    let [bound] = active.as_slice() else {
+        panic!("{active:?}");
+    };
+    assert_eq!(bound.name, "-2 c >= -0.8");
+    assert!(!bound.pushed.is_empty(), "{bound:?}");
+    let expected = 0.5 * found.best.gradient.euclidean[0].abs();
+    // Exact but for the distance of the parameter from its bound.
+    assert!(
+        (bound.multiplier / expected - 1.0).abs() < 1e-10,
+        "{bound:?} {expected}"
+    );
 }

@@ -160,6 +160,9 @@ fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
     let duration = problem.oscillator.grid.duration();
     let metric = problem.functions.relative_metric(&sizes, duration);
     let gradient = &point.gradient.euclidean;
+    if problem.constraints.are_simple() {
+        return Some(simple_multipliers(problem, point, &metric));
+    }
     // Scaled so that the largest entry of the right-hand side is near 1.
     let steepest = gradient
         .iter()
@@ -185,4 +188,42 @@ fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
             cones: cones.collect(),
         }
     })
+}
+
+/// [`multipliers`] where every row bounds one parameter: then the step of steepest descent is stopped
+/// in each parameter by itself, by the nearest of its bounds.
+fn simple_multipliers(problem: &Problem, point: &Point, metric: &[f64]) -> Multipliers {
+    let groups = &problem.constraints.groups;
+    let gradient = &point.gradient.euclidean;
+    let step = |j: usize| -gradient[j] / metric[j];
+    // The bound that stops each parameter: how far it lies along the step, and its row.
+    let mut stops: Vec<Option<(f64, [usize; 2], f64)>> = vec![None; metric.len()];
+    for (g, group) in groups.iter().enumerate() {
+        for i in 0..group.rows.len() {
+            let Some((j, a)) = group.single(i) else {
+                continue;
+            };
+            let [lower, upper] = group.bounds(i).map(|bound| bound / a);
+            let bound = match (step(j) > 0.0) == (a > 0.0) {
+                true => upper,
+                false => lower,
+            };
+            let room = ((bound - point.parameters[j]) * step(j).signum()).max(0.0);
+            let nearer = stops[j].is_none_or(|(nearest, ..)| room < nearest);
+            if room < step(j).abs() && nearer {
+                stops[j] = Some((room, [g, i], a));
+            }
+        }
+    }
+    let mut rows: Vec<Vec<f64>> = groups.iter().map(|g| vec![0.0; g.rows.len()]).collect();
+    for (j, stop) in stops.iter().enumerate() {
+        if let Some((room, [g, i], a)) = *stop {
+            let moved = room * step(j).signum();
+            rows[g][i] = -(metric[j] * moved + gradient[j]) / a;
+        }
+    }
+    Multipliers {
+        rows,
+        cones: Vec::new(),
+    }
 }
