@@ -73,7 +73,8 @@ impl<'a> LinearDevice<'a> {
             stiffness,
             h: oscillator.grid.step(),
         };
-        (fits && lanes::run(Within(device.mass))).then_some(device)
+        // Also behind the end of a record that is shorter than the grid.
+        (fits && lanes::run(Within(mass))).then_some(device)
     }
 
     /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner

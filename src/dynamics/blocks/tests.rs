@@ -228,3 +228,16 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
     let found = oscillator.forward_in_blocks_into(&stiff, INITIAL, None, &mut motion);
     assert_eq!(found.unwrap_err(), expected);
 }
+
+/// A record that ends before the grid does: the device must have mass on all of it.
+#[test]
+fn mass_is_required_behind_the_end_of_a_record() {
+    let nodes = 500;
+    let (oscillator, mut device) = (oscillator(nodes), device(nodes));
+    device.mass[nodes - 1] = -1.0;
+    let mut short = Trajectory::zeros(300);
+    let expected = oscillator.forward_into(&device, INITIAL, None, &mut short);
+    let found = oscillator.forward_in_blocks_into(&device, INITIAL, None, &mut short);
+    assert!(expected.is_err());
+    assert_eq!(found, expected);
+}
