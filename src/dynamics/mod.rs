@@ -31,7 +31,7 @@ mod trials;
 mod window;
 
 pub(crate) use maps::FUNCTIONS;
-pub(crate) use sense_nodes::Accelerations;
+pub(crate) use sense_nodes::{Accelerations, Sight};
 pub(crate) use tangents::{Course, Slot, TILE, TILE_NODES, Tangents};
 
 pub use device::{Device, State};

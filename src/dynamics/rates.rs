@@ -1,8 +1,10 @@
 //! The forward solve with what does not depend on the motion made ahead, eight steps at a time: each
-//! function by the mass, and the drive. What is left of a step are products and sums of its states.
+//! function by the mass, and the drive, times the step and the tableau's factors. What is left of a step
+//! are products and sums of its states, in an order in which few wait for each other: a stage's velocity
+//! waits for four operations on the displacement of the stage before.
 
 use super::stages::Rhs;
-use super::tableau::{MIDPOINT, Position, RK4, Tableau};
+use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{MOST_TERMS, Method, State, Term, Trajectory, window};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
 
@@ -53,11 +55,36 @@ fn place(term: Term) -> usize {
     }
 }
 
-/// `p/m` of each kind of term, and the drive `f/m - b''`, over eight steps at the three positions.
+/// Most stages of a tableau.
+const STAGES: usize = 4;
+
+/// `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of
+/// the tableau.
+#[derive(Clone, Copy)]
 struct Rates {
-    kinds: [[Row; 3]; MOST_TERMS],
-    drive: [Row; 3],
+    kinds: [Row; MOST_TERMS],
+    drive: Row,
 }
+
+/// What the acceleration of a stage brings.
+#[derive(Clone, Copy)]
+struct Brought {
+    /// To the velocity of the next stage.
+    next: Rates,
+    /// To the velocity at the right node.
+    end: Rates,
+}
+
+const NOTHING: Brought = {
+    let rates = Rates {
+        kinds: [[0.0; LANES]; MOST_TERMS],
+        drive: [0.0; LANES],
+    };
+    Brought {
+        next: rates,
+        end: rates,
+    }
+};
 
 struct Forward<'a> {
     rhs: Rhs<'a>,
@@ -104,17 +131,21 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
-        let mut rates = Rates {
-            kinds: [[[0.0; LANES]; 3]; MOST_TERMS],
-            drive: [[0.0; LANES]; 3],
-        };
+        let mut brought = [NOTHING; STAGES];
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
         let motion = &mut *self.trajectory;
         let steps = motion.nodes() - 1;
         (motion.displacement[0], motion.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            prepare(arithmetic, &self.rhs, &self.kinds, from, &mut rates);
+            prepare(
+                arithmetic,
+                tableau,
+                &self.rhs,
+                &self.kinds,
+                from,
+                &mut brought,
+            );
             let to = (from + LANES).min(steps);
             let ends = motion.displacement[from + 1..=to]
                 .iter_mut()
@@ -122,7 +153,7 @@ impl Forward<'_> {
             for (l, (end_y, end_v)) in ends.enumerate() {
                 step(
                     tableau,
-                    &rates,
+                    &brought,
                     there,
                     self.width,
                     self.rhs.dt,
@@ -138,35 +169,54 @@ impl Forward<'_> {
 }
 
 #[inline(always)]
-fn prepare<A: Arithmetic>(
+fn prepare<A: Arithmetic, const S: usize>(
     arithmetic: A,
+    tableau: &Tableau<S>,
     rhs: &Rhs,
     kinds: &[Option<usize>; MOST_TERMS],
     i: usize,
-    rates: &mut Rates,
+    brought: &mut [Brought; STAGES],
 ) {
     let (one, half) = (Eight::splat(arithmetic, 1.0), Eight::splat(arithmetic, 0.5));
     let left = Eight::load(arithmetic, &window::row(&rhs.device.mass, i));
     let right = Eight::load(arithmetic, &window::row(&rhs.device.mass, i + 1));
     let per_mass = [one / left, one / ((right + left) * half), one / right];
-    for (rate, kind) in rates.kinds.iter_mut().zip(kinds) {
+    for (k, kind) in kinds.iter().enumerate() {
         let Some(j) = *kind else {
             continue;
         };
         let p = &rhs.device.coefficients[j];
         let left = Eight::load(arithmetic, &window::row(p, i));
         let right = Eight::load(arithmetic, &window::row(p, i + 1));
-        let p = [left, (right + left) * half, right];
+        let mut p = [left, (right + left) * half, right];
         for q in 0..3 {
-            rate[q] = (p[q] * per_mass[q]).row();
+            p[q] = p[q] * per_mass[q];
+        }
+        for s in 0..S {
+            let [next, end] = factors(tableau, rhs.dt, s);
+            let p = p[tableau.position[s] as usize];
+            brought[s].next.kinds[k] = (p * Eight::splat(arithmetic, next)).row();
+            brought[s].end.kinds[k] = (p * Eight::splat(arithmetic, end)).row();
         }
     }
     let force = window::stepwise(rhs.excitation.and_then(|e| e.force.as_ref()), i);
     let base = window::stepwise(rhs.excitation.and_then(|e| e.base.as_ref()), i);
-    for q in 0..3 {
+    for s in 0..S {
+        let q = tableau.position[s] as usize;
         let push = Eight::load(arithmetic, &force[q]) * per_mass[q];
-        rates.drive[q] = (push - Eight::load(arithmetic, &base[q])).row();
+        let drive = push - Eight::load(arithmetic, &base[q]);
+        let [next, end] = factors(tableau, rhs.dt, s);
+        brought[s].next.drive = (drive * Eight::splat(arithmetic, next)).row();
+        brought[s].end.drive = (drive * Eight::splat(arithmetic, end)).row();
     }
+}
+
+/// The step times what the acceleration of stage `s` counts for the next stage, the only one that sees
+/// it, and for the end of the step.
+#[inline(always)]
+fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] {
+    let next = if s + 1 < S { tableau.a[s + 1][s] } else { 0.0 };
+    [dt * next, dt * tableau.b[s]]
 }
 
 /// One step, in lane `l` of the rates.
@@ -177,7 +227,7 @@ fn prepare<A: Arithmetic>(
 )]
 fn step<const S: usize>(
     tableau: &Tableau<S>,
-    rates: &Rates,
+    brought: &[Brought; STAGES],
     there: [bool; MOST_TERMS],
     width: f64,
     dt: f64,
@@ -185,52 +235,62 @@ fn step<const S: usize>(
     y: &mut f64,
     v: &mut f64,
 ) {
-    let [mut vs, mut accelerations] = [[0.0; S]; 2];
+    let (mut y_s, mut v_s) = (*y, *v);
+    let (mut y_end, mut v_end) = (*y, *v);
     for s in 0..S {
-        let (mut y_s, mut v_s) = (*y, *v);
-        for r in 0..s {
-            if tableau.a[s][r] != 0.0 {
-                let h = dt * tableau.a[s][r];
-                y_s += h * vs[r];
-                v_s += h * accelerations[r];
-            }
+        let phi = Phi::at(there, width, y_s, v_s);
+        let [next, end] = factors(tableau, dt, s);
+        if end != 0.0 {
+            y_end += end * v_s;
+            v_end = phi.add(&brought[s].end, there, l, v_end);
         }
-        let position = match tableau.position[s] {
-            Position::Left => 0,
-            Position::Middle => 1,
-            Position::Right => 2,
-        };
-        // What needs the velocity comes last: it is the last to be known.
-        let mut a = rates.drive[position][l];
-        if there[OFFSET] {
-            a -= rates.kinds[OFFSET][position][l];
+        if s + 1 < S {
+            y_s = *y + next * v_s;
+            v_s = phi.add(&brought[s].next, there, l, *v);
         }
-        if there[STIFFNESS] {
-            a -= rates.kinds[STIFFNESS][position][l] * y_s;
-        }
+    }
+    (*y, *v) = (y_end, v_end);
+}
+
+/// What each term multiplies its function by, at one stage.
+#[derive(Clone, Copy)]
+struct Phi([f64; MOST_TERMS]);
+
+impl Phi {
+    #[inline(always)]
+    fn at(there: [bool; MOST_TERMS], width: f64, y: f64, v: f64) -> Self {
+        let mut phi = [0.0; MOST_TERMS];
+        phi[OFFSET] = 1.0;
+        phi[STIFFNESS] = y;
+        phi[DAMPING] = v;
         if there[CUBIC_STIFFNESS] {
-            a -= rates.kinds[CUBIC_STIFFNESS][position][l] * (y_s * y_s * y_s);
-        }
-        if there[DAMPING] {
-            a -= rates.kinds[DAMPING][position][l] * v_s;
+            phi[CUBIC_STIFFNESS] = y * y * y;
         }
         if there[QUADRATIC_DAMPING] {
-            a -= rates.kinds[QUADRATIC_DAMPING][position][l] * Term::QuadraticDamping.phi(y_s, v_s);
+            phi[QUADRATIC_DAMPING] = Term::QuadraticDamping.phi(y, v);
         }
         if there[COULOMB_FRICTION] {
-            let phi = Term::CoulombFriction { width }.phi(y_s, v_s);
-            a -= rates.kinds[COULOMB_FRICTION][position][l] * phi;
+            phi[COULOMB_FRICTION] = Term::CoulombFriction { width }.phi(y, v);
         }
-        (vs[s], accelerations[s]) = (v_s, a);
+        Self(phi)
     }
-    let [mut by_y, mut by_v] = [0.0; 2];
-    for s in 0..S {
-        if tableau.b[s] != 0.0 {
-            let h = dt * tableau.b[s];
-            by_y += h * vs[s];
-            by_v += h * accelerations[s];
+
+    /// `v + h y''`: what is known first is added first.
+    #[inline(always)]
+    fn add(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, v: f64) -> f64 {
+        let mut v = v + rates.drive[l];
+        for kind in [
+            OFFSET,
+            DAMPING,
+            STIFFNESS,
+            CUBIC_STIFFNESS,
+            QUADRATIC_DAMPING,
+            COULOMB_FRICTION,
+        ] {
+            if there[kind] {
+                v -= rates.kinds[kind][l] * self.0[kind];
+            }
         }
+        v
     }
-    *y += by_y;
-    *v += by_v;
 }

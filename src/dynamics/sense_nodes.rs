@@ -16,7 +16,7 @@ pub(crate) struct Accelerations {
 }
 
 impl Accelerations {
-    const NOTHING: Self = Self {
+    pub const NOTHING: Self = Self {
         value: [0.0; LANES],
         states: [[0.0; LANES]; 2],
         functions: [[0.0; LANES]; FUNCTIONS],
@@ -33,51 +33,79 @@ impl Oscillator {
         states: &Trajectory,
         nodes: std::ops::Range<usize>,
         around: impl Fn(usize) -> Surroundings,
-        mut give: impl FnMut(usize, &Accelerations),
+        give: impl FnMut(usize, &Accelerations),
     ) {
-        let mut seen = Accelerations::NOTHING;
-        let mut from = nodes.start;
-        while from < nodes.end {
-            let [mut forces, mut bases] = [[0.0; LANES]; 2];
-            let rows = forces.iter_mut().zip(&mut bases);
-            for (node, (to_force, to_base)) in (from..nodes.end).zip(rows) {
-                let Surroundings { force, base } = around(node);
-                (*to_force, *to_base) = (force, base);
-            }
-            lanes::run(Sense {
+        lanes::run(Sense {
+            sight: Sight {
                 oscillator: self,
                 device,
                 states,
-                from,
-                driven: [forces, bases],
-                seen: &mut seen,
-            });
+            },
+            nodes,
+            around,
+            give,
+        });
+    }
+}
+
+struct Sense<'a, F, G> {
+    sight: Sight<'a>,
+    nodes: std::ops::Range<usize>,
+    around: F,
+    give: G,
+}
+
+impl<F: Fn(usize) -> Surroundings, G: FnMut(usize, &Accelerations)> Kernel for Sense<'_, F, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let Sense {
+            sight,
+            nodes,
+            around,
+            mut give,
+        } = self;
+        let mut seen = Accelerations::NOTHING;
+        let mut from = nodes.start;
+        while from < nodes.end {
+            let count = (nodes.end - from).min(LANES);
+            sight.see(arithmetic, from, count, &around, &mut seen);
             give(from, &seen);
             from += LANES;
         }
     }
 }
 
-struct Sense<'a> {
-    oscillator: &'a Oscillator,
-    device: &'a Device,
-    states: &'a Trajectory,
-    from: usize,
-    driven: [Row; 2],
-    seen: &'a mut Accelerations,
+/// Whose accelerations are seen.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight<'a> {
+    pub oscillator: &'a Oscillator,
+    pub device: &'a Device,
+    pub states: &'a Trajectory,
 }
 
-impl Kernel for Sense<'_> {
-    type Output = ();
-
+impl Sight<'_> {
+    /// The accelerations at `count` nodes, at most eight, from node `i` on; lanes beyond mean nothing.
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) {
+    pub fn see<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        i: usize,
+        count: usize,
+        around: impl Fn(usize) -> Surroundings,
+        seen: &mut Accelerations,
+    ) {
+        let [mut forces, mut bases] = [[0.0; LANES]; 2];
+        for l in 0..count.min(LANES) {
+            let Surroundings { force, base } = around(i + l);
+            (forces[l], bases[l]) = (force, base);
+        }
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
-        let i = self.from;
         let y = Eight::load(arithmetic, &window::row(&self.states.displacement, i));
         let v = Eight::load(arithmetic, &window::row(&self.states.velocity, i));
         let per_mass = one / Eight::load(arithmetic, &window::row(&self.device.mass, i));
-        let mut push = Eight::load(arithmetic, &self.driven[0]);
+        let mut push = Eight::load(arithmetic, &forces);
         let [mut by_y, mut by_v] = [zero; 2];
         let terms = self.oscillator.terms.iter().zip(&self.device.coefficients);
         for (j, (term, p)) in terms.enumerate() {
@@ -86,11 +114,11 @@ impl Kernel for Sense<'_> {
             push = push - p * response.phi;
             by_y = by_y - p * response.by_y;
             by_v = by_v - p * response.by_v;
-            self.seen.functions[j + 1] = (-response.phi * per_mass).row();
+            seen.functions[j + 1] = (-response.phi * per_mass).row();
         }
         let inertia = push * per_mass;
-        self.seen.functions[0] = (-inertia * per_mass).row();
-        self.seen.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
-        self.seen.value = (inertia - Eight::load(arithmetic, &self.driven[1])).row();
+        seen.functions[0] = (-inertia * per_mass).row();
+        seen.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
+        seen.value = (inertia - Eight::load(arithmetic, &bases)).row();
     }
 }

@@ -49,6 +49,19 @@ impl Design {
         }
     }
 
+    /// The largest size that `B theta` has at any of the nodes.
+    pub fn largest(&self, theta: &[f64], nodes: usize) -> f64 {
+        match self {
+            Design::Empty => 0.0,
+            Design::Identity => largest(theta),
+            // Rounding keeps the order of sizes.
+            Design::Sparse(matrix) if is_column(matrix) => {
+                (largest(matrix.values()) * theta[0]).abs()
+            }
+            Design::Sparse(_) => largest(&self.multiply(theta, nodes)),
+        }
+    }
+
     /// `B theta`.
     pub fn multiply(&self, theta: &[f64], nodes: usize) -> Vec<f64> {
         let mut values = vec![0.0; nodes];
@@ -81,6 +94,20 @@ impl Design {
         (0..nodes).for_each(|i| entries.push(i, 0, 1.0));
         Design::Sparse(CsrMatrix::from(&entries))
     }
+}
+
+/// The largest size of any of the values.
+pub(crate) fn largest(f: &[f64]) -> f64 {
+    // Four at a time: one maximum would wait for itself.
+    let (fours, rest) = f.as_chunks::<4>();
+    let mut most = [0.0f64; 4];
+    for four in fours {
+        for (most, p) in most.iter_mut().zip(four) {
+            *most = most.max(p.abs());
+        }
+    }
+    let rest = rest.iter().map(|p| p.abs());
+    rest.chain(most).fold(0.0, f64::max)
 }
 
 /// Whether a matrix has one column, without gaps: its values are all there is to it.

@@ -1,7 +1,9 @@
 //! The derivatives of all predictions with respect to all parameters, from tangents in lanes.
 
 use super::{Channel, Evaluation, View};
-use crate::dynamics::{Course, FUNCTIONS, Sensed, Slot, TILE, TILE_NODES, Tangents};
+use crate::dynamics::{
+    Accelerations, Course, FUNCTIONS, Sensed, Sight, Slot, TILE, TILE_NODES, Tangents,
+};
 use crate::functions::{Design, Functions};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::problem::{Experiment, Problem};
@@ -12,7 +14,21 @@ impl Problem {
     /// The change of every prediction (rows: readings of all channels of all experiments, in order)
     /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        self.predictions_jacobian_in(evaluation, DMatrix::zeros(0, 0))
+    }
+
+    /// [`Problem::predictions_jacobian`] in the storage of an older one.
+    pub(crate) fn predictions_jacobian_in(
+        &self,
+        evaluation: &Evaluation,
+        old: DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let (rows, columns) = (self.reading_count(), self.parameters());
+        // Every entry of a channel's rows is written.
+        let mut jacobian = match old.shape() == (rows, columns) {
+            true => old,
+            false => DMatrix::zeros(rows, columns),
+        };
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
             let count = experiment.reading_count();
@@ -264,45 +280,41 @@ impl<'a> Reader<'a> {
 
     /// The readings in the steps `steps`, over which the tangents have just gone.
     fn read(&mut self, tangents: &Tangents, steps: Range<usize>, jacobian: &mut DMatrix<f64>) {
-        let places = self.channel.places();
-        let mut glance = Glance::NOTHING;
         let height = jacobian.nrows();
-        loop {
-            let open = places[self.next..].iter().take(LANES);
-            glance.count = open.take_while(|p| p.step < steps.end).count();
-            if glance.count == 0 {
-                return;
+        lanes::run(Read {
+            reader: self,
+            tangents,
+            steps,
+            columns: jacobian.as_mut_slice(),
+            height,
+        });
+    }
+
+    /// Takes the next readings within the steps `steps`: how many they are and where they stand.
+    #[inline(always)]
+    fn glance<A: Arithmetic>(&self, arithmetic: A, steps: &Range<usize>, glance: &mut Glance) {
+        let places = &self.channel.places()[self.next..];
+        glance.count = 0;
+        for (l, place) in places.iter().take(LANES).enumerate() {
+            if place.step >= steps.end {
+                break;
             }
-            for l in 0..glance.count {
-                let place = places[self.next + l];
-                glance.steps[l] = place.step - steps.start;
-                glance.at_left[l] = place.fraction == 0.0;
-                match self.kind {
-                    Kind::Nodes => {
-                        glance.steps[l] += usize::from(place.fraction == 1.0);
-                    }
-                    Kind::Accelerations if place.fraction == 0.0 => {}
-                    _ => glance.set(l, &self.channel.sensed(self.view, self.next + l)),
-                }
+            glance.count = l + 1;
+            glance.steps[l] = place.step - steps.start;
+            glance.at_left[l] = place.fraction == 0.0;
+            match self.kind {
+                Kind::Nodes => glance.steps[l] += usize::from(place.fraction == 1.0),
+                Kind::Accelerations if place.fraction == 0.0 => {}
+                _ => glance.set(l, &self.channel.sensed(self.view, self.next + l)),
             }
-            if self.kind == Kind::Accelerations {
-                self.glance_at_accelerations(&mut glance);
-            }
-            let columns = jacobian.as_mut_slice();
-            lanes::run(Answer {
-                tangents,
-                glance: &glance,
-                kind: self.kind,
-                gain: self.gain,
-                columns,
-                height,
-                row: self.row + self.next,
-            });
-            self.next += glance.count;
+        }
+        if self.kind == Kind::Accelerations && glance.count > 0 {
+            self.glance_at_accelerations(arithmetic, glance);
         }
     }
 
-    fn glance_at_accelerations(&self, glance: &mut Glance) {
+    #[inline(always)]
+    fn glance_at_accelerations<A: Arithmetic>(&self, arithmetic: A, glance: &mut Glance) {
         let View {
             oscillator,
             device,
@@ -310,20 +322,23 @@ impl<'a> Reader<'a> {
             motion,
             ..
         } = self.view;
-        let places = self.channel.places();
-        let nodes = self.next..self.next + glance.count;
+        let sight = Sight {
+            oscillator,
+            device,
+            states: motion,
+        };
         let around = |i| self.channel.around_reading(excitation, i);
-        oscillator.accelerations(device, motion, nodes, around, |_, seen| {
-            for l in 0..glance.count {
-                if places[self.next + l].fraction != 0.0 {
-                    continue;
-                }
-                glance.states[l] = [seen.states[0][l], seen.states[1][l], 0.0, 0.0];
-                for f in 0..FUNCTIONS {
-                    glance.functions[l][0][f] = seen.functions[f][l];
-                }
+        let mut seen = Accelerations::NOTHING;
+        sight.see(arithmetic, self.next, glance.count, around, &mut seen);
+        for l in 0..glance.count.min(LANES) {
+            if !glance.at_left[l] {
+                continue;
             }
-        });
+            glance.states[l] = [seen.states[0][l], seen.states[1][l], 0.0, 0.0];
+            for f in 0..=oscillator.terms.len() {
+                glance.functions[l][0][f] = seen.functions[f][l];
+            }
+        }
     }
 
     /// What the sensor itself adds, and the filter.
@@ -354,50 +369,79 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The readings of a channel within a tile.
+struct Read<'a, 'c> {
+    reader: &'a mut Reader<'c>,
+    tangents: &'a Tangents,
+    steps: Range<usize>,
+    /// Columns of `height` numbers each.
+    columns: &'a mut [f64],
+    height: usize,
+}
+
+impl Kernel for Read<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let mut glance = Glance::NOTHING;
+        loop {
+            self.reader.glance(arithmetic, &self.steps, &mut glance);
+            if glance.count == 0 {
+                return;
+            }
+            let answer = Answer {
+                tangents: self.tangents,
+                glance: &glance,
+                kind: self.reader.kind,
+                gain: self.reader.gain,
+            };
+            let row = self.reader.row + self.reader.next;
+            answer.write(arithmetic, self.columns, self.height, row);
+            self.reader.next += glance.count;
+        }
+    }
+}
+
 /// The answers of up to eight readings to all directions.
 struct Answer<'a> {
     tangents: &'a Tangents,
     glance: &'a Glance,
     kind: Kind,
     gain: f64,
-    /// Columns of `height` numbers each.
-    columns: &'a mut [f64],
-    height: usize,
-    /// Row of the first reading.
-    row: usize,
 }
 
-impl Kernel for Answer<'_> {
-    type Output = ();
-
+impl Answer<'_> {
+    /// Writes them from `row` on into columns of `height` numbers each.
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) {
-        let groups = (self.columns.len() / self.height).div_ceil(LANES);
+    fn write<A: Arithmetic>(&self, arithmetic: A, columns: &mut [f64], height: usize, row: usize) {
+        let groups = (columns.len() / height).div_ceil(LANES);
         let gain = Eight::splat(arithmetic, self.gain);
+        let count = self.glance.count;
         for g in 0..groups {
             let mut answers = [[0.0; LANES]; LANES];
-            for (l, row) in answers.iter_mut().enumerate().take(self.glance.count) {
-                let step = self.glance.steps[l];
-                let answer = match self.kind {
-                    Kind::Nodes => Eight::load(arithmetic, &self.tangents.states(g)[step][0]),
+            for (l, answer) in answers.iter_mut().enumerate().take(count) {
+                let sum = match self.kind {
+                    Kind::Nodes => {
+                        let step = self.glance.steps[l];
+                        Eight::load(arithmetic, &self.tangents.states(g)[step][0])
+                    }
                     Kind::Accelerations | Kind::Any => self.at_step(arithmetic, g, l),
                 };
-                *row = (gain * answer).row();
+                *answer = (gain * sum).row();
             }
             let answers = arithmetic.transpose(&answers);
-            let columns = self.columns.chunks_exact_mut(self.height);
+            let columns = columns.chunks_exact_mut(height);
             for (column, answer) in columns.skip(g * LANES).zip(&answers) {
-                let rows = &mut column[self.row..self.row + self.glance.count];
+                let rows = &mut column[row..row + count];
                 match rows.first_chunk_mut::<LANES>() {
                     Some(rows) => *rows = *answer,
-                    None => rows.copy_from_slice(&answer[..self.glance.count]),
+                    None => rows.copy_from_slice(&answer[..count]),
                 }
             }
         }
     }
-}
 
-impl Answer<'_> {
     /// The answer of reading `l` to the directions of a group, before the gain.
     #[inline(always)]
     fn at_step<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {

@@ -2,8 +2,8 @@
 
 use super::Evaluation;
 use crate::dynamics::quadrature::curvature;
-use crate::dynamics::{Term, Trajectory};
-use crate::functions::Design;
+use crate::dynamics::{MOST_TERMS, Term, Trajectory};
+use crate::functions::largest;
 use crate::problem::Problem;
 
 impl Problem {
@@ -12,42 +12,27 @@ impl Problem {
     /// the experiments that it takes part in. So a damping on its way to zero still has a size, that
     /// of a damping that matters.
     pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+        let terms = &self.oscillator.terms;
         let step = self.oscillator.grid.step();
-        let accelerations: Vec<Vec<f64>> = (evaluation.trajectories.iter())
-            .map(|motion| curvature(&motion.displacement, step))
+        let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
+            .map(|motion| squares(motion, terms, step))
             .collect();
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.assemblies().iter().enumerate() {
             let device = evaluation.device_of(which);
-            let takes_part = |e: &usize| self.experiments[*e].device == which;
-            let squares = |of: &dyn Fn(usize) -> f64| -> f64 {
-                let motions = (0..self.experiments.len()).filter(takes_part);
-                motions.map(of).sum::<f64>().sqrt()
+            // Of the accelerations first, then of what each term sees.
+            let root = |what: usize| -> f64 {
+                let own = self.experiments.iter().zip(&squares);
+                let own = own.filter(|(experiment, _)| experiment.device == which);
+                own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
             let mass = largest(&device.mass);
-            let inertia = mass * squares(&|e| sum_of_squares(&accelerations[e]));
-            let natural = |j: usize| {
-                let response = squares(&|e| {
-                    let Trajectory {
-                        displacement: y,
-                        velocity: v,
-                    } = &evaluation.trajectories[e];
-                    match self.oscillator.terms[j] {
-                        Term::Damping => sum_of_squares(v),
-                        Term::Stiffness => sum_of_squares(y),
-                        term => {
-                            let pairs = y.iter().zip(v);
-                            pairs.map(|(y, v)| term.phi(*y, *v).powi(2)).sum()
-                        }
-                    }
-                });
-                match response > 0.0 {
-                    true => inertia / response,
-                    false => 0.0,
-                }
+            let inertia = mass * root(0);
+            let natural = |j: usize| match root(j + 1) {
+                response if response > 0.0 => inertia / response,
+                _ => 0.0,
             };
-            let terms = 0..self.oscillator.terms.len();
-            let natural = std::iter::once(mass).chain(terms.map(natural));
+            let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
             let own = device.functions().map(largest);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
@@ -60,20 +45,12 @@ impl Problem {
     /// to [`Problem::natural_sizes`] at the first, or to the scalar's own size.
     pub fn relative_change(&self, before: &Evaluation, from: &[f64], after: &[f64]) -> f64 {
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
-        let mut values = vec![0.0; self.functions.nodes()];
         let parts = self.functions.iter().zip(self.functions.ranges());
         let functions = parts.zip(self.natural_sizes(before));
         let mut most = 0.0f64;
         for ((function, range), size) in functions {
             let delta = &delta[range.clone()];
-            let change = match &function.design {
-                Design::Identity => largest(delta),
-                design => {
-                    values.fill(0.0);
-                    design.multiply_add(delta, &mut values);
-                    largest(&values)
-                }
-            };
+            let change = function.design.largest(delta, self.functions.nodes());
             if change != 0.0 {
                 most = most.max(change / size);
             }
@@ -83,19 +60,55 @@ impl Problem {
     }
 }
 
-fn largest(f: &[f64]) -> f64 {
-    // Four at a time: one maximum would wait for itself.
-    let (fours, rest) = f.as_chunks::<4>();
-    let mut most = [0.0f64; 4];
-    for four in fours {
-        for (most, p) in most.iter_mut().zip(four) {
-            *most = most.max(p.abs());
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term.
+fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    let Trajectory {
+        displacement: y,
+        velocity: v,
+    } = motion;
+    let acceleration = curvature(y, step);
+    let mut sums = vec![0.0; terms.len() + 1];
+    let mut phi = [[0.0; PART]; MOST_TERMS];
+    for from in (0..motion.nodes()).step_by(PART) {
+        let range = from..(from + PART).min(motion.nodes());
+        let (y, v) = (&y[range.clone()], &v[range.clone()]);
+        for (term, phi) in terms.iter().zip(&mut phi) {
+            if !matches!(term, Term::Damping | Term::Stiffness) {
+                let pairs = y.iter().zip(v);
+                let values = phi.iter_mut().zip(pairs);
+                values.for_each(|(phi, (y, v))| *phi = term.phi(*y, *v));
+            }
+        }
+        let seen = terms.iter().zip(&phi).map(|(term, phi)| match term {
+            Term::Damping => v,
+            Term::Stiffness => y,
+            _ => &phi[..range.len()],
+        });
+        let columns: Vec<&[f64]> = std::iter::once(&acceleration[range.clone()])
+            .chain(seen)
+            .collect();
+        for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {
+            add_squares(columns, sums);
         }
     }
-    let rest = rest.iter().map(|p| p.abs());
-    rest.chain(most).fold(0.0, f64::max)
+    sums
 }
 
-fn sum_of_squares(f: &[f64]) -> f64 {
-    f.iter().map(|x| x * x).sum()
+/// Nodes whose terms are looked at together.
+const PART: usize = 256;
+
+/// Adds the squares of each column in their order: up to four sums side by side, as each waits for
+/// itself.
+fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
+    let column = |c: usize| columns[c.min(columns.len() - 1)];
+    let (zero, one, two, three) = (column(0), column(1), column(2), column(3));
+    let mut four = [0.0; 4];
+    four[..sums.len()].copy_from_slice(sums);
+    for (((a, b), c), d) in zero.iter().zip(one).zip(two).zip(three) {
+        four[0] += a * a;
+        four[1] += b * b;
+        four[2] += c * c;
+        four[3] += d * d;
+    }
+    sums.copy_from_slice(&four[..sums.len()]);
 }
