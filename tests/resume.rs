@@ -44,8 +44,7 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
         }
         Some(search) => {
             let (rule, which) = (search.rule, &search.penalties);
-            let found =
-                choose_weight_watched(problem, &start, &settings, rule, which, &mut watch);
+            let found = choose_weight_watched(problem, &start, &settings, rule, which, &mut watch);
             let (path, _, fit) = found.expect("a motion");
             (Some(path), fit)
         }
@@ -87,7 +86,10 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
     std::fs::write(place.path().join("fit.checkpoint"), "{\"fit\"").expect("room");
     let mut journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
     let found = run(&model, Some(&mut journal), u64::MAX);
-    assert!(told(&whole) == told(&found), "{name}: other bits after a tear");
+    assert!(
+        told(&whole) == told(&found),
+        "{name}: other bits after a tear"
+    );
     let healed = std::fs::read(&path).expect("the journal");
     assert_eq!(without_times(&healed), without_times(&text), "{name}");
 }
@@ -104,8 +106,7 @@ fn without_times(text: &[u8]) -> Vec<String> {
 
 #[test]
 fn steepest_descent() {
-    let shorter = [("nodes: 2000", "nodes: 2000"), ("iterations: 1000}", "iterations: 40}")];
-    again_and_again("paper", &shorter, 13);
+    again_and_again("paper", &[("iterations: 1000}", "iterations: 40}")], 13);
 }
 
 #[test]
@@ -115,13 +116,13 @@ fn lbfgs_with_its_memory_full() {
 
 #[test]
 fn gauss_newton_with_many_values() {
-    again_and_again("paper-positive", &[], 2);
+    let longer = [("iterations: 100", "iterations: 9"), ("1e-6", "1e-30")];
+    again_and_again("paper-positive", &longer, 2);
 }
 
 #[test]
 fn projected_gradient() {
-    let other = [("gauss-newton", "projected-gradient"), ("initial: data, ", "")];
-    again_and_again("knots", &other, 5);
+    again_and_again("knots", &[("gauss-newton", "projected-gradient")], 17);
 }
 
 #[test]
@@ -131,7 +132,10 @@ fn rounds_of_sigmas() {
 
 #[test]
 fn a_path_of_weights() {
-    let shorter = [("nodes: 2000", "nodes: 400"), ("iterations: 40", "iterations: 12")];
+    let shorter = [
+        ("nodes: 2000", "nodes: 400"),
+        ("iterations: 40", "iterations: 12"),
+    ];
     again_and_again("noisy", &shorter, 9);
 }
 

@@ -80,7 +80,10 @@ pub(super) fn side_by_side(
         match (entry, folder) {
             (Entry::Model(model, heading), Some(folder)) => {
                 let is_kept = journal.as_ref().is_some_and(|j| j.has(&name));
-                match ComparedRun::read(&name, folder.path()).ok().filter(|_| is_kept) {
+                match ComparedRun::read(&name, folder.path())
+                    .ok()
+                    .filter(|_| is_kept)
+                {
                     Some(run) => compared.runs.push(run),
                     None => compared.fit(&name, *model, &heading, &folder, flag)?,
                 }

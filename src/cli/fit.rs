@@ -4,10 +4,11 @@ use super::progress::Progress;
 use super::{Failure, exit_code, interrupt, print, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
-use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::error::{InputError, Place};
+use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, json, predict, summary,
+    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, json, predict,
+    summary,
 };
 use crate::solvers::{
     Fit, Keeper, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
@@ -49,12 +50,13 @@ pub(super) struct Printed {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
-        return Err(
-            InputError::new(Place::Argument("--checkpoint".into()), "no time can be this")
-                .found(seconds)
-                .expected("a number of seconds, 0 (after every iteration) or greater")
-                .into(),
-        );
+        return Err(InputError::new(
+            Place::Argument("--checkpoint".into()),
+            "no time can be this",
+        )
+        .found(seconds)
+        .expected("a number of seconds, 0 (after every iteration) or greater")
+        .into());
     }
     let file = ModelFile::read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
@@ -191,24 +193,25 @@ pub(super) fn search(
     }
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {
-        None => fit_with_noise_watched(problem, &start, settings, &mut watch).map(|(problem, fit)| {
-            let with_sigmas = Model {
+        None => {
+            fit_with_noise_watched(problem, &start, settings, &mut watch).map(|(problem, fit)| {
+                let with_sigmas = Model {
+                    problem,
+                    ..model.clone()
+                };
+                (Some(with_sigmas), None, fit)
+            })
+        }
+        Some(WeightSearch { rule, penalties }) => choose_weight_watched(
+            problem, &start, settings, *rule, penalties, &mut watch,
+        )
+        .map(|(path, problem, fit)| {
+            let weighted = Model {
                 problem,
                 ..model.clone()
             };
-            (Some(with_sigmas), None, fit)
+            (Some(weighted), Some(path), fit)
         }),
-        Some(WeightSearch { rule, penalties }) => {
-            choose_weight_watched(problem, &start, settings, *rule, penalties, &mut watch).map(
-                |(path, problem, fit)| {
-                    let weighted = Model {
-                        problem,
-                        ..model.clone()
-                    };
-                    (Some(weighted), Some(path), fit)
-                },
-            )
-        }
     };
     progress.clear();
     let result = result.or_else(|breakdown| {

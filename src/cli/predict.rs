@@ -4,8 +4,7 @@ use super::{Failure, OK, print, unwritable};
 use crate::dynamics::State;
 use crate::error::{InputError, Place};
 use crate::report::{
-    CsvTable, OutputFolder, PredictedMotion, Run, figures, json, predict, prediction_table,
-    render,
+    CsvTable, OutputFolder, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
 use std::path::PathBuf;
 

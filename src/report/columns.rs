@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Longest table of a run that is read, bytes.
 const LONGEST: u64 = 1 << 30;
-const WRITTEN: &str = "a table written by `kmcfit fit`";
+const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
 /// A table that a run wrote: unlike a user's, it may have no rows and empty fields, and every field
 /// that is not empty is a number.
@@ -25,7 +25,7 @@ impl Columns {
     /// If there is no such file, or a row has another number of fields than the header, or a field that
     /// is neither empty nor a number.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let text = read_text(path, WRITTEN, LONGEST)?;
+        let text = read_text(path, TABLE, LONGEST)?;
         let mut lines = text.lines();
         let header = lines.next().filter(|header| !header.is_empty());
         let header = header.ok_or_else(|| {

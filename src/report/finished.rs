@@ -175,8 +175,7 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<Row>, InputError> {
     let table = table.with_rows(rows, "iteration")?;
     let column = |name: &str| table.required(name);
     let ratio = "gradient_norm_squared_ratio";
-    let (cost, cost_ratio, gradient) =
-        (column("cost")?, column("cost_ratio")?, column(ratio)?);
+    let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
     let (step, change) = (column("step")?, column("relative_change")?);
     Ok((0..rows)
         .map(|i| Row {

@@ -56,7 +56,9 @@ mod tests {
     #[test]
     fn one_at_a_time() {
         let place = tempfile::tempdir().expect("a folder");
-        for take in [Lock::take, |folder: &Path| Lock::by_file(&folder.join(LOCK))] {
+        for take in [Lock::take, |folder: &Path| {
+            Lock::by_file(&folder.join(LOCK))
+        }] {
             let first = take(place.path()).expect("free").expect("a lock");
             assert!(take(place.path()).is_err());
             drop(first);

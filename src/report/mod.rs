@@ -17,8 +17,8 @@
 //! ```
 
 mod axis;
-pub mod compare;
 mod columns;
+pub mod compare;
 mod cost;
 mod csv;
 mod curve;
@@ -46,8 +46,8 @@ pub mod svg;
 mod text;
 mod timings;
 
-pub use compare::Comparison;
 pub use columns::Columns;
+pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use figure::{Axis, Figure, Panel, Scale};

@@ -175,12 +175,7 @@ impl Run<'_, '_> {
         progress
     }
 
-    fn stand_again(
-        &mut self,
-        work: &Work,
-        rows: Vec<Row>,
-        standing: Standing,
-    ) -> Option<Progress> {
+    fn stand_again(&mut self, work: &Work, rows: Vec<Row>, standing: Standing) -> Option<Progress> {
         let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
         if !fits(&standing.parameters.0) {
             return None;

@@ -49,6 +49,12 @@ pub fn predict_held_out(
         solver: Solver::GaussNewton,
         ..settings.clone()
     };
-    let found = search(&alone, &start, &settings, None, &mut Watch::new(&mut |_| {}))?;
+    let found = search(
+        &alone,
+        &start,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )?;
     Ok((alone, found.best.evaluation))
 }

@@ -67,7 +67,14 @@ pub fn without_motion(
     }
     let mut settings = settings.clone();
     settings.stopping.iterations = 0;
-    let fit = search(problem, given, &settings, None, &mut Watch::new(&mut |_| {})).map_err(|_| breakdown)?;
+    let fit = search(
+        problem,
+        given,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )
+    .map_err(|_| breakdown)?;
     let reason = format!(
         "no start within the constraints has a motion ({breakdown}); what is kept is the start as \
          given, which breaks them"

@@ -273,7 +273,12 @@ mod tests {
         let read: Bits = serde_json::from_str(&text).expect("bits");
         let bits = |b: &Bits| b.0.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&read), bits(&numbers));
-        for damaged in [&text[..text.len() - 2], "\"00\"", "\"000000000000000g\"", "1"] {
+        for damaged in [
+            &text[..text.len() - 2],
+            "\"00\"",
+            "\"000000000000000g\"",
+            "1",
+        ] {
             assert!(serde_json::from_str::<Bits>(damaged).is_err(), "{damaged}");
         }
     }

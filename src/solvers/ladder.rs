@@ -10,7 +10,9 @@ use super::all_at_once::all_at_once;
 use super::executor::search;
 use super::recorder::Reference;
 use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, Watch, equation_error};
+use super::{
+    Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, Watch, equation_error,
+};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use std::sync::atomic::Ordering;
@@ -157,7 +159,14 @@ pub fn fit_watched(
                 }));
                 let ended = matches!(fit.outcome.status, Status::Interrupted | Status::TimeLimit);
                 let enough = !climbs || ended || explains(problem, &fit);
-                best = Some(better(best, fit));
+                let interrupted = fit.outcome.status == Status::Interrupted;
+                let outcome = fit.outcome.clone();
+                let mut lower = better(best, fit);
+                if interrupted {
+                    // An earlier rung may have come further, but the ladder was not climbed to its end.
+                    lower.outcome = outcome;
+                }
+                best = Some(lower);
                 if enough {
                     break;
                 }

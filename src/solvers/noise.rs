@@ -69,6 +69,11 @@ pub fn fit_with_noise_watched(
             },
             snapshots: found.snapshots,
             initial_cost: next.initial_cost,
+            // Rounds that were ended from outside are not at their end, wherever the last one came to.
+            outcome: match ended {
+                true => found.outcome,
+                false => next.outcome,
+            },
             ..next
         };
         if ended || change < SETTLED {

@@ -85,8 +85,7 @@ impl Recorder {
         standing: &Standing,
         at: impl Fn(&[f64]) -> Option<Vec<Trajectory>>,
     ) -> Option<Self> {
-        let [initial_cost, started_from, initial_norm_squared] =
-            *standing.references.0.as_slice()
+        let [initial_cost, started_from, initial_norm_squared] = *standing.references.0.as_slice()
         else {
             return None;
         };

@@ -3,7 +3,7 @@
 use super::executor::search;
 use super::gauss_newton::{linearisation_tangents, linearise_at};
 use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Row, Rung, Status, Timings, Watch, fit_watched};
+use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch, fit_watched};
 use crate::dynamics::Breakdown;
 use crate::objective::Channel;
 use crate::problem::Problem;
@@ -208,7 +208,7 @@ struct Walk<'a, 'w> {
     which: &'a [usize],
     watch: &'a mut Watch<'w>,
     from: Vec<f64>,
-    last: Option<Status>,
+    last: Option<Outcome>,
     rungs: Vec<Rung>,
     counts: Counts,
     timings: Timings,
@@ -248,7 +248,7 @@ impl Walk<'_, '_> {
         if self.last.is_none() {
             self.rungs.clone_from(&found.rungs);
         }
-        self.last = Some(found.outcome.status);
+        self.last = Some(found.outcome.clone());
         self.counts += found.counts;
         self.timings += found.timings;
         self.elapsed += found.elapsed;
@@ -272,7 +272,13 @@ impl Walk<'_, '_> {
 
     /// The fit at a point of the path once more, with the rungs that led onto the path.
     fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, Breakdown> {
-        let found = search(problem, from, &self.settings, None, self.watch)?;
+        let mut found = search(problem, from, &self.settings, None, self.watch)?;
+        if self.ended()
+            && let Some(outcome) = self.last.take()
+        {
+            // Only a part of the path was walked, wherever this fit came to.
+            found.outcome = outcome;
+        }
         Ok(Fit {
             rungs: self.rungs.clone(),
             ..found
@@ -280,7 +286,8 @@ impl Walk<'_, '_> {
     }
 
     fn ended(&self) -> bool {
-        matches!(self.last, Some(Status::Interrupted | Status::TimeLimit))
+        let status = self.last.as_ref().map(|outcome| outcome.status);
+        matches!(status, Some(Status::Interrupted | Status::TimeLimit))
     }
 }
 

@@ -47,7 +47,11 @@ impl ComparedRun {
             name: name.into(),
             // Older documents have none.
             max_violation: violation.and_then(serde_json::Value::as_f64),
-            iterations: finished.history.iter().map(|r| r.iteration as f64).collect(),
+            iterations: finished
+                .history
+                .iter()
+                .map(|r| r.iteration as f64)
+                .collect(),
             cost_ratio: finished.history.iter().map(|r| r.cost_ratio).collect(),
             motions: motions(&finished.trajectory, names),
             finished,
