@@ -6,7 +6,7 @@ use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, unwritabl
 use crate::config::{Model, ModelFile, Purpose, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
-use crate::report::{FitHeading, Journal, OutputFolder, json};
+use crate::report::{FitHeading, FitJournal, Journal, OutputFolder, json};
 use crate::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -85,7 +85,15 @@ pub(super) fn side_by_side(
                     .filter(|_| is_kept)
                 {
                     Some(run) => compared.runs.push(run),
-                    None => compared.fit(&name, *model, &heading, &folder, flag)?,
+                    None => {
+                        // A fit of a story goes on where it was, one of a comparison begins.
+                        let before = journal
+                            .as_ref()
+                            .and_then(|_| FitJournal::go_on(folder.path(), &heading).ok());
+                        let begin = || begun(&folder, &heading);
+                        let fit = before.map_or_else(begin, Ok)?;
+                        compared.fit(&name, *model, fit, &folder, flag)?;
+                    }
                 }
                 if let Some(journal) = &mut journal
                     && !compared.interrupted
@@ -129,7 +137,7 @@ impl Compared {
         &mut self,
         name: &str,
         mut model: Model,
-        heading: &FitHeading,
+        journal: FitJournal,
         folder: &OutputFolder,
         flag: &Arc<AtomicBool>,
     ) -> Result<(), Failure> {
@@ -143,7 +151,6 @@ impl Compared {
         }
         model.settings.interrupt = Some(Arc::clone(flag));
         let progress = Progress::new(model.settings.stopping.iterations).named(name);
-        let journal = begun(folder, heading)?;
         match fit_into(folder, &model, &progress, true, journal) {
             Ok((_, status)) => {
                 self.interrupted |= status == Status::Interrupted;
@@ -188,7 +195,7 @@ fn entry(path: &Path, name: &str) -> Result<Entry, InputError> {
     }
     let file = ModelFile::read(path)?;
     let model = build(&file, Purpose::Fit)?;
-    let heading = FitHeading::new(&file, true, None)?;
+    let heading = FitHeading::new(&file, true, None);
     Ok(Entry::Model(Box::new(model), heading))
 }
 

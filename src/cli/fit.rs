@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     let file = ModelFile::read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
-    let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint)?;
+    let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint);
     let flag = interrupt::flag();
     let folder = OutputFolder::prepare(&output_path(arguments))?;
     if let Ok(Some(_)) = FitJournal::heading(folder.path()) {
@@ -84,7 +84,7 @@ pub(super) fn begun(folder: &OutputFolder, heading: &FitHeading) -> Result<FitJo
 pub(super) fn go_on(place: &Path, heading: &FitHeading, printed: &Printed) -> Result<u8, Failure> {
     let file = ModelFile::read(&heading.model)?;
     let model = build(&file, Purpose::Fit)?;
-    let now = FitHeading::new(&file, heading.figures, heading.checkpoint)?;
+    let now = FitHeading::new(&file, heading.figures, heading.checkpoint);
     let flag = interrupt::flag();
     let folder = OutputFolder::prepare(place)?;
     let journal = FitJournal::go_on(folder.path(), &now)?;

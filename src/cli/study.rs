@@ -81,7 +81,7 @@ fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> R
     for model in &story.models {
         let file = ModelFile::read(model)?;
         text += &file.text;
-        text += &FitHeading::new(&file, true, None)?.data_hashes();
+        text += &FitHeading::new(&file, true, None).data_hashes();
     }
     let heading = Heading::new(path, &text, 0.0);
     let flag = interrupt::flag();
@@ -142,7 +142,7 @@ fn study(
     model.settings.interrupt = Some(Arc::clone(&flag));
     let start = model.problem.start();
     let cost = model.problem.evaluate(&start).map_or(f64::NAN, |e| e.cost);
-    let fit = FitHeading::new(&file, false, None)?;
+    let fit = FitHeading::new(&file, false, None);
     let text = file.text.clone() + &fit.data_hashes();
     let heading = Heading::new(path, &text, cost);
     let folder = OutputFolder::prepare(out)?;

@@ -48,7 +48,7 @@ pub enum Memory {
     Nothing,
     /// Of L-BFGS.
     Lbfgs {
-        /// The coordinates of the point, empty where they are those of its parameters.
+        /// The coordinates of the point, as the last step left them.
         x: Bits,
         /// Which of them are logarithms.
         logarithmic: Vec<bool>,

@@ -166,6 +166,32 @@ fn a_study_whose_fit_is_ended() {
     }
 }
 
+/// A story that is killed goes on in the middle of a fit; what was finished is kept, and what an older
+/// run left in its folders is none of it.
+#[test]
+#[cfg(unix)]
+fn a_story_whose_fit_is_ended() {
+    let bench = paper(60);
+    let slow = bench
+        .read("models/knots.yaml")
+        .replace("gauss-newton", "projected-gradient")
+        .replace("{iterations: 50, tolerance: 1e-10}", "{iterations: 400}");
+    bench.write("models/slow.yaml", &slow);
+    bench.run_to(0, &["fit", "models/slow.yaml", "--out", "whole"]);
+    bench.run_to(0, &["fit", "models/knots.yaml", "--out", "run/slow"]);
+    let story = "format: 1\ntitle: Two\nstory: [paper.yaml, slow.yaml]\n";
+    bench.write("models/story.yaml", story);
+    let mut child = started(&bench, &["study", "models/story.yaml", "--out", "run"]);
+    wait_for_line(&bench, "run/slow/fit.journal", 20);
+    child.kill().expect("a child");
+    child.wait().expect("it ends");
+    let first = bench.read("run/paper/result.json");
+    bench.run_to(0, &["resume", "run"]);
+    assert_eq!(bench.read("run/paper/result.json"), first, "fitted again");
+    assert!(bits(&bench, "run/slow") == bits(&bench, "whole"));
+    assert!(bench.path("run/compare.html").exists());
+}
+
 /// The first Ctrl-C writes the best so far, from which `resume` goes on; figures included.
 #[test]
 #[cfg(unix)]

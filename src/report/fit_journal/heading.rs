@@ -38,34 +38,27 @@ pub struct Source {
 }
 
 impl FitHeading {
-    /// The heading for a fit of a model.
-    ///
-    /// # Errors
-    /// If a file that the model names cannot be read.
-    pub fn new(
-        file: &ModelFile,
-        figures: bool,
-        checkpoint: Option<f64>,
-    ) -> Result<Self, InputError> {
+    /// The heading for a fit of a model that was built: what it needs of its files could be read.
+    pub fn new(file: &ModelFile, figures: bool, checkpoint: Option<f64>) -> Self {
         let mut sources = vec![Source {
             file: file.path.clone(),
             hash: hash(file.text.as_bytes()),
         }];
         for path in file.data_files() {
-            let bytes = read_bytes(&path, "a file of readings", LONGEST)?;
+            let bytes = read_bytes(&path, "a file of readings", LONGEST);
             sources.push(Source {
                 file: path,
-                hash: hash(&bytes),
+                hash: bytes.map_or("not read".into(), |bytes| hash(&bytes)),
             });
         }
-        Ok(Self {
+        Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
             model: file.path.clone(),
             figures,
             checkpoint,
             sources,
-        })
+        }
     }
 
     /// The hashes of the files that the model reads.
