@@ -1,12 +1,12 @@
 //! `kmcfit compare`
 
-use super::fit::fit_into;
+use super::fit::{begun, fit_into};
 use super::progress::Progress;
 use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
-use crate::report::{OutputFolder, json};
+use crate::report::{FitHeading, FitJournal, Journal, OutputFolder, json};
 use crate::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,15 +27,18 @@ pub struct Arguments {
 }
 
 /// One argument, read and found usable.
-enum Entry {
+pub(super) enum Entry {
     /// To be fitted into a folder.
-    Model(Box<Model>),
+    Model(Box<Model>, FitHeading),
     /// Finished.
     Run(Box<ComparedRun>),
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let (folder, comparison, interrupted) = side_by_side(&arguments.runs, &arguments.out, false)?;
+    let entries = entries(&arguments.runs, &arguments.out)?;
+    let flag = interrupt::flag();
+    let folder = OutputFolder::prepare(&arguments.out)?;
+    let (comparison, interrupted) = side_by_side(entries, &folder, &flag, None)?;
     comparison
         .write(&folder)
         .map_err(|error| unwritable(folder.path(), &error))?;
@@ -55,50 +58,68 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     })
 }
 
-/// Fits models and reads finished runs; the folder of all, the comparison, and whether it was
-/// interrupted. With `go_on` the fits that were finished in the folder before are read, not made again.
+/// Fits models and reads finished runs; the comparison, and whether it was interrupted. Fits that the
+/// journal of a story says were finished in the folder before are read, not made again.
 pub(super) fn side_by_side(
-    runs: &[PathBuf],
-    out: &Path,
-    go_on: bool,
-) -> Result<(OutputFolder, Comparison, bool), Failure> {
-    // Whatever is wrong with the input is said before anything is run or made.
-    let names = names(runs, out);
-    let entries = (runs.iter().zip(&names))
-        .map(|(path, name)| entry(path, name))
-        .collect::<Result<Vec<_>, _>>()?;
-    let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(out)?;
+    entries: Vec<(String, Entry)>,
+    folder: &OutputFolder,
+    flag: &Arc<AtomicBool>,
+    mut journal: Option<&mut Journal>,
+) -> Result<(Comparison, bool), Failure> {
+    let out = folder.path();
     let mut compared = Compared::default();
-    let mut folders = Vec::new();
-    for (entry, name) in entries.iter().zip(&names) {
-        folders.push(match entry {
-            Entry::Model(_) => Some(OutputFolder::prepare(&out.join(name))?),
+    let mut prepared = Vec::new();
+    for (name, entry) in entries {
+        let folder = match entry {
+            Entry::Model(..) => Some(OutputFolder::prepare(&out.join(&name))?),
             Entry::Run(_) => None,
-        });
+        };
+        prepared.push((name, entry, folder));
     }
-    for ((entry, name), folder) in entries.into_iter().zip(&names).zip(&folders) {
+    for (name, entry, folder) in prepared {
         match (entry, folder) {
-            (Entry::Model(model), Some(folder)) => match finished(name, folder, go_on) {
-                Some(run) => compared.runs.push(run),
-                None => compared.fit(name, *model, folder, &flag)?,
-            },
+            (Entry::Model(model, heading), Some(folder)) => {
+                let is_kept = journal.as_ref().is_some_and(|j| j.has(&name));
+                match ComparedRun::read(&name, folder.path())
+                    .ok()
+                    .filter(|_| is_kept)
+                {
+                    Some(run) => compared.runs.push(run),
+                    None => {
+                        // A fit of a story goes on where it was, one of a comparison begins.
+                        let before = journal
+                            .as_ref()
+                            .and_then(|_| FitJournal::go_on(folder.path(), &heading).ok());
+                        let begin = || begun(&folder, &heading);
+                        let fit = before.map_or_else(begin, Ok)?;
+                        compared.fit(&name, *model, fit, &folder, flag)?;
+                    }
+                }
+                if let Some(journal) = &mut journal
+                    && !compared.interrupted
+                {
+                    let kept = journal.piece(&name, || true, || true);
+                    kept.map_err(|error| unwritable(out, &error))?;
+                }
+            }
             (Entry::Run(run), _) => compared.runs.push(*run),
-            (Entry::Model(_), None) => {}
+            (Entry::Model(..), None) => {}
         }
     }
     let interrupted = compared.interrupted;
-    let comparison = Comparison::new(compared.runs, compared.left_out);
-    Ok((folder, comparison, interrupted))
+    Ok((
+        Comparison::new(compared.runs, compared.left_out),
+        interrupted,
+    ))
 }
 
-/// What a fit left in its folder before, if it came to its end.
-fn finished(name: &str, folder: &OutputFolder, go_on: bool) -> Option<ComparedRun> {
-    let run = ComparedRun::read(name, folder.path())
-        .ok()
-        .filter(|_| go_on)?;
-    let status = &run.finished.document.outcome.status;
-    (status != Status::Interrupted.name()).then_some(run)
+/// The arguments, read and found usable, and what each is called: whatever is wrong with them is said
+/// before anything is run or made.
+pub(super) fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, Entry)>, InputError> {
+    let entries = runs.iter().zip(names(runs, out));
+    entries
+        .map(|(path, name)| Ok((name.clone(), entry(path, &name)?)))
+        .collect()
 }
 
 /// The runs so far.
@@ -116,6 +137,7 @@ impl Compared {
         &mut self,
         name: &str,
         mut model: Model,
+        journal: FitJournal,
         folder: &OutputFolder,
         flag: &Arc<AtomicBool>,
     ) -> Result<(), Failure> {
@@ -129,7 +151,7 @@ impl Compared {
         }
         model.settings.interrupt = Some(Arc::clone(flag));
         let progress = Progress::new(model.settings.stopping.iterations).named(name);
-        match fit_into(folder, &model, &progress, true) {
+        match fit_into(folder, &model, &progress, true, journal) {
             Ok((_, status)) => {
                 self.interrupted |= status == Status::Interrupted;
                 match ComparedRun::read(name, folder.path()) {
@@ -171,8 +193,10 @@ fn entry(path: &Path, name: &str) -> Result<Entry, InputError> {
             .expected(EXPECTED)
             .hint(format!("give its folder: {folder}")));
     }
-    let model = build(&ModelFile::read(path)?, Purpose::Fit)?;
-    Ok(Entry::Model(Box::new(model)))
+    let file = ModelFile::read(path)?;
+    let model = build(&file, Purpose::Fit)?;
+    let heading = FitHeading::new(&file, true, None);
+    Ok(Entry::Model(Box::new(model), heading))
 }
 
 /// What each run is called: the name of its file or folder, with a number where that is taken. A
@@ -209,7 +233,7 @@ fn stem(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let name = match path.is_dir() {
         true => whole.file_name(),
-        false => path.file_stem(),
+        false => return super::stem(path),
     };
     name.map_or_else(|| "run".into(), |name| name.to_string_lossy().into_owned())
 }

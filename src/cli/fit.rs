@@ -1,13 +1,22 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, exit_code, interrupt, print, unwritable};
+use super::{Failure, exit_code, interrupt, print, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
+use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
-use crate::report::{Known, OutputFolder, Run, TimingsSummary, json, predict, summary};
-use crate::solvers::{Fit, Row, Status, WeightPath, choose_weight, fit_with_noise, without_motion};
+use crate::report::{
+    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, json, predict,
+    summary,
+};
+use crate::solvers::{
+    Fit, Keeper, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
+    without_motion,
+};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -27,13 +36,69 @@ pub struct Arguments {
     /// Print where the time went.
     #[arg(long)]
     timings: bool,
+    /// Least time between two checkpoints, from which `resume` goes on after the fit was killed [default:
+    /// 1 s, and more where they take more than 2 % of the time].
+    #[arg(long, value_name = "SECONDS")]
+    checkpoint: Option<f64>,
+}
+
+/// What is printed at the end.
+pub(super) struct Printed {
+    pub json: bool,
+    pub timings: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
+        return Err(InputError::new(
+            Place::Argument("--checkpoint".into()),
+            "no time can be this",
+        )
+        .found(seconds)
+        .expected("a number of seconds, 0 (after every iteration) or greater")
+        .into());
+    }
     let file = ModelFile::read(&arguments.model)?;
-    let mut model = build(&file, Purpose::Fit)?;
-    model.settings.interrupt = Some(interrupt::flag());
+    let model = build(&file, Purpose::Fit)?;
+    let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint);
+    let flag = interrupt::flag();
     let folder = OutputFolder::prepare(&output_path(arguments))?;
+    if let Ok(Some(_)) = FitJournal::heading(folder.path()) {
+        eprintln!("note: the unfinished fit in this folder is not gone on with but begun again");
+    }
+    let printed = Printed {
+        json: arguments.json,
+        timings: arguments.timings,
+    };
+    let journal = begun(&folder, &heading)?;
+    run_in(&folder, model, flag, (heading.figures, journal), &printed)
+}
+
+/// A new journal.
+pub(super) fn begun(folder: &OutputFolder, heading: &FitHeading) -> Result<FitJournal, Failure> {
+    let journal = FitJournal::begin(folder.path(), heading);
+    Ok(journal.map_err(|error| unwritable(folder.path(), &error))?)
+}
+
+/// Goes on with a fit that did not come to its end.
+pub(super) fn go_on(place: &Path, heading: &FitHeading, printed: &Printed) -> Result<u8, Failure> {
+    let file = ModelFile::read(&heading.model)?;
+    let model = build(&file, Purpose::Fit)?;
+    let now = FitHeading::new(&file, heading.figures, heading.checkpoint);
+    let flag = interrupt::flag();
+    let folder = OutputFolder::prepare(place)?;
+    let journal = FitJournal::go_on(folder.path(), &now)?;
+    run_in(&folder, model, flag, (heading.figures, journal), printed)
+}
+
+fn run_in(
+    folder: &OutputFolder,
+    mut model: Model,
+    flag: Arc<AtomicBool>,
+    (with_figures, journal): (bool, FitJournal),
+    printed: &Printed,
+) -> Result<u8, Failure> {
+    model.settings.interrupt = Some(flag);
     for remark in &model.remarks {
         eprintln!("note: {remark}");
     }
@@ -41,64 +106,76 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         eprintln!("warning: {warning}");
     }
     let progress = Progress::new(model.settings.stopping.iterations);
-    let (document, status) = fit_into(&folder, &model, &progress, !arguments.no_report)?;
-    if arguments.json {
-        print(&json(&document));
-    } else {
-        print(&summary(&document));
-        if arguments.timings {
-            print(&format!("\n{}\n", document.timings.text()));
-        }
-        print(&format!("results in {}\n", folder.path().display()));
+    let (document, status) = fit_into(folder, &model, &progress, with_figures, journal)?;
+    tell(&document, folder.path(), printed);
+    if status == Status::Interrupted {
+        let folder = folder.path().display();
+        eprintln!("note: `kmcfit resume {folder}` goes on with this fit");
     }
     Ok(exit_code(status))
 }
 
-/// Fits a model and writes everything that the run leaves behind into a folder.
+/// Prints what a run came to.
+pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) {
+    if printed.json {
+        return print(&json(document));
+    }
+    print(&summary(document));
+    if printed.timings {
+        print(&format!("\n{}\n", document.timings.text()));
+    }
+    print(&format!("results in {}\n", folder.display()));
+}
+
+/// Fits a model and writes everything that the run leaves behind into a folder. An older run there
+/// stays as it is until the new one is complete.
 pub(super) fn fit_into(
     folder: &OutputFolder,
     model: &Model,
     progress: &Progress,
     with_figures: bool,
+    mut journal: FitJournal,
 ) -> Result<(ResultDocument, Status), Failure> {
     let clock = Instant::now();
-    // A folder holds a result only of the run that wrote the rest of it.
-    folder
-        .begin()
-        .map_err(|error| unwritable(folder.path(), &error))?;
-    let (weighted, path, found) = match search(model, progress) {
+    let full = |error| unwritable(folder.path(), &error);
+    let result = search(model, progress, Some(&mut journal));
+    if let Some(trouble) = journal.trouble() {
+        eprintln!("warning: the journal of the fit could not be kept: {trouble}");
+    }
+    let (weighted, path, found) = match result {
         Ok(found) => found,
         Err(reason) => {
             let document = FailureDocument::new(&model.title, &reason);
-            folder
-                .write("result.json", &json(&document))
-                .map_err(|error| unwritable(folder.path(), &error))?;
+            let stage = folder.stage().map_err(full)?;
+            stage.commit_run(&json(&document)).map_err(full)?;
+            FitJournal::clear(folder.path()).map_err(full)?;
             return Err(Failure::Numerical(reason));
         }
     };
     let model = weighted.as_ref().unwrap_or(model);
     let predictions = predictions(model, &found);
     let known = Known::of(model, &found);
-    let run = Run {
+    let run = FittedModel {
         known: &known,
         model,
         fit: &found,
         predictions: &predictions,
         weights: path.as_ref(),
     };
-    let full = |error| unwritable(folder.path(), &error);
     let mut document = run.document();
-    let writing = run.write(folder, with_figures).map_err(full)?;
+    let mut stage = folder.stage().map_err(full)?;
+    let writing = run.write(&mut stage, with_figures).map_err(full)?;
     let before = &model.preparation;
-    document.timings = TimingsSummary::new(
-        &found,
-        before.reading + writing,
-        before.total + clock.elapsed(),
-    );
-    folder
-        .write("result.json", &json(&document))
-        .map_err(full)?;
-    Ok((document, found.outcome.status))
+    let outside = before.reading + writing;
+    // A fit that was gone on with took longer than this clock saw.
+    let total = (before.total + clock.elapsed()).max(outside + found.elapsed);
+    document.timings = TimingsSummary::new(&found, outside, total);
+    stage.commit_run(&json(&document)).map_err(full)?;
+    let status = found.outcome.status;
+    if status != Status::Interrupted {
+        FitJournal::clear(folder.path()).map_err(full)?;
+    }
+    Ok((document, status))
 }
 
 /// The fit; where a rule chooses the weight of the smoothness also the model with that weight and
@@ -106,29 +183,35 @@ pub(super) fn fit_into(
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
+    keeper: Option<&mut dyn Keeper>,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
     let start = model.problem.functions.start();
     let mut observe = |row: &Row| progress.show(row);
+    let mut watch = Watch::new(&mut observe);
+    if let Some(keeper) = keeper {
+        watch = watch.keeping(keeper);
+    }
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {
-        None => fit_with_noise(problem, &start, settings, &mut observe).map(|(problem, fit)| {
-            let with_sigmas = Model {
+        None => {
+            fit_with_noise_watched(problem, &start, settings, &mut watch).map(|(problem, fit)| {
+                let with_sigmas = Model {
+                    problem,
+                    ..model.clone()
+                };
+                (Some(with_sigmas), None, fit)
+            })
+        }
+        Some(WeightSearch { rule, penalties }) => choose_weight_watched(
+            problem, &start, settings, *rule, penalties, &mut watch,
+        )
+        .map(|(path, problem, fit)| {
+            let weighted = Model {
                 problem,
                 ..model.clone()
             };
-            (Some(with_sigmas), None, fit)
+            (Some(weighted), Some(path), fit)
         }),
-        Some(WeightSearch { rule, penalties }) => {
-            choose_weight(problem, &start, settings, *rule, penalties, &mut observe).map(
-                |(path, problem, fit)| {
-                    let weighted = Model {
-                        problem,
-                        ..model.clone()
-                    };
-                    (Some(weighted), Some(path), fit)
-                },
-            )
-        }
     };
     progress.clear();
     let result = result.or_else(|breakdown| {
@@ -160,8 +243,6 @@ fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
 
 /// `runs/NAME` with the name of the model file.
 fn output_path(arguments: &Arguments) -> PathBuf {
-    arguments.out.clone().unwrap_or_else(|| {
-        let name = arguments.model.file_stem().unwrap_or_default();
-        Path::new("runs").join(name)
-    })
+    let own = || Path::new("runs").join(stem(&arguments.model));
+    arguments.out.clone().unwrap_or_else(own)
 }

@@ -6,6 +6,7 @@ mod fit;
 mod interrupt;
 mod predict;
 mod progress;
+mod resume;
 mod simulate;
 mod study;
 
@@ -32,7 +33,7 @@ enum Command {
     Predict(predict::Arguments),
     Compare(compare::Arguments),
     Study(study::Arguments),
-    Resume(study::ResumeArguments),
+    Resume(resume::Arguments),
 }
 
 /// Everything is as asked for.
@@ -69,7 +70,7 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
-        Command::Resume(arguments) => study::resume(&arguments),
+        Command::Resume(arguments) => resume::run(&arguments),
     };
     ExitCode::from(match result {
         Ok(code) => code,
@@ -93,6 +94,15 @@ fn exit_code(status: Status) -> u8 {
         | Status::Stalled
         | Status::Infeasible
         | Status::Failed => NOT_CONVERGED,
+    }
+}
+
+/// The name of a model file without its ending, for a folder: never one that leads out of the folder
+/// above, as `..` does.
+fn stem(model: &Path) -> String {
+    match model.file_stem().map(|stem| stem.to_string_lossy()) {
+        Some(stem) if !stem.trim_matches('.').is_empty() => stem.into_owned(),
+        _ => "run".into(),
     }
 }
 

@@ -4,8 +4,7 @@ use super::{Failure, OK, print, unwritable};
 use crate::dynamics::State;
 use crate::error::{InputError, Place};
 use crate::report::{
-    CsvTable, FinishedRun, OutputFolder, PredictedMotion, figures, json, predict, prediction_table,
-    render,
+    CsvTable, OutputFolder, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
 use std::path::PathBuf;
 
@@ -31,7 +30,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .iter()
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
-    let run = FinishedRun::open(&arguments.run)?;
+    let run = Run::open(&arguments.run)?;
     let folder = arguments
         .out
         .as_deref()
@@ -79,7 +78,11 @@ fn write(folder: &OutputFolder, times: &[f64], motions: &[PredictedMotion]) -> s
             table = table.column(format!("true_y_m_{}", i + 1), truth.displacement.clone());
         }
     }
-    folder.write("predictions.csv", &table.to_csv())?;
     let figure = figures::predictions(times, motions);
-    folder.write("figures/predictions.svg", &render(&figure))
+    let mut stage = folder.stage()?;
+    let mut batch = stage.batch();
+    batch.write("predictions.csv", &table.to_csv())?;
+    batch.write("figures/predictions.svg", &render(&figure))?;
+    batch.finish()?;
+    stage.commit()
 }

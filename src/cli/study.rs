@@ -1,17 +1,17 @@
-//! `kmcfit study` and `kmcfit resume`
+//! `kmcfit study`
 
-use super::compare::{side_by_side, verdict};
+use super::compare::{entries, side_by_side, verdict};
 use super::fit::search;
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, unwritable};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, Story, build};
-use crate::error::InputError;
+use crate::error::{InputError, Place};
 use crate::identifiability::count;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::report::study::{StudyDocument, gather};
-use crate::report::{FinishedRun, Heading, Journal, OutputFolder, json};
-use crate::solvers::Status;
+use crate::report::{FitHeading, FitJournal, Heading, Journal, OutputFolder, Run, json};
+use crate::solvers::{Keeper, Status};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,95 +33,66 @@ pub struct Arguments {
     threads: Option<usize>,
 }
 
-/// Go on with a study that was interrupted.
-#[derive(Debug, clap::Args)]
-pub struct ResumeArguments {
-    /// Folder of the study.
-    study: PathBuf,
-    /// Print the result document instead of the summary.
-    #[arg(long)]
-    json: bool,
-    /// Threads; the results do not depend on them [default: one per core].
-    #[arg(long)]
-    threads: Option<usize>,
-}
-
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    if arguments.threads == Some(0) {
-        return Err(InputError::new(
-            crate::error::Place::Argument("--threads".into()),
-            "a study needs a thread",
-        )
-        .found(0)
-        .expected("1 or more")
-        .into());
-    }
-    let name = arguments.model.file_stem().unwrap_or_default();
+    let threads = threads(arguments.threads)?;
     let out = arguments
         .out
         .clone()
-        .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", name.to_string_lossy())));
+        .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", stem(&arguments.model))));
     if arguments.model.is_dir() {
         // A run of another format, or one that failed, is refused here.
-        let run = FinishedRun::open(&arguments.model)?;
+        let run = Run::open(&arguments.model)?;
         let model = PathBuf::from(&run.document.model.file);
-        let threads = threads(arguments.threads);
         return study(&model, &out, arguments.json, threads, false);
     }
     match Story::read(&arguments.model)? {
         Some(story) => tell(&arguments.model, &story, &out, arguments.json, false),
-        None => {
-            let threads = threads(arguments.threads);
-            study(&arguments.model, &out, arguments.json, threads, false)
-        }
+        None => study(&arguments.model, &out, arguments.json, threads, false),
     }
 }
 
-pub fn resume(arguments: &ResumeArguments) -> Result<u8, Failure> {
-    let heading = Journal::heading(&arguments.study)?;
-    if let Some(story) = Story::read(&heading.model)? {
-        return tell(
-            &heading.model,
-            &story,
-            &arguments.study,
-            arguments.json,
-            true,
-        );
+/// Goes on with a study or a story that did not come to its end.
+pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
+    let threads = threads(asked)?;
+    let model = Journal::heading(folder)?.model;
+    match Story::read(&model)? {
+        Some(story) => tell(&model, &story, folder, as_json, true),
+        None => study(&model, folder, as_json, threads, true),
     }
-    let threads = threads(arguments.threads);
-    study(
-        &heading.model,
-        &arguments.study,
-        arguments.json,
-        threads,
-        true,
-    )
 }
 
-fn threads(asked: Option<usize>) -> usize {
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    asked.unwrap_or_else(cores).max(1)
+fn threads(asked: Option<usize>) -> Result<usize, InputError> {
+    match asked {
+        Some(0) => Err(InputError::new(
+            Place::Argument("--threads".into()),
+            "a study needs a thread",
+        )
+        .found(0)
+        .expected("1 or more")),
+        Some(threads) => Ok(threads),
+        None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
+    }
 }
 
 /// Runs the models of a story and tells them on one page.
 fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> Result<u8, Failure> {
+    let entries = entries(&story.models, out)?;
     let mut text = String::new();
     for model in &story.models {
-        // Whatever is wrong with a model is said before anything is made.
         let file = ModelFile::read(model)?;
-        build(&file, Purpose::Fit)?;
         text += &file.text;
+        text += &FitHeading::new(&file, true, None).data_hashes();
     }
     let heading = Heading::new(path, &text, 0.0);
-    if go_on {
+    let flag = interrupt::flag();
+    let folder = OutputFolder::prepare(out)?;
+    let mut journal = match go_on {
         // Refused where a model is another one by now.
-        Journal::go_on(out, &heading)?;
-    } else {
-        let folder = OutputFolder::prepare(out)?;
-        Journal::begin(folder.path(), &heading)
-            .map_err(|error| unwritable(folder.path(), &error))?;
-    }
-    let (folder, comparison, interrupted) = side_by_side(&story.models, out, go_on)?;
+        true => Journal::go_on(folder.path(), &heading)?,
+        false => Journal::begin(folder.path(), &heading)
+            .map_err(|error| unwritable(folder.path(), &error))?,
+    };
+    let (comparison, interrupted) = side_by_side(entries, &folder, &flag, Some(&mut journal))?;
     let comparison = match interrupted {
         true => comparison,
         false => comparison.told_as(&story.title),
@@ -171,7 +142,9 @@ fn study(
     model.settings.interrupt = Some(Arc::clone(&flag));
     let start = model.problem.start();
     let cost = model.problem.evaluate(&start).map_or(f64::NAN, |e| e.cost);
-    let heading = Heading::new(path, &file.text, cost);
+    let fit = FitHeading::new(&file, false, None);
+    let text = file.text.clone() + &fit.data_hashes();
+    let heading = Heading::new(path, &text, cost);
     let folder = OutputFolder::prepare(out)?;
     let journal = match go_on {
         true => Journal::go_on(folder.path(), &heading)?,
@@ -180,6 +153,9 @@ fn study(
     };
     let mut work = Work {
         model: &model,
+        folder: folder.path(),
+        heading: fit,
+        go_on,
         journal,
         flag,
         threads,
@@ -245,6 +221,15 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     }
 }
 
+/// The journal of the fit of a study; a fit without one begins again when it is gone on with.
+fn fit_journal(folder: &Path, heading: &FitHeading, go_on: bool) -> Option<FitJournal> {
+    let before = go_on.then(|| FitJournal::go_on(folder, heading));
+    match before {
+        Some(Ok(journal)) => Some(journal),
+        _ => FitJournal::begin(folder, heading).ok(),
+    }
+}
+
 /// Why a study cannot go on.
 enum Trouble {
     Disk(io::Error),
@@ -260,6 +245,10 @@ impl From<io::Error> for Trouble {
 /// A study at work.
 struct Work<'a> {
     model: &'a Model,
+    folder: &'a Path,
+    /// Of the journal of the fit.
+    heading: FitHeading,
+    go_on: bool,
     journal: Journal,
     flag: Arc<AtomicBool>,
     threads: usize,
@@ -286,7 +275,13 @@ impl Work<'_> {
                 if std::io::stderr().is_terminal() {
                     eprintln!("studying: {name}");
                 }
-                self.journal.piece(name, || $compute)?
+                let flag = Arc::clone(&self.flag);
+                // What an interrupt may have cut short is no piece.
+                let whole = || !flag.load(Ordering::Relaxed);
+                match self.journal.piece(name, || $compute, whole)? {
+                    Some(result) => result,
+                    None => return Ok(false),
+                }
             }};
         }
         let spectrum = piece!("spectrum", gather::spectrum(&problem, &theta, &evaluation));
@@ -364,12 +359,26 @@ impl Work<'_> {
     fn fit(&mut self) -> Result<Option<(Problem, Vec<f64>, Evaluation)>, Trouble> {
         let model = self.model;
         let progress = Progress::new(model.settings.stopping.iterations);
-        let fitted = self.journal.piece("fit", || {
-            let (weighted, _, found) = search(model, &progress)?;
+        let (folder, heading, go_on) = (self.folder, &self.heading, self.go_on);
+        let flag = Arc::clone(&self.flag);
+        let mut interrupted = None;
+        let compute = || {
+            let mut keeper = fit_journal(folder, heading, go_on);
+            let keeper = keeper.as_mut().map(|k| k as &mut dyn Keeper);
+            let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
+            interrupted = Some(gather::fit(problem, &found));
             Ok::<_, String>(gather::fit(problem, &found))
-        })?;
+        };
+        let whole = || !flag.load(Ordering::Relaxed);
+        let fitted = self.journal.piece("fit", compute, whole)?;
+        let Some(fitted) = fitted else {
+            // The best so far is told, and the journal of the fit has what it goes on from.
+            self.document.fit = interrupted;
+            return Ok(None);
+        };
         let fit = fitted.map_err(Trouble::Numerical)?;
+        FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted.name();
         let problem = gather::as_fitted(&model.problem, &fit);
         let theta = fit.parameters.clone();

@@ -97,12 +97,44 @@ impl ModelFile {
         InputError::new(place(&self.path, position), problem).key(key)
     }
 
+    /// The files that the model reads, each once, in the order of the text.
+    pub fn data_files(&self) -> Vec<PathBuf> {
+        let mut names = Vec::new();
+        if let Ok(value) = serde_yaml::from_str::<serde_yaml::Value>(&self.text) {
+            collect_data(&value, &mut names);
+        }
+        let mut files: Vec<PathBuf> = Vec::new();
+        for file in names.iter().map(|name| self.resolve(name)) {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+        files
+    }
+
     /// A path in the model file, relative to its folder.
     pub fn resolve(&self, relative: impl AsRef<Path>) -> PathBuf {
         match self.path.parent() {
             Some(folder) => folder.join(relative),
             None => relative.as_ref().to_path_buf(),
         }
+    }
+}
+
+/// The values of all keys `data` that name a file.
+fn collect_data(value: &serde_yaml::Value, names: &mut Vec<String>) {
+    use serde_yaml::Value;
+    match value {
+        Value::Mapping(map) => {
+            for (key, value) in map {
+                match (key.as_str(), value.as_str()) {
+                    (Some("data"), Some(name)) => names.push(name.to_owned()),
+                    _ => collect_data(value, names),
+                }
+            }
+        }
+        Value::Sequence(list) => list.iter().for_each(|value| collect_data(value, names)),
+        _ => {}
     }
 }
 

@@ -1,22 +1,33 @@
 //! An output folder whose files appear whole or not at all.
 
+use super::lock::Lock;
 use crate::error::{InputError, Place};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
-/// A folder that can be written to.
+/// Names of files and folders on their way begin so.
+const ON_ITS_WAY: &str = ".kmcfit-";
+/// Folders in an output folder.
+const FOLDERS: [&str; 2] = ["figures", "readings"];
+/// The file without which a folder holds no run.
+const RESULT: &str = "result.json";
+/// The tables of a run.
+const TABLES: [&str; 3] = ["history.csv", "functions.csv", "trajectory.csv"];
+
+/// A folder that can be written to, and by nobody else as long as this lives.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
+    _lock: Option<Lock>,
 }
 
 impl OutputFolder {
-    /// Makes the folder if need be and proves that a file can be made in it, so that a long run does
-    /// not end with nowhere to put its results.
+    /// Makes the folder if need be, locks it, and proves that a file can be made in it, so that a long
+    /// run does not end with nowhere to put its results. What a killed run left on its way is removed.
     ///
     /// # Errors
-    /// If the folder cannot be made or written to.
+    /// If the folder cannot be made or written to, or another run writes to it.
     pub fn prepare(path: &Path) -> Result<Self, InputError> {
         let refuse = |problem: &str, error: &io::Error| {
             InputError::new(Place::Argument("--out".into()), problem)
@@ -24,11 +35,16 @@ impl OutputFolder {
                 .expected("a folder that can be written to")
         };
         make_folder(path).map_err(|e| refuse("the output folder cannot be made", &e))?;
-        NamedTempFile::new_in(path)
+        let lock = Lock::take(path).map_err(|_| taken(path))?;
+        on_its_way()
+            .tempfile_in(path)
             .map_err(|e| refuse("the output folder cannot be written to", &e.kind().into()))?;
-        Ok(Self {
+        let folder = Self {
             path: path.to_path_buf(),
-        })
+            _lock: lock,
+        };
+        folder.tidy();
+        Ok(folder)
     }
 
     /// Where it is.
@@ -36,22 +52,30 @@ impl OutputFolder {
         &self.path
     }
 
-    /// Takes away what an older run left that the new one may not write again: its result, without
-    /// which the folder holds no run, its figures and its tables of readings.
-    ///
-    /// # Errors
-    /// What the file system says.
-    pub fn begin(&self) -> io::Result<()> {
-        let gone = |result: io::Result<()>| match result {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-            _ => Ok(()),
-        };
-        gone(std::fs::remove_file(self.path.join("result.json")))?;
-        for (name, kind) in [("figures", "svg"), ("readings", "csv")] {
-            let Ok(files) = std::fs::read_dir(self.path.join(name)) else {
-                continue;
-            };
-            for file in files.flatten().map(|entry| entry.path()) {
+    /// Removes what was on its way when an earlier run was killed. What cannot be removed does no harm.
+    fn tidy(&self) {
+        let folders = FOLDERS.map(|name| self.path.join(name));
+        for folder in std::iter::once(&self.path).chain(&folders) {
+            for path in entries(folder) {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                if name.starts_with(ON_ITS_WAY) {
+                    let _ = match path.is_dir() {
+                        true => std::fs::remove_dir_all(&path),
+                        false => std::fs::remove_file(&path),
+                    };
+                }
+            }
+        }
+    }
+
+    /// Takes away what an older run left: its result first, without which the folder holds no run, then
+    /// its tables and figures.
+    fn retire(&self) -> io::Result<()> {
+        for name in std::iter::once(RESULT).chain(TABLES) {
+            gone(std::fs::remove_file(self.path.join(name)))?;
+        }
+        for (name, kind) in FOLDERS.into_iter().zip(["svg", "csv"]) {
+            for file in entries(&self.path.join(name)) {
                 if file.extension().is_some_and(|e| e == kind) {
                     gone(std::fs::remove_file(file))?;
                 }
@@ -66,16 +90,117 @@ impl OutputFolder {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, name: &str, contents: &str) -> io::Result<()> {
-        write_whole(&self.path.join(name), contents)
+        let path = self.path.join(name);
+        make_own_folder(&self.path, &path)?;
+        write_whole(&path, contents)
     }
 
     /// Several files, which are made durable together.
     pub fn batch(&self) -> Batch<'_> {
         Batch {
-            folder: self,
+            folder: &self.path,
             files: Vec::new(),
+            names: None,
         }
     }
+
+    /// Files that are seen together: none of them before all are written and durable.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn stage(&self) -> io::Result<Stage<'_>> {
+        Ok(Stage {
+            folder: self,
+            place: on_its_way().tempdir_in(&self.path)?,
+            names: Vec::new(),
+        })
+    }
+}
+
+fn taken(path: &Path) -> InputError {
+    InputError::new(
+        Place::Argument("--out".into()),
+        "another run is writing to this folder",
+    )
+    .found(path.display())
+    .expected("a folder of its own for each run")
+    .hint("wait for the other run, or give another folder with --out")
+}
+
+/// What is in a folder; nothing where it is no folder or is a link, which may lead anywhere.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    if folder.is_symlink() {
+        return Vec::new();
+    }
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    entries.flatten().map(|entry| entry.path()).collect()
+}
+
+fn gone(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// The results of a run on their way: written to a folder beside the old ones, which stay whole until
+/// the new ones are, and then put in their places by renaming. A full disk costs the new ones only.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    folder: &'a OutputFolder,
+    place: TempDir,
+    names: Vec<String>,
+}
+
+impl Stage<'_> {
+    /// Adds files, durable when the batch is finished, but not yet seen.
+    pub fn batch(&mut self) -> Batch<'_> {
+        Batch {
+            folder: self.place.path(),
+            files: Vec::new(),
+            names: Some(&mut self.names),
+        }
+    }
+
+    /// Puts the files in their places, in the order in which they were added.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn commit(self) -> io::Result<()> {
+        for name in &self.names {
+            let path = self.folder.path.join(name);
+            make_own_folder(&self.folder.path, &path)?;
+            std::fs::rename(self.place.path().join(name), path)?;
+        }
+        Ok(())
+    }
+
+    /// The same for a run with `result`, which comes last, so that a folder that has one is complete:
+    /// an older run goes before the first new file comes, its result before all.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn commit_run(mut self, result: &str) -> io::Result<()> {
+        let mut batch = self.batch();
+        batch.write(RESULT, result)?;
+        batch.finish()?;
+        self.folder.retire()?;
+        self.commit()
+    }
+}
+
+/// Makes the folder of `path` inside `folder`; a link in its place could lead out of it.
+fn make_own_folder(folder: &Path, path: &Path) -> io::Result<()> {
+    let Some(parent) = path.parent().filter(|parent| *parent != folder) else {
+        return Ok(());
+    };
+    if parent.is_symlink() {
+        return Err(io::Error::other(format!(
+            "{} is a link, and what is written there would be elsewhere",
+            parent.display()
+        )));
+    }
+    make_folder(parent)
 }
 
 /// So many files are made durable at once: each takes a thread and is open until then.
@@ -85,8 +210,10 @@ const AT_ONCE: usize = 16;
 /// asked for all at once: a run's tables then take a few milliseconds and not some each.
 #[derive(Debug)]
 pub struct Batch<'a> {
-    folder: &'a OutputFolder,
+    folder: &'a Path,
     files: Vec<(NamedTempFile, PathBuf)>,
+    /// Where the names of the files are noted.
+    names: Option<&'a mut Vec<String>>,
 }
 
 impl Batch<'_> {
@@ -95,8 +222,12 @@ impl Batch<'_> {
     /// # Errors
     /// What the file system says.
     pub fn write(&mut self, name: &str, contents: &str) -> io::Result<()> {
-        let path = self.folder.path.join(name);
+        let path = self.folder.join(name);
+        make_own_folder(self.folder, &path)?;
         self.files.push((written(&path, contents)?, path));
+        if let Some(names) = &mut self.names {
+            names.push(name.to_owned());
+        }
         match self.files.len() < AT_ONCE {
             true => Ok(()),
             false => self.settle(),
@@ -144,6 +275,15 @@ pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
     Ok(())
 }
 
+/// A new file at `path`, in the place of what was there: it begins with `contents` and can be appended
+/// to.
+///
+/// # Errors
+/// What the file system says.
+pub(super) fn begun(path: &Path, contents: &str) -> io::Result<std::fs::File> {
+    written(path, contents)?.persist(path).map_err(|e| e.error)
+}
+
 /// A temporary file with `contents` in the folder of `path`, which is made if need be.
 fn written(path: &Path, contents: &str) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
@@ -167,9 +307,16 @@ fn make_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
+/// Maker of files and folders on their way.
+fn on_its_way() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(ON_ITS_WAY);
+    builder
+}
+
 /// A temporary file that, once renamed, has the permissions of an ordinary new file.
 fn whole_file(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
+    let mut builder = on_its_way();
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

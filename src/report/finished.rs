@@ -1,95 +1,144 @@
 //! Reading a finished run back.
 
+use super::columns::Columns;
 use super::document::{FORMAT, ResultDocument};
 use crate::dynamics::{Device, Method, Oscillator, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::input::read_text;
-use crate::observations::Table;
-use std::path::Path;
+use crate::solvers::Row;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
 
 /// Longest result document, bytes.
 const LONGEST_DOCUMENT: u64 = 1 << 26;
+/// Most nodes that a run is believed to have: its tables would be longer than any that is read.
+const MOST_NODES: usize = 1 << 28;
 
-/// A finished run: its document and its device.
+/// A finished run, loaded from the folder that `kmcfit fit` wrote it to.
+///
+/// ```no_run
+/// use kmcfit::Run;
+/// let run = Run::open("runs/paper")?;
+/// println!("{}: J = {:e}", run.document.outcome.status, run.document.cost.r#final);
+/// let mass = &run.device.mass;                            // kg, one value per node
+/// for (t, m) in run.oscillator.grid.times().iter().zip(mass) {
+///     println!("{t} s: {m} kg");
+/// }
+/// if let Some([low, high]) = run.band("mass") {           // 95 %, where they were computed
+///     println!("at the start between {} and {} kg", low[0], high[0]);
+/// }
+/// # Ok::<(), kmcfit::error::InputError>(())
+/// ```
 #[derive(Debug, Clone)]
-pub struct FinishedRun {
+pub struct Run {
+    /// Its folder.
+    pub folder: PathBuf,
     /// `result.json`.
     pub document: ResultDocument,
+    /// The same with every key that is there, those of later versions included.
+    pub value: Value,
     /// Grid, stepper and terms of the run.
     pub oscillator: Oscillator,
     /// The device that was found.
     pub device: Device,
     /// The true device, where the model named it.
     pub truth: Option<Device>,
+    /// `history.csv`: one row per iteration.
+    pub history: Vec<Row>,
+    /// `functions.csv`: one row per node; not a number where a field is empty.
+    pub functions: Columns,
+    /// `trajectory.csv`: one row per node; not a number where a record has ended or was not read.
+    pub trajectory: Columns,
 }
 
-impl FinishedRun {
+impl Run {
     /// Reads the folder of a finished run.
     ///
     /// # Errors
-    /// If there is no complete run of this format in the folder.
-    pub fn open(folder: &Path) -> Result<Self, InputError> {
+    /// If there is no complete run of this format in the folder: the error says which file is missing
+    /// or damaged, and where.
+    pub fn open(folder: impl AsRef<Path>) -> Result<Self, InputError> {
+        let folder = folder.as_ref();
         if !folder.is_dir() {
             return Err(InputError::file(folder, "there is no such folder")
                 .expected("the folder of a finished run, as written by `kmcfit fit`"));
         }
-        let document = document(folder)?;
-        let path = folder.join("result.json");
-        let unusable = |found: String| {
-            InputError::file(&path, "the result describes no run that can be used")
-                .found(found)
-                .expected("a result written by `kmcfit fit`")
-        };
-        let grid = (document.model.grid())
-            .ok_or_else(|| unusable(format!("{} nodes", document.model.nodes)))?;
-        let steppers = [Method::Midpoint, Method::Rk4];
-        let method = (steppers
-            .into_iter()
-            .find(|m| m.name() == document.model.stepper))
-        .ok_or_else(|| unusable(format!("stepper `{}`", document.model.stepper)))?;
-        let width = document.model.friction_width.unwrap_or(f64::NAN);
-        let known = |name: &String| Quantity::ALL.into_iter().find(|q| q.name() == name);
-        let quantities: Option<Vec<Quantity>> = document.model.terms.iter().map(known).collect();
-        let quantities =
-            quantities.ok_or_else(|| unusable(format!("terms {:?}", document.model.terms)))?;
-        let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
-        if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
-            return Err(unusable(format!("terms {:?}", document.model.terms)));
-        }
-        let table = Table::read(folder.join("functions.csv"))?;
-        if table.rows() != grid.nodes() {
-            return Err(
-                InputError::file(table.path(), "the table does not belong to this result")
-                    .found(format!("{} rows", table.rows()))
-                    .expected(format!("{} rows, one per node", grid.nodes())),
-            );
-        }
-        let has_truth = table.headers().iter().any(|h| h.starts_with("true_"));
+        let value = value(folder)?;
+        let document = document(folder, &value)?;
+        let (oscillator, quantities) = oscillator(folder, &document)?;
+        let nodes = oscillator.grid.nodes();
+        let functions = Columns::read(&folder.join("functions.csv"))?.with_rows(nodes, "node")?;
+        let trajectory = Columns::read(&folder.join("trajectory.csv"))?.with_rows(nodes, "node")?;
+        let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
-            document,
-            oscillator: Oscillator {
-                grid,
-                method,
-                terms,
-            },
-            device: device(&table, "", &quantities)?,
+            folder: folder.to_path_buf(),
+            device: device(&functions, "", &quantities)?,
             truth: has_truth
-                .then(|| device(&table, "true_", &quantities))
+                .then(|| device(&functions, "true_", &quantities))
                 .transpose()?,
+            history: history(folder, document.counts.iterations)?,
+            document,
+            value,
+            oscillator,
+            functions,
+            trajectory,
         })
+    }
+
+    /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`,
+    /// `k/m`, `damping of shaker`), in its unit; `None` where none was computed.
+    pub fn band(&self, name: &str) -> Option<[Vec<f64>; 2]> {
+        let name = name.replace([' ', '/', ','], "_");
+        let end = |side: &str| self.functions.column(&format!("{name}_{side}_95"));
+        Some([end("low")?, end("high")?])
     }
 }
 
-fn document(folder: &Path) -> Result<ResultDocument, InputError> {
+fn oscillator(
+    folder: &Path,
+    document: &ResultDocument,
+) -> Result<(Oscillator, Vec<Quantity>), InputError> {
+    let model = &document.model;
+    let unusable = |found: String| {
+        InputError::file(
+            folder.join("result.json"),
+            "the result describes no run that can be used",
+        )
+        .found(found)
+        .expected("a result written by `kmcfit fit`")
+    };
+    let grid = model.grid().filter(|_| model.nodes <= MOST_NODES);
+    let grid = grid.ok_or_else(|| unusable(format!("{} nodes", model.nodes)))?;
+    let mut steppers = [Method::Midpoint, Method::Rk4].into_iter();
+    let method = steppers.find(|m| m.name() == model.stepper);
+    let method = method.ok_or_else(|| unusable(format!("stepper `{}`", model.stepper)))?;
+    let width = model.friction_width.unwrap_or(f64::NAN);
+    let known = |name: &String| Quantity::ALL.into_iter().find(|q| q.name() == name);
+    let quantities: Option<Vec<Quantity>> = model.terms.iter().map(known).collect();
+    let no_terms = || unusable(format!("terms {:?}", model.terms));
+    let quantities = quantities.ok_or_else(no_terms)?;
+    let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
+    if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
+        return Err(no_terms());
+    }
+    let oscillator = Oscillator {
+        grid,
+        method,
+        terms,
+    };
+    Ok((oscillator, quantities))
+}
+
+fn value(folder: &Path) -> Result<Value, InputError> {
     let path = folder.join("result.json");
     let text = read_text(&path, "the result of a finished run", LONGEST_DOCUMENT)?;
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(|error| {
+    let value: Value = serde_json::from_str(&text).map_err(|error| {
         InputError::file(&path, "this is no JSON document")
             .found(error)
             .expected("a result written by `kmcfit fit`")
     })?;
-    let format = value.get("format").and_then(serde_json::Value::as_u64);
+    let format = value.get("format").and_then(Value::as_u64);
     if format != Some(FORMAT.into()) {
         return Err(
             InputError::file(&path, "the result has another format version")
@@ -98,6 +147,11 @@ fn document(folder: &Path) -> Result<ResultDocument, InputError> {
                 .expected(FORMAT.to_string()),
         );
     }
+    Ok(value)
+}
+
+fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> {
+    let path = folder.join("result.json");
     if value.get("model").is_none()
         && let Some(reason) = value.pointer("/outcome/reason").and_then(|r| r.as_str())
     {
@@ -108,19 +162,36 @@ fn document(folder: &Path) -> Result<ResultDocument, InputError> {
                 .expected("the result of a run that found one"),
         );
     }
-    serde_json::from_value(value).map_err(|error| {
+    serde_json::from_value(value.clone()).map_err(|error| {
         InputError::file(&path, "the result is not complete")
             .found(error)
             .expected("a result written by `kmcfit fit`")
     })
 }
 
-/// The mass and the functions of the terms `quantities`.
-fn device(table: &Table, prefix: &str, quantities: &[Quantity]) -> Result<Device, InputError> {
-    let column = |quantity: Quantity| {
-        let name = format!("{prefix}{}", quantity.column());
-        table.column(&name).map(<[f64]>::to_vec)
-    };
+fn history(folder: &Path, iterations: u64) -> Result<Vec<Row>, InputError> {
+    let table = Columns::read(&folder.join("history.csv"))?;
+    let rows = usize::try_from(iterations).unwrap_or(usize::MAX);
+    let table = table.with_rows(rows, "iteration")?;
+    let column = |name: &str| table.required(name);
+    let ratio = "gradient_norm_squared_ratio";
+    let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
+    let (step, change) = (column("step")?, column("relative_change")?);
+    Ok((0..rows)
+        .map(|i| Row {
+            iteration: i as u64 + 1,
+            cost: cost[i],
+            cost_ratio: cost_ratio[i],
+            gradient_norm_squared_ratio: gradient[i],
+            step: step[i],
+            relative_change: change[i],
+        })
+        .collect())
+}
+
+/// The mass and the functions of the terms `quantities`, which are finite at every node.
+fn device(table: &Columns, prefix: &str, quantities: &[Quantity]) -> Result<Device, InputError> {
+    let column = |quantity: Quantity| table.finite(&format!("{prefix}{}", quantity.column()));
     Ok(Device {
         mass: column(Quantity::Mass)?,
         coefficients: quantities

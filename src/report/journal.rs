@@ -1,12 +1,14 @@
 //! A journal of finished pieces: a study that is interrupted goes on where it was.
 
+use super::files::begun;
+use super::fit_journal::hash;
 use crate::error::InputError;
 use crate::input::read_text;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -30,14 +32,10 @@ pub struct Heading {
 impl Heading {
     /// The heading for a model of this text whose start costs `cost`.
     pub fn new(model: &Path, text: &str, cost: f64) -> Self {
-        // FNV-1a, which is the same on every machine.
-        let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
         Self {
             format: FORMAT,
             model: model.to_path_buf(),
-            fingerprint: format!("{hash:016x}-{:016x}", cost.to_bits()),
+            fingerprint: format!("{}-{:016x}", hash(text.as_bytes()), cost.to_bits()),
         }
     }
 }
@@ -61,10 +59,8 @@ impl Journal {
     /// # Errors
     /// What the file system says.
     pub fn begin(folder: &Path, heading: &Heading) -> io::Result<Self> {
-        let mut file = File::create(folder.join(JOURNAL))?;
-        write_line(&mut file, heading)?;
         Ok(Self {
-            file,
+            file: begun(&folder.join(JOURNAL), &line(heading)?)?,
             done: BTreeMap::new(),
         })
     }
@@ -125,15 +121,17 @@ impl Journal {
                 format!("the journal cannot be gone on with: {error}"),
             )
         };
-        super::write_whole(&path, &kept).map_err(unwritable)?;
-        let file = OpenOptions::new()
-            .append(true)
-            .open(&path)
-            .map_err(unwritable)?;
+        let file = begun(&path, &kept).map_err(unwritable)?;
         Ok(Self { file, done })
     }
 
-    /// The result of a piece: as it was kept, or computed now and kept.
+    /// Whether there is a piece of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.done.contains_key(name)
+    }
+
+    /// The result of a piece: as it was kept, or computed now and kept; nothing if it is not `whole`
+    /// after it was computed.
     ///
     /// # Errors
     /// What the file system says.
@@ -141,13 +139,17 @@ impl Journal {
         &mut self,
         name: &str,
         compute: impl FnOnce() -> T,
-    ) -> io::Result<T> {
+        whole: impl FnOnce() -> bool,
+    ) -> io::Result<Option<T>> {
         if let Some(kept) = self.done.get(name)
             && let Ok(result) = serde_json::from_value(kept.clone())
         {
-            return Ok(result);
+            return Ok(Some(result));
         }
         let result = compute();
+        if !whole() {
+            return Ok(None);
+        }
         let line = Line {
             piece: name.to_owned(),
             result: serde_json::to_value(&result).map_err(io::Error::other)?,
@@ -155,13 +157,16 @@ impl Journal {
         write_line(&mut self.file, &line)?;
         // What is told now is what would be read back; a piece with numbers that JSON does not have is
         // computed again by whoever goes on.
-        Ok(serde_json::from_value(line.result).unwrap_or(result))
+        Ok(Some(serde_json::from_value(line.result).unwrap_or(result)))
     }
 }
 
-fn write_line(file: &mut File, line: &impl Serialize) -> io::Result<()> {
-    let mut text = serde_json::to_string(line).map_err(io::Error::other)?;
-    text.push('\n');
-    file.write_all(text.as_bytes())?;
+fn write_line(file: &mut File, content: &impl Serialize) -> io::Result<()> {
+    file.write_all(line(content)?.as_bytes())?;
     file.sync_data()
+}
+
+fn line(content: &impl Serialize) -> io::Result<String> {
+    let text = serde_json::to_string(content).map_err(io::Error::other)?;
+    Ok(text + "\n")
 }

@@ -17,6 +17,7 @@
 //! ```
 
 mod axis;
+mod columns;
 pub mod compare;
 mod cost;
 mod csv;
@@ -26,11 +27,13 @@ pub mod figure;
 pub mod figures;
 mod files;
 mod finished;
+mod fit_journal;
 mod html;
 mod journal;
 mod knowledge;
 mod layout;
 mod legend;
+mod lock;
 pub mod mark;
 mod measured;
 mod panel;
@@ -43,16 +46,18 @@ pub mod svg;
 mod text;
 mod timings;
 
+pub use columns::Columns;
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use figure::{Axis, Figure, Panel, Scale};
-pub use files::{Batch, OutputFolder, write_whole};
-pub use finished::FinishedRun;
+pub use files::{Batch, OutputFolder, Stage, write_whole};
+pub use finished::Run;
+pub use fit_journal::{CHECKPOINT, FIT_JOURNAL, FitHeading, FitJournal, Source};
 pub use journal::{Heading, JOURNAL, Journal};
 pub use mark::{Colour, Dash, Mark, Style};
 pub use predict::{PredictedMotion, predict};
-pub use run::{Known, Run, json};
+pub use run::{FittedModel, Known, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};
 pub use timings::{PartSummary, TimingsSummary};

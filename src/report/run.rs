@@ -9,7 +9,7 @@ use super::document::{
 };
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
-use super::files::OutputFolder;
+use super::files::Stage;
 use super::knowledge::knowledge;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
 use super::render;
@@ -35,7 +35,7 @@ const FEW_PARAMETERS: usize = 64;
 
 /// A fitted model and what it predicts.
 #[derive(Debug, Clone, Copy)]
-pub struct Run<'a> {
+pub struct FittedModel<'a> {
     /// What was fitted.
     pub model: &'a Model,
     /// What was found.
@@ -81,15 +81,15 @@ impl Known {
     }
 }
 
-impl Run<'_> {
-    /// Writes tables and, if asked for, figures: all but the result document, which comes last, so that
-    /// a folder with a result is complete. Returns what the writing took.
+impl FittedModel<'_> {
+    /// Writes tables and, if asked for, figures: all but the result document, which comes last
+    /// ([`Stage::commit_run`]). Returns what the writing took.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn write(&self, folder: &OutputFolder, with_figures: bool) -> io::Result<Duration> {
+    pub fn write(&self, stage: &mut Stage, with_figures: bool) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
-        let mut batch = folder.batch();
+        let mut batch = stage.batch();
         let mut write = |name: &str, text: &str| timed(&mut writing, || batch.write(name, text));
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;

@@ -1,6 +1,7 @@
 //! The loop around every solver, run by argmin's executor.
 
 use super::gauss_newton::GaussNewton;
+use super::keep::{Bits, Memory, Standing, Watch};
 use super::lbfgs::Lbfgs;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
@@ -48,7 +49,8 @@ impl Fit {
     }
 }
 
-/// Runs one solver from `start`; `observe` is called after every iteration. `reference` is what the
+/// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
+/// search goes on from there. `reference` is what the
 /// ratios of cost and gradient are taken to, by default the start itself.
 ///
 /// Every method accepts only points of lower cost, so the last point is the best one. The equation
@@ -61,11 +63,12 @@ pub(super) fn search(
     start: &[f64],
     settings: &FitSettings,
     reference: Option<Reference>,
-    observe: &mut dyn FnMut(&Row),
+    watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
-        return Ok(equation_error::fit(problem, start, observe));
+        return Ok(equation_error::fit(problem, start, watch.observe()));
     }
+    let kept = watch.begin_search();
     let run = Run {
         method: method(settings.solver),
         settings,
@@ -74,7 +77,9 @@ pub(super) fn search(
         timings: Timings::default(),
         progress: Err(NOT_STARTED),
         outcome: None,
-        observe,
+        kept,
+        before: Before::default(),
+        watch,
     };
     let result = Executor::new(problem, run)
         .configure(|state: SearchState| state.param(start.to_vec()))
@@ -96,7 +101,7 @@ pub fn fit_from(
     start: &[f64],
     settings: &FitSettings,
 ) -> Result<Fit, Breakdown> {
-    search(problem, start, settings, None, &mut |_| {})
+    search(problem, start, settings, None, &mut Watch::new(&mut |_| {}))
 }
 
 fn method(solver: Solver) -> Box<dyn Descend> {
@@ -110,7 +115,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
 }
 
 /// One method at work, seen by argmin as a solver.
-struct Run<'a> {
+struct Run<'a, 'w> {
     method: Box<dyn Descend>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
@@ -118,7 +123,18 @@ struct Run<'a> {
     timings: Timings,
     progress: Result<Progress, Breakdown>,
     outcome: Option<Outcome>,
-    observe: &'a mut dyn FnMut(&Row),
+    /// What was kept of this search when it ran before.
+    kept: Option<(Vec<Row>, Standing)>,
+    before: Before,
+    watch: &'a mut Watch<'w>,
+}
+
+/// What a search did before it was ended from outside.
+#[derive(Default)]
+struct Before {
+    counts: Counts,
+    timings: Timings,
+    elapsed: Duration,
 }
 
 struct Progress {
@@ -137,7 +153,7 @@ const NOT_STARTED: Breakdown = Breakdown {
 /// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl Run<'_> {
+impl Run<'_, '_> {
     fn start(&self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
         let mut evaluation = work.problem().workspace();
         work.evaluate_into(&parameters, &mut evaluation)?;
@@ -146,6 +162,90 @@ impl Run<'_> {
             recorder: Recorder::new(&point, self.reference),
             point,
         })
+    }
+
+    /// The search where it stood when it was ended from outside, if that was kept and comes out with
+    /// the same bits.
+    fn recalled(&mut self, work: &Work) -> Option<Progress> {
+        let (rows, standing) = self.kept.take()?;
+        let progress = self.stand_again(work, rows, standing);
+        if progress.is_none() {
+            self.watch.refuse();
+        }
+        progress
+    }
+
+    fn stand_again(&mut self, work: &Work, rows: Vec<Row>, standing: Standing) -> Option<Progress> {
+        let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
+        if !fits(&standing.parameters.0) {
+            return None;
+        }
+        let motions = |parameters: &[f64]| match fits(parameters) {
+            true => work.motions_again(parameters).ok(),
+            false => None,
+        };
+        let recorder = Recorder::recalled(rows, &standing, motions)?;
+        let point = work.again(standing.parameters.0).ok()?;
+        if point.fingerprint() != standing.fingerprint {
+            return None;
+        }
+        if standing.outcome.is_none()
+            && !(self.method).recall(standing.memory, work.problem(), &point)
+        {
+            return None;
+        }
+        self.outcome = standing.outcome;
+        self.before = Before {
+            counts: standing.counts,
+            timings: standing.timings,
+            elapsed: standing.elapsed,
+        };
+        Some(Progress { point, recorder })
+    }
+
+    /// Keeps where the search stands: when it is time to, and before it ends by an interrupt.
+    fn keep(&mut self, counts: Counts) {
+        let interrupted = |o: &Outcome| o.status == Status::Interrupted;
+        let now = match &self.outcome {
+            Some(outcome) => interrupted(outcome),
+            None => self.watch.is_due(),
+        };
+        if now {
+            self.stand(counts, None);
+        }
+        if self.outcome.as_ref().is_some_and(interrupted) {
+            self.watch.close();
+        }
+    }
+
+    fn stand(&mut self, counts: Counts, outcome: Option<Outcome>) {
+        let Ok(Progress { point, recorder }) = &self.progress else {
+            return;
+        };
+        let standing = || Standing {
+            iterations: recorder.rows.len() as u64,
+            parameters: Bits(point.parameters.clone()),
+            fingerprint: point.fingerprint(),
+            memory: match outcome {
+                None => self.method.memory(),
+                Some(_) => Memory::Nothing,
+            },
+            references: Bits(vec![
+                recorder.initial_cost,
+                recorder.started_from,
+                recorder.initial_norm_squared,
+            ]),
+            snapshots: recorder.snapshot_points(),
+            counts: self.before.counts + counts,
+            timings: self.before.timings + self.timings,
+            elapsed: self.before.elapsed + self.clock.elapsed(),
+            outcome,
+        };
+        self.watch.stand(standing);
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.before.elapsed + self.clock.elapsed()
     }
 
     fn advance(&mut self, work: &mut Work) {
@@ -170,7 +270,7 @@ impl Run<'_> {
                 let previous_cost = before.evaluation.cost;
                 progress.point = *point;
                 if let Some(row) = progress.recorder.rows.last() {
-                    (self.observe)(row);
+                    self.watch.iteration(row);
                     let stopping = &self.settings.stopping;
                     self.outcome = stopping.after(row, previous_cost, hindered);
                 }
@@ -207,13 +307,20 @@ impl Run<'_> {
             return Some(Outcome::new(Status::Interrupted, reason));
         }
         let limit = self.settings.stopping.limit?;
-        (self.clock.elapsed() >= limit).then(|| {
+        (self.elapsed() >= limit).then(|| {
             let reason = format!("the limit of {} s is reached", limit.as_secs_f64());
             Outcome::new(Status::TimeLimit, reason)
         })
     }
 
-    fn finish(self, counts: Counts) -> Result<Fit, Breakdown> {
+    fn finish(mut self, counts: Counts) -> Result<Fit, Breakdown> {
+        match &self.outcome {
+            _ if self.progress.is_err() => self.watch.nothing(),
+            // It goes on from where it was kept to stand.
+            Some(outcome) if outcome.status == Status::Interrupted => {}
+            outcome => self.stand(counts, outcome.clone()),
+        }
+        let elapsed = self.elapsed();
         let Progress { point, recorder } = self.progress?;
         Ok(Fit {
             best: point,
@@ -225,9 +332,9 @@ impl Run<'_> {
             outcome: self
                 .outcome
                 .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
-            counts,
-            timings: self.timings,
-            elapsed: self.clock.elapsed(),
+            counts: self.before.counts + counts,
+            timings: self.before.timings + self.timings,
+            elapsed,
             rungs: Vec::new(),
         })
     }
@@ -242,7 +349,7 @@ impl Run<'_> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -254,9 +361,14 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
         let mut work = Work::new(problem, self.settings);
-        self.progress = self.start(&mut work, parameters);
-        self.timings += work.timings;
-        self.outcome = self.nothing_to_do(problem.problem);
+        match self.recalled(&work) {
+            Some(progress) => self.progress = Ok(progress),
+            None => {
+                self.progress = self.start(&mut work, parameters);
+                self.timings += work.timings;
+                self.outcome = self.nothing_to_do(problem.problem);
+            }
+        }
         Ok((self.view(state), None))
     }
 
@@ -268,6 +380,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_> {
         let mut work = Work::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
+        self.keep(Counts::of(problem));
         Ok((self.view(state), None))
     }
 

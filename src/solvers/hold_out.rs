@@ -1,7 +1,7 @@
 //! Experiments that took no part in the fit.
 
 use super::executor::search;
-use super::{FitSettings, Solver, states_from_readings};
+use super::{FitSettings, Solver, Watch, states_from_readings};
 use crate::dynamics::Breakdown;
 use crate::functions::{CoefficientFunction, Functions, Scalar};
 use crate::objective::Evaluation;
@@ -49,6 +49,12 @@ pub fn predict_held_out(
         solver: Solver::GaussNewton,
         ..settings.clone()
     };
-    let found = search(&alone, &start, &settings, None, &mut |_| {})?;
+    let found = search(
+        &alone,
+        &start,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )?;
     Ok((alone, found.best.evaluation))
 }

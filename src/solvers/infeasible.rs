@@ -4,7 +4,7 @@
 //! points have a motion is not: only that the mass must be positive is a constraint of its own.
 
 use super::executor::search;
-use super::{Fit, FitSettings, Outcome, Point, Status, Step};
+use super::{Fit, FitSettings, Outcome, Point, Status, Step, Watch};
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
@@ -67,7 +67,14 @@ pub fn without_motion(
     }
     let mut settings = settings.clone();
     settings.stopping.iterations = 0;
-    let fit = search(problem, given, &settings, None, &mut |_| {}).map_err(|_| breakdown)?;
+    let fit = search(
+        problem,
+        given,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )
+    .map_err(|_| breakdown)?;
     let reason = format!(
         "no start within the constraints has a motion ({breakdown}); what is kept is the start as \
          given, which breaks them"

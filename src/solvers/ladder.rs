@@ -10,7 +10,9 @@ use super::all_at_once::all_at_once;
 use super::executor::search;
 use super::recorder::Reference;
 use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, equation_error};
+use super::{
+    Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, Watch, equation_error,
+};
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use std::sync::atomic::Ordering;
@@ -93,8 +95,21 @@ pub fn fit(
     settings: &FitSettings,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<Fit, Breakdown> {
+    fit_watched(problem, start, settings, &mut Watch::new(observe))
+}
+
+/// [`fit`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what was kept.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
-        return search(problem, start, settings, None, observe);
+        return search(problem, start, settings, None, watch);
     }
     let first = match settings.initial {
         Initial::Functions => [Attempt::Functions, Attempt::Data],
@@ -124,12 +139,12 @@ pub fn fit(
             attempt,
             reference,
             &mut before,
-            observe,
+            watch,
         );
         match result {
             Ok(mut fit) => {
-                // With the work that made the start.
-                fit.elapsed = clock.elapsed();
+                // With the work that made the start, and what was done before it went on.
+                fit.elapsed = fit.elapsed.max(clock.elapsed());
                 rungs.push(Rung {
                     name: attempt.name(),
                     initial_cost: fit.started_from,
@@ -144,7 +159,14 @@ pub fn fit(
                 }));
                 let ended = matches!(fit.outcome.status, Status::Interrupted | Status::TimeLimit);
                 let enough = !climbs || ended || explains(problem, &fit);
-                best = Some(better(best, fit));
+                let interrupted = fit.outcome.status == Status::Interrupted;
+                let outcome = fit.outcome.clone();
+                let mut lower = better(best, fit);
+                if interrupted {
+                    // An earlier rung may have come further, but the ladder was not climbed to its end.
+                    lower.outcome = outcome;
+                }
+                best = Some(lower);
                 if enough {
                     break;
                 }
@@ -168,7 +190,7 @@ pub fn fit(
         (Some(fit), _) => {
             let fit = match fit.outcome.status {
                 Status::MaxIterations if capped => {
-                    gone_on(problem, fit, settings, reference, &mut rungs, observe)?
+                    gone_on(problem, fit, settings, reference, &mut rungs, watch)?
                 }
                 _ => fit,
             };
@@ -224,7 +246,7 @@ fn gone_on(
     settings: &FitSettings,
     reference: Option<Reference>,
     rungs: &mut Vec<Rung>,
-    observe: &mut dyn FnMut(&Row),
+    watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     let mut settings = settings.clone();
     let taken = fit.history.len() as u64;
@@ -233,7 +255,7 @@ fn gone_on(
         return Ok(fit);
     }
     let start = &fit.best.parameters;
-    let more = search(problem, start, &settings, reference, observe)?;
+    let more = search(problem, start, &settings, reference, watch)?;
     rungs.push(Rung {
         name: "best of these, continued",
         initial_cost: more.started_from,
@@ -299,21 +321,23 @@ fn run(
     attempt: Attempt,
     reference: Option<Reference>,
     before: &mut Before,
-    observe: &mut dyn FnMut(&Row),
+    watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     let clock = &mut before.timings.start;
     let parameters = match attempt {
         Attempt::Functions => start.to_vec(),
         Attempt::Data => from_data(problem, start, clock),
-        Attempt::GrowingHorizon => over_growing_parts(problem, start, settings, before),
+        Attempt::GrowingHorizon => over_growing_parts(problem, start, settings, before, watch),
         Attempt::AllAtOnce => {
             let flag = settings.interrupt.as_ref();
             let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
-            timed(clock, || all_at_once(problem, start, &interrupted))
-                .unwrap_or_else(|| from_data(problem, start, clock))
+            watch.piece(start.len(), &interrupted, || {
+                timed(clock, || all_at_once(problem, start, &interrupted))
+                    .unwrap_or_else(|| from_data(problem, start, clock))
+            })
         }
     };
-    search(problem, &parameters, settings, reference, observe)
+    search(problem, &parameters, settings, reference, watch)
 }
 
 /// The equation-error start, fitted to growing parts of the record.
@@ -322,13 +346,15 @@ fn over_growing_parts(
     start: &[f64],
     settings: &FitSettings,
     before: &mut Before,
+    watch: &mut Watch,
 ) -> Vec<f64> {
     let mut parameters = from_data(problem, start, &mut before.timings.start);
     let mut short = settings.clone();
     short.stopping.iterations = HORIZON_ITERATIONS;
     for share in HORIZONS {
         let part = problem.first_part(share);
-        if let Ok(fit) = search(&part, &parameters, &short, None, &mut |_| {}) {
+        let found = watch.unseen(|watch| search(&part, &parameters, &short, None, watch));
+        if let Ok(fit) = found {
             before.counts += fit.counts;
             before.timings += fit.timings;
             parameters = fit.best.parameters;

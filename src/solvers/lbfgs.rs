@@ -11,7 +11,7 @@
 
 use super::line_search::{Line, weak_wolfe};
 use super::point::Work;
-use super::{Descend, Point, Step};
+use super::{Bits, Descend, Memory, Point, Step};
 use crate::functions::{Functions, Quantity};
 use crate::lanes::sum::dot;
 use crate::lanes::{self, Elementwise};
@@ -190,6 +190,68 @@ impl Descend for Lbfgs {
             }
         }
         Step::Stuck("no step along the gradient lowers the cost enough".into())
+    }
+
+    fn memory(&self) -> Memory {
+        let here = self.here.as_ref();
+        let pair = |p: &Pair| {
+            let [s, z] = [&p.s, &p.z].map(|v| Bits(v.primal.clone()));
+            [s, z, Bits(p.z.dual.clone()), Bits(vec![p.curvature])]
+        };
+        Memory::Lbfgs {
+            x: Bits(here.map_or(Vec::new(), |here| here.x.clone())),
+            logarithmic: here.map_or(Vec::new(), |here| here.logarithmic.clone()),
+            pairs: self.pairs.iter().map(pair).collect(),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, problem: &Problem, point: &Point) -> bool {
+        let Memory::Lbfgs {
+            x,
+            logarithmic,
+            pairs,
+        } = memory
+        else {
+            return false;
+        };
+        let len = point.parameters.len();
+        let pair = |[s, z, dual, curvature]: [Bits; 4]| {
+            let whole = [&s, &z, &dual].iter().all(|v| v.0.len() == len);
+            let [curvature] = *curvature.0.as_slice() else {
+                return None;
+            };
+            whole.then(|| Pair {
+                s: Vector {
+                    dual: problem.functions.gram_multiply(&s.0),
+                    primal: s.0,
+                },
+                z: Vector {
+                    primal: z.0,
+                    dual: dual.0,
+                },
+                curvature,
+            })
+        };
+        let pairs: Option<VecDeque<Pair>> = pairs.into_iter().map(pair).collect();
+        let Some(pairs) = pairs.filter(|pairs| pairs.len() <= self.memory) else {
+            return false;
+        };
+        // After a step there is always the point that it led to.
+        if [x.0.len(), logarithmic.len()] != [len; 2] {
+            return false;
+        }
+        let at = Coordinates {
+            functions: &problem.functions,
+            logarithmic,
+        };
+        self.here = Some(Here {
+            parameters: point.parameters.clone(),
+            x: x.0,
+            gradient: at.gradient(point),
+            logarithmic: at.logarithmic,
+        });
+        self.pairs = pairs;
+        true
     }
 }
 

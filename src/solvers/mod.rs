@@ -10,6 +10,7 @@ mod executor;
 mod gauss_newton;
 mod hold_out;
 mod infeasible;
+mod keep;
 mod kinematics;
 mod ladder;
 mod lbfgs;
@@ -31,9 +32,10 @@ pub use executor::{Fit, fit_from};
 pub(crate) use gauss_newton::{FEW_PARAMETERS, add_priors, linear_readings, weighted_jacobian};
 pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
+pub use keep::{Bits, Keeper, Kept, Memory, Standing, Watch};
 pub use kinematics::states_from_readings;
-pub use ladder::{Initial, Rung, fit};
-pub use noise::fit_with_noise;
+pub use ladder::{Initial, Rung, fit, fit_watched};
+pub use noise::{fit_with_noise, fit_with_noise_watched};
 pub use outcome::{Outcome, Status};
 pub use point::{Counts, Point};
 pub use recorder::{Row, SNAPSHOT_ITERATIONS, Snapshot};
@@ -41,9 +43,10 @@ pub use start::Start;
 pub use stopping::Stopping;
 pub use timings::Timings;
 pub(crate) use timings::timed;
-pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight};
+pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
 use crate::objective::GradientKind;
+use crate::problem::Problem;
 use point::Work;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -120,4 +123,15 @@ pub(crate) enum Step {
 pub(crate) trait Descend {
     /// One iteration from `point`.
     fn step(&mut self, work: &mut Work, point: &Point) -> Step;
+
+    /// What decides its next steps beside the point.
+    fn memory(&self) -> Memory {
+        Memory::Nothing
+    }
+
+    /// Takes up a memory at `point`; whether it is one of this method and this problem.
+    fn recall(&mut self, memory: Memory, problem: &Problem, point: &Point) -> bool {
+        let _ = (problem, point);
+        memory == Memory::Nothing
+    }
 }

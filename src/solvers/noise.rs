@@ -1,7 +1,7 @@
 //! Sigmas that are estimated from the residuals.
 
 use super::executor::search;
-use super::{Fit, FitSettings, Row, Status, fit};
+use super::{Fit, FitSettings, Row, Status, Watch, fit_watched};
 use crate::dynamics::Breakdown;
 use crate::objective::{Channel, Loss, Weighting};
 use crate::problem::Problem;
@@ -13,7 +13,7 @@ const SETTLED: f64 = 1e-6;
 /// From the median of the absolute residuals to the standard deviation of Gaussian noise.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
-/// [`fit`], with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
+/// [`fit`](super::fit), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
 /// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
 /// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
 /// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
@@ -22,15 +22,29 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// residuals.
 ///
 /// # Errors
-/// As [`fit`].
+/// As [`fit`](super::fit).
 pub fn fit_with_noise(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
     observe: &mut dyn FnMut(&Row),
 ) -> Result<(Problem, Fit), Breakdown> {
+    fit_with_noise_watched(problem, start, settings, &mut Watch::new(observe))
+}
+
+/// [`fit_with_noise`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what
+/// was kept.
+///
+/// # Errors
+/// As [`fit_with_noise`].
+pub fn fit_with_noise_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<(Problem, Fit), Breakdown> {
     let mut problem = problem.clone();
-    let mut found = fit(&problem, start, settings, observe)?;
+    let mut found = fit_watched(&problem, start, settings, watch)?;
     let estimates = problem
         .channels()
         .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
@@ -43,7 +57,7 @@ pub fn fit_with_noise(
             found.outcome.status,
             Status::Interrupted | Status::TimeLimit
         );
-        let next = search(&problem, &found.best.parameters, settings, None, observe)?;
+        let next = search(&problem, &found.best.parameters, settings, None, watch)?;
         found = Fit {
             counts: found.counts + next.counts,
             timings: found.timings + next.timings,
@@ -55,6 +69,11 @@ pub fn fit_with_noise(
             },
             snapshots: found.snapshots,
             initial_cost: next.initial_cost,
+            // Rounds that were ended from outside are not at their end, wherever the last one came to.
+            outcome: match ended {
+                true => found.outcome,
+                false => next.outcome,
+            },
             ..next
         };
         if ended || change < SETTLED {

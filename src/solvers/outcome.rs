@@ -1,7 +1,9 @@
 //! How a fit ended.
 
+use serde::{Deserialize, Serialize};
+
 /// How a fit ended, in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
     /// A stopping test of the model was met.
     Converged,
@@ -38,7 +40,7 @@ impl Status {
 }
 
 /// How a fit ended, and why in words.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// In one word.
     pub status: Status,

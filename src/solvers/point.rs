@@ -2,9 +2,10 @@
 
 use super::timings::{Timings, timed};
 use super::{FitSettings, Solver};
-use crate::dynamics::Breakdown;
+use crate::dynamics::{Breakdown, Trajectory};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
+use serde::{Deserialize, Serialize};
 
 /// Parameters with everything known about them.
 #[derive(Debug, Clone)]
@@ -18,7 +19,7 @@ pub struct Point {
 }
 
 /// How often the equations were solved; one count is one pass over all experiments.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Forward solves.
     pub forward: u64,
@@ -67,6 +68,33 @@ impl<'a, 'p> Work<'a, 'p> {
         self.problem
             .problem
             .expect("the executor holds the problem")
+    }
+
+    /// A point that was there before, computed again without counting.
+    pub fn again(&self, parameters: Vec<f64>) -> Result<Point, Breakdown> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        match self.in_order {
+            true => problem.evaluate_in_order_into(&parameters, &mut evaluation)?,
+            false => problem.evaluate_into(&parameters, &mut evaluation)?,
+        }
+        let gradient = problem.gradient(&parameters, &evaluation, self.kind);
+        Ok(Point {
+            parameters,
+            evaluation,
+            gradient,
+        })
+    }
+
+    /// The motions at a point that was there before, computed again without counting.
+    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, Breakdown> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        match self.in_order {
+            true => problem.evaluate_in_order_into(parameters, &mut evaluation)?,
+            false => problem.evaluate_into(parameters, &mut evaluation)?,
+        }
+        Ok(evaluation.trajectories)
     }
 
     /// One forward solve into `evaluation`.

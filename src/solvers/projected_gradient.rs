@@ -8,8 +8,9 @@
 
 use super::infeasible::no_step;
 use super::point::Work;
-use super::{Descend, Point, Step};
+use super::{Bits, Descend, Memory, Point, Step};
 use crate::constraints::TOLERANCE;
+use crate::problem::Problem;
 use crate::qp::{ConicStatus, project_within};
 
 /// Sufficient decrease along the feasible direction.
@@ -62,6 +63,28 @@ impl Descend for ProjectedGradient {
             share *= 0.5;
         }
         Step::Stuck("no step towards the projected gradient lowers the cost".into())
+    }
+
+    fn memory(&self) -> Memory {
+        Memory::ProjectedGradient {
+            metric: Bits(self.metric.clone()),
+            lengths: Bits(vec![self.first_length, self.length]),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, _: &Problem, point: &Point) -> bool {
+        let Memory::ProjectedGradient { metric, lengths } = memory else {
+            return false;
+        };
+        let [first_length, length] = *lengths.0.as_slice() else {
+            return false;
+        };
+        *self = Self {
+            metric: metric.0,
+            first_length,
+            length,
+        };
+        self.metric.len() == point.parameters.len()
     }
 }
 

@@ -1,23 +1,30 @@
 //! What happened, iteration by iteration.
 
 use super::Point;
+use super::keep::{Bits, Standing, number_or_nan};
 use crate::dynamics::Trajectory;
 use crate::problem::Problem;
+use serde::{Deserialize, Serialize};
 
 /// One iteration: the cost after it, the gradient before it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Iteration, from 1.
     pub iteration: u64,
     /// `J` after the iteration.
+    #[serde(deserialize_with = "number_or_nan")]
     pub cost: f64,
     /// `J / J0`.
+    #[serde(deserialize_with = "number_or_nan")]
     pub cost_ratio: f64,
     /// `G^2` before the iteration over its first value.
+    #[serde(deserialize_with = "number_or_nan")]
     pub gradient_norm_squared_ratio: f64,
     /// Step length along the solver's direction.
+    #[serde(deserialize_with = "number_or_nan")]
     pub step: f64,
     /// Largest change of a function relative to its natural size ([`Problem::relative_change`]).
+    #[serde(deserialize_with = "number_or_nan")]
     pub relative_change: f64,
 }
 
@@ -48,6 +55,8 @@ pub(super) struct Recorder {
     pub initial_cost: f64,
     pub started_from: f64,
     pub initial_norm_squared: f64,
+    /// The parameters of the snapshots.
+    snapshot_parameters: Vec<Bits>,
 }
 
 impl Recorder {
@@ -63,9 +72,54 @@ impl Recorder {
             initial_cost: reference.cost,
             started_from: start.evaluation.cost,
             initial_norm_squared: reference.norm_squared,
+            snapshot_parameters: Vec::new(),
         };
         recorder.keep_snapshot(0, start);
         recorder
+    }
+
+    /// The record of a search that stood here, with the motions that `at` computes; `None` where it is
+    /// not whole.
+    pub fn recalled(
+        rows: Vec<Row>,
+        standing: &Standing,
+        at: impl Fn(&[f64]) -> Option<Vec<Trajectory>>,
+    ) -> Option<Self> {
+        let [initial_cost, started_from, initial_norm_squared] = *standing.references.0.as_slice()
+        else {
+            return None;
+        };
+        let known = standing.snapshots.iter().map(|(iteration, _)| iteration);
+        let expected = SNAPSHOT_ITERATIONS.iter();
+        if !known.eq(expected.take_while(|i| **i <= standing.iterations))
+            || rows.len() as u64 != standing.iterations
+        {
+            return None;
+        }
+        let snapshots = standing.snapshots.iter().map(|(iteration, parameters)| {
+            Some(Snapshot {
+                iteration: *iteration,
+                trajectories: at(&parameters.0)?,
+            })
+        });
+        Some(Self {
+            rows,
+            snapshots: snapshots.collect::<Option<_>>()?,
+            initial_cost,
+            started_from,
+            initial_norm_squared,
+            snapshot_parameters: (standing.snapshots.iter())
+                .map(|(_, parameters)| parameters.clone())
+                .collect(),
+        })
+    }
+
+    /// The points of the snapshots, by iteration.
+    pub fn snapshot_points(&self) -> Vec<(u64, Bits)> {
+        let iterations = self.snapshots.iter().map(|s| s.iteration);
+        iterations
+            .zip(self.snapshot_parameters.iter().cloned())
+            .collect()
     }
 
     /// Records the iteration that led from `before` to `after`.
@@ -95,6 +149,8 @@ impl Recorder {
                 iteration,
                 trajectories: point.evaluation.trajectories.clone(),
             });
+            self.snapshot_parameters
+                .push(Bits(point.parameters.clone()));
         }
     }
 }

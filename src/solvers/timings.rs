@@ -1,11 +1,12 @@
 //! Where the time of a fit goes.
 
+use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign};
 use std::time::{Duration, Instant};
 
 /// Wall-clock time by what it was spent on. No time is in two of them; what is in none of them is
 /// bookkeeping.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Timings {
     /// Forward solves: motions, predictions and costs.
     pub forward: Duration,

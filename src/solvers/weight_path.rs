@@ -3,7 +3,7 @@
 use super::executor::search;
 use super::gauss_newton::{linearisation_tangents, linearise_at};
 use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Row, Rung, Status, Timings, fit};
+use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch, fit_watched};
 use crate::dynamics::Breakdown;
 use crate::objective::Channel;
 use crate::problem::Problem;
@@ -132,11 +132,34 @@ pub fn choose_weight(
     which: &[usize],
     observe: &mut dyn FnMut(&Row),
 ) -> Result<(WeightPath, Problem, Fit), Breakdown> {
+    choose_weight_watched(
+        problem,
+        start,
+        settings,
+        rule,
+        which,
+        &mut Watch::new(observe),
+    )
+}
+
+/// [`choose_weight`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what was
+/// kept.
+///
+/// # Errors
+/// As [`choose_weight`].
+pub fn choose_weight_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    rule: WeightRule,
+    which: &[usize],
+    watch: &mut Watch,
+) -> Result<(WeightPath, Problem, Fit), Breakdown> {
     let mut walk = Walk {
         problem,
         settings: settings.clone(),
         which,
-        observe,
+        watch,
         from: start.to_vec(),
         last: None,
         rungs: Vec::new(),
@@ -179,20 +202,20 @@ pub fn choose_weight(
 /// A walk along the path. The first fit climbs the ladder of [`fit`]; every other starts where its
 /// neighbour ended, and needs none: a fit that explains the record is followed while its weight
 /// changes, also to weights so large that it explains the record no longer.
-struct Walk<'a> {
+struct Walk<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
-    observe: &'a mut dyn FnMut(&Row),
+    watch: &'a mut Watch<'w>,
     from: Vec<f64>,
-    last: Option<Status>,
+    last: Option<Outcome>,
     rungs: Vec<Rung>,
     counts: Counts,
     timings: Timings,
     elapsed: Duration,
 }
 
-impl Walk<'_> {
+impl Walk<'_, '_> {
     /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
     /// at the middle a fit explains the record, which it need not at the largest weight, and
     /// converges fast, which it need not at the smallest.
@@ -219,13 +242,13 @@ impl Walk<'_> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
         let from = std::mem::take(&mut self.from);
         let found = match self.last {
-            None => fit(&problem, &from, &self.settings, self.observe)?,
-            Some(_) => search(&problem, &from, &self.settings, None, self.observe)?,
+            None => fit_watched(&problem, &from, &self.settings, self.watch)?,
+            Some(_) => search(&problem, &from, &self.settings, None, self.watch)?,
         };
         if self.last.is_none() {
             self.rungs.clone_from(&found.rungs);
         }
-        self.last = Some(found.outcome.status);
+        self.last = Some(found.outcome.clone());
         self.counts += found.counts;
         self.timings += found.timings;
         self.elapsed += found.elapsed;
@@ -233,7 +256,9 @@ impl Walk<'_> {
         let misfit = found.best.evaluation.misfit;
         let n = problem.reading_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
-        let degrees_of_freedom = degrees_of_freedom(&problem, &found, &mut self.timings);
+        let timings = &mut self.timings;
+        let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
+        let degrees_of_freedom = self.watch.piece(1, &|| false, compute)[0];
         Ok(PathPoint {
             weight,
             iterations: iterations(&found),
@@ -247,7 +272,13 @@ impl Walk<'_> {
 
     /// The fit at a point of the path once more, with the rungs that led onto the path.
     fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, Breakdown> {
-        let found = search(problem, from, &self.settings, None, self.observe)?;
+        let mut found = search(problem, from, &self.settings, None, self.watch)?;
+        if self.ended()
+            && let Some(outcome) = self.last.take()
+        {
+            // Only a part of the path was walked, wherever this fit came to.
+            found.outcome = outcome;
+        }
         Ok(Fit {
             rungs: self.rungs.clone(),
             ..found
@@ -255,7 +286,8 @@ impl Walk<'_> {
     }
 
     fn ended(&self) -> bool {
-        matches!(self.last, Some(Status::Interrupted | Status::TimeLimit))
+        let status = self.last.as_ref().map(|outcome| outcome.status);
+        matches!(status, Some(Status::Interrupted | Status::TimeLimit))
     }
 }
 

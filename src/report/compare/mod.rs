@@ -139,13 +139,15 @@ impl Comparison {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
-        let mut batch = folder.batch();
+        let mut stage = folder.stage()?;
+        let mut batch = stage.batch();
         for figure in figures::all(self) {
             batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
         batch.write("compare.csv", &self.to_csv())?;
         batch.write("compare.html", &self.to_html())?;
-        batch.finish()
+        batch.finish()?;
+        stage.commit()
     }
 }
 

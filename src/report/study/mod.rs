@@ -27,12 +27,14 @@ impl StudyDocument {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
-        let mut batch = folder.batch();
+        let mut stage = folder.stage()?;
+        let mut batch = stage.batch();
         for figure in figures::all(self) {
             batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
         batch.write("study.html", &page::page(self))?;
         batch.write("study.json", &json(self))?;
-        batch.finish()
+        batch.finish()?;
+        stage.commit()
     }
 }

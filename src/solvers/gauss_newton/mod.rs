@@ -15,7 +15,7 @@ pub(crate) use dense::weighted_jacobian;
 use super::infeasible::no_step;
 use super::point::Work;
 use super::timings::timed;
-use super::{Descend, Point, Step, Timings};
+use super::{Bits, Descend, Memory, Point, Step, Timings};
 use crate::constraints;
 use crate::objective::{Evaluation, Loss};
 use crate::problem::Problem;
@@ -141,6 +141,25 @@ impl Descend for GaussNewton {
             Some(status) => no_step(problem, point, status),
             None => Step::Stuck("no Gauss-Newton step lowers the cost".into()),
         }
+    }
+
+    fn memory(&self) -> Memory {
+        let numbers = std::iter::once(self.damping).chain(self.first_cost);
+        Memory::GaussNewton {
+            numbers: Bits(numbers.collect()),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, _: &Problem, _: &Point) -> bool {
+        let Memory::GaussNewton { numbers } = memory else {
+            return false;
+        };
+        let [damping, first_cost @ ..] = numbers.0.as_slice() else {
+            return false;
+        };
+        self.damping = *damping;
+        self.first_cost = first_cost.first().copied();
+        first_cost.len() <= 1
     }
 }
 

@@ -1,0 +1,62 @@
+//! `kmcfit resume`
+
+use super::fit::{self, Printed};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, study};
+use crate::error::InputError;
+use crate::report::{FitJournal, JOURNAL, Run};
+use crate::solvers::Status;
+use std::path::PathBuf;
+
+/// Go on with a fit, study or story that was killed or interrupted, to the same bits.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Its folder.
+    folder: PathBuf,
+    /// Print the result document instead of the summary.
+    #[arg(long)]
+    json: bool,
+    /// Threads of a study; the results do not depend on them [default: one per core].
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let folder = &arguments.folder;
+    if !folder.is_dir() {
+        return Err(InputError::file(folder, "there is no such folder")
+            .expected("the folder of a fit or study that did not come to its end")
+            .into());
+    }
+    if folder.join(JOURNAL).exists() {
+        return study::go_on(folder, arguments.json, arguments.threads);
+    }
+    let printed = Printed {
+        json: arguments.json,
+        timings: false,
+    };
+    if let Some(heading) = FitJournal::heading(folder)? {
+        return fit::go_on(folder, &heading, &printed);
+    }
+    finished(arguments, &printed)
+}
+
+/// What was finished before is told again.
+fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, Failure> {
+    let folder = &arguments.folder;
+    if !folder.join("result.json").exists() {
+        return Err(
+            InputError::file(folder, "there is nothing to go on with in this folder")
+                .expected("the folder of a fit or study that did not come to its end")
+                .into(),
+        );
+    }
+    let run = Run::open(folder)?;
+    eprintln!("note: nothing is left to do: this run had come to its end");
+    fit::tell(&run.document, folder, printed);
+    let is = |status: Status| run.document.outcome.status == status.name();
+    Ok(match () {
+        () if is(Status::Converged) || is(Status::Completed) => OK,
+        () if is(Status::Interrupted) => INTERRUPTED,
+        () => NOT_CONVERGED,
+    })
+}

@@ -1,0 +1,68 @@
+//! A lock on an output folder: one run at a time.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::Path;
+
+/// The file that is locked where a folder cannot be.
+const LOCK: &str = ".kmcfit.lock";
+
+/// The lock. The system opens it when the program ends, however it ends, so a killed run blocks nobody.
+#[derive(Debug)]
+pub(super) struct Lock {
+    _held: File,
+}
+
+/// Somebody else holds the lock.
+#[derive(Debug)]
+pub(super) struct Taken;
+
+impl Lock {
+    /// Locks a folder, or a file in it where the system locks no folders. Nothing, where the file system
+    /// knows no locks at all: a run must be possible there too.
+    pub fn take(folder: &Path) -> Result<Option<Self>, Taken> {
+        let on_folder = File::open(folder).ok().map(locked);
+        match on_folder {
+            Some(Ok(lock)) => Ok(Some(lock)),
+            Some(Err(TryLockError::WouldBlock)) => Err(Taken),
+            Some(Err(TryLockError::Error(_))) | None => Self::by_file(&folder.join(LOCK)),
+        }
+    }
+
+    fn by_file(path: &Path) -> Result<Option<Self>, Taken> {
+        let mut options = OpenOptions::new();
+        options.write(true).create(true).truncate(false);
+        // A link in its place could lead anywhere.
+        let file = match path.is_symlink() {
+            true => None,
+            false => options.open(path).ok(),
+        };
+        match file.map(locked) {
+            Some(Ok(lock)) => Ok(Some(lock)),
+            Some(Err(TryLockError::WouldBlock)) => Err(Taken),
+            Some(Err(TryLockError::Error(_))) | None => Ok(None),
+        }
+    }
+}
+
+fn locked(file: File) -> Result<Lock, TryLockError> {
+    file.try_lock()?;
+    Ok(Lock { _held: file })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_at_a_time() {
+        let place = tempfile::tempdir().expect("a folder");
+        for take in [Lock::take, |folder: &Path| {
+            Lock::by_file(&folder.join(LOCK))
+        }] {
+            let first = take(place.path()).expect("free").expect("a lock");
+            assert!(take(place.path()).is_err());
+            drop(first);
+            assert!(take(place.path()).expect("free again").is_some());
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Runs are loaded back by the library.
+
+use crate::workbench::{Workbench, column, paper_run};
+use kmcfit::Run;
+
+#[test]
+fn a_run_is_what_its_files_say() {
+    let (bench, _) = paper_run();
+    let run = Run::open(bench.path("runs/paper")).expect("a run");
+    let read = |table: &str, name: &str| column(&bench.read(&format!("runs/paper/{table}")), name);
+    assert_eq!(run.document.outcome.status, "completed");
+    assert_eq!(
+        run.value["cost"]["final"].as_f64(),
+        Some(run.document.cost.r#final)
+    );
+    let costs: Vec<f64> = run.history.iter().map(|row| row.cost).collect();
+    assert_eq!(costs, read("history.csv", "cost"));
+    assert_eq!(run.history.last().map(|row| row.iteration), Some(1000));
+    assert_eq!(run.device.mass, read("functions.csv", "mass_kg"));
+    let truth = run.truth.as_ref().expect("the truth is known");
+    assert_eq!(truth.mass, read("functions.csv", "true_mass_kg"));
+    assert_eq!(
+        run.trajectory.column("y_m"),
+        Some(read("trajectory.csv", "y_m"))
+    );
+    assert_eq!(run.oscillator.grid.times(), read("trajectory.csv", "t_s"));
+    assert!(
+        run.band("mass").is_none(),
+        "of 6000 values no bands are computed"
+    );
+}
+
+#[test]
+fn bands() {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(
+        0,
+        &[
+            "fit",
+            "models/linear-mass.yaml",
+            "--out",
+            "run",
+            "--no-report",
+        ],
+    );
+    let run = Run::open(bench.path("run")).expect("a run");
+    let [low, high] = run.band("mass").expect("few values");
+    let within = |i: usize| low[i] <= run.device.mass[i] && run.device.mass[i] <= high[i];
+    assert!((0..run.device.mass.len()).all(within));
+    assert!(run.band("k/m").is_some() && run.band("friction").is_none());
+}
+
+/// Whatever is missing or damaged is said with its file; nothing that is in a file ends the program.
+#[test]
+fn damaged_runs() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    let folder = bench.path("run");
+    let refused = || Run::open(&folder).expect_err("damaged").to_string();
+    for name in [
+        "result.json",
+        "history.csv",
+        "functions.csv",
+        "trajectory.csv",
+    ] {
+        let path = folder.join(name);
+        let whole = std::fs::read(&path).expect("a file");
+        std::fs::remove_file(&path).expect("a file");
+        assert!(
+            refused().contains(&format!("{name}: there is no such file")),
+            "{}",
+            refused()
+        );
+        for share in 0..20 {
+            std::fs::write(&path, &whole[..whole.len() * share / 20]).expect("room");
+            assert!(refused().contains(name), "{}", refused());
+        }
+        let mut state = 7_u64;
+        for _ in 0..300 {
+            let mut spoiled = whole.clone();
+            for _ in 0..3 {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                let place = (state >> 33) as usize % spoiled.len();
+                spoiled[place] = (state >> 20) as u8;
+            }
+            std::fs::write(&path, &spoiled).expect("room");
+            // A digit more or less may go unnoticed: that it ends in order is all.
+            let _ = Run::open(&folder);
+        }
+        std::fs::write(&path, &whole).expect("room");
+    }
+    let functions = bench.read("run/functions.csv");
+    let spoil = |from: &str, to: &str| {
+        assert!(functions.contains(from));
+        bench.write("run/functions.csv", &functions.replacen(from, to, 1));
+        refused().replace(&folder.display().to_string(), "run")
+    };
+    let renamed = spoil("mass_kg", "mass_g");
+    let text = spoil("\n0,", "\nx,");
+    let field = spoil("\n0,", "\n0,,");
+    insta::assert_snapshot!([text, field].join("\n"), @"
+    run/functions.csv:2: row 1, column `t_s`: this is no number
+      found: `x`
+      expected: a number, or nothing
+    run/functions.csv:2: row 1: the row has another number of fields
+      found: 9
+      expected: 8
+    ");
+    assert!(
+        renamed.starts_with("run/functions.csv: there is no column `mass_kg`"),
+        "{renamed}"
+    );
+    assert!(renamed.contains("did you mean `mass_g`"), "{renamed}");
+}

@@ -1,0 +1,161 @@
+//! A fit that is interrupted and gone on with ends with the bits of one that is not.
+
+use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::report::{FIT_JOURNAL, FitHeading, FitJournal};
+use kmcfit::solvers::{
+    Fit, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
+};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A shipped model with other words in it.
+fn model(name: &str, changes: &[(&str, &str)]) -> (ModelFile, Model) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{name}.yaml"));
+    let mut text = std::fs::read_to_string(&path).expect("a shipped model");
+    for (from, to) in changes {
+        assert!(text.contains(from), "{name}: {from}");
+        text = text.replace(from, to);
+    }
+    let file = ModelFile::parse(&path, text).expect("a model");
+    let model = build(&file, Purpose::Fit).expect("a model");
+    (file, model)
+}
+
+/// Fits until iteration `last` of all that are shown.
+fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<WeightPath>, Fit) {
+    let mut settings = model.settings.clone();
+    let flag = Arc::new(AtomicBool::new(false));
+    settings.interrupt = Some(Arc::clone(&flag));
+    let mut shown = 0;
+    let mut observe = |_: &Row| {
+        shown += 1;
+        flag.fetch_or(shown >= last, Ordering::Relaxed);
+    };
+    let mut watch = Watch::new(&mut observe);
+    if let Some(journal) = journal {
+        watch = watch.keeping(journal);
+    }
+    let (problem, start) = (&model.problem, model.problem.start());
+    match &model.weight_rule {
+        None => {
+            let found = fit_with_noise_watched(problem, &start, &settings, &mut watch);
+            (None, found.expect("a motion").1)
+        }
+        Some(search) => {
+            let (rule, which) = (search.rule, &search.penalties);
+            let found = choose_weight_watched(problem, &start, &settings, rule, which, &mut watch);
+            let (path, _, fit) = found.expect("a motion");
+            (Some(path), fit)
+        }
+    }
+}
+
+/// All that a fit leaves but times, with all bits: numbers print so that they read back the same.
+fn told((path, fit): &(Option<WeightPath>, Fit)) -> String {
+    format!(
+        "{path:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        fit.best, fit.history, fit.snapshots, fit.outcome, fit.counts, fit.rungs
+    )
+}
+
+/// Interrupts the fit again and again after `each` more iterations until it comes to its end.
+fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
+    let (file, model) = model(name, changes);
+    let whole = run(&model, None, u64::MAX);
+    let place = tempfile::tempdir().expect("a folder");
+    let heading = FitHeading::new(&file, false, None);
+    let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
+    let mut times = 0;
+    let found = loop {
+        let found = run(&model, Some(&mut journal), each);
+        assert!(journal.trouble().is_none());
+        if found.1.outcome.status != Status::Interrupted {
+            break found;
+        }
+        times += 1;
+        assert!(times < 1000, "{name} never ends");
+        journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+    };
+    assert!(times >= 2, "{name} was interrupted {times} times only");
+    assert!(told(&whole) == told(&found), "{name}: other bits");
+    // A journal of which the last line and the checkpoint are torn.
+    let path = place.path().join(FIT_JOURNAL);
+    let text = std::fs::read(&path).expect("the journal");
+    std::fs::write(&path, &text[..text.len() - 7]).expect("room");
+    std::fs::write(place.path().join("fit.checkpoint"), "{\"fit\"").expect("room");
+    let mut journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+    let found = run(&model, Some(&mut journal), u64::MAX);
+    assert!(
+        told(&whole) == told(&found),
+        "{name}: other bits after a tear"
+    );
+    let healed = std::fs::read(&path).expect("the journal");
+    assert_eq!(without_times(&healed), without_times(&text), "{name}");
+}
+
+/// The lines of a journal up to where the times are told.
+fn without_times(text: &[u8]) -> Vec<String> {
+    let text = String::from_utf8(text.to_vec()).expect("text");
+    let line = |line: &str| match line.split_once("\"timings\"") {
+        Some((before, _)) => before.to_owned(),
+        None => line.to_owned(),
+    };
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn steepest_descent() {
+    again_and_again("paper", &[("iterations: 1000}", "iterations: 40}")], 13);
+}
+
+#[test]
+fn lbfgs_with_its_memory_full() {
+    again_and_again("paper-lbfgs", &[], 150);
+}
+
+#[test]
+fn gauss_newton_with_many_values() {
+    let longer = [("iterations: 100", "iterations: 9"), ("1e-6", "1e-30")];
+    again_and_again("paper-positive", &longer, 2);
+}
+
+#[test]
+fn projected_gradient() {
+    again_and_again("knots", &[("gauss-newton", "projected-gradient")], 17);
+}
+
+#[test]
+fn rounds_of_sigmas() {
+    again_and_again("accelerometer", &[], 2);
+}
+
+#[test]
+fn a_path_of_weights() {
+    let shorter = [
+        ("nodes: 2000", "nodes: 400"),
+        ("iterations: 40", "iterations: 12"),
+    ];
+    again_and_again("noisy", &shorter, 9);
+}
+
+/// What does not come out with the same bits is computed again: a journal can cost time and never
+/// change a result.
+#[test]
+fn a_journal_that_lies() {
+    let (file, model) = model("knots", &[]);
+    let whole = run(&model, None, u64::MAX);
+    let place = tempfile::tempdir().expect("a folder");
+    let heading = FitHeading::new(&file, false, Some(0.0));
+    let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
+    run(&model, Some(&mut journal), 3);
+    let path = place.path().join("fit.checkpoint");
+    let text = std::fs::read_to_string(&path).expect("a checkpoint");
+    let begin = text.find("\"parameters\":\"").expect("parameters") + 14;
+    let mut bytes = text.into_bytes();
+    bytes[begin + 15] ^= 1;
+    std::fs::write(&path, bytes).expect("room");
+    let mut journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+    let found = run(&model, Some(&mut journal), u64::MAX);
+    assert!(told(&whole) == told(&found), "the lie was believed");
+}
