@@ -88,7 +88,7 @@ pub(super) fn fit_into(
     };
     let full = |error| unwritable(folder.path(), &error);
     let mut document = run.document();
-    let writing = run.write(folder, with_figures).map_err(full)?;
+    let writing = run.write(folder, &document, with_figures).map_err(full)?;
     let before = &model.preparation;
     document.timings = TimingsSummary::new(
         &found,

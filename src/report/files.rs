@@ -37,7 +37,7 @@ impl OutputFolder {
     }
 
     /// Takes away what an older run left that the new one may not write again: its result, without
-    /// which the folder holds no run, its figures and its tables of readings.
+    /// which the folder holds no run, its page, its figures and its tables of readings.
     ///
     /// # Errors
     /// What the file system says.
@@ -46,7 +46,9 @@ impl OutputFolder {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
             _ => Ok(()),
         };
-        gone(std::fs::remove_file(self.path.join("result.json")))?;
+        for name in ["result.json", "report.html"] {
+            gone(std::fs::remove_file(self.path.join(name)))?;
+        }
         for (name, kind) in [("figures", "svg"), ("readings", "csv")] {
             let Ok(files) = std::fs::read_dir(self.path.join(name)) else {
                 continue;

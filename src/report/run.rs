@@ -12,6 +12,7 @@ use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::OutputFolder;
 use super::knowledge::knowledge;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
+use super::page::fit_page;
 use super::render;
 use super::timings::TimingsSummary;
 use crate::config::{ChannelNote, Model};
@@ -19,8 +20,7 @@ use crate::diagnostics::rms;
 use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction, Ratios};
-use crate::identifiability::{BandSettings, Bands, count, verdicts};
-use crate::objective::Channel;
+use crate::identifiability::{Band, BandSettings, Bands, count, verdicts};
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
@@ -82,12 +82,18 @@ impl Known {
 }
 
 impl Run<'_> {
-    /// Writes tables and, if asked for, figures: all but the result document, which comes last, so that
-    /// a folder with a result is complete. Returns what the writing took.
+    /// Writes tables and, if asked for, figures and the page of `document`: all but the result document
+    /// itself, which comes last, so that a folder with a result is complete. Returns what the writing
+    /// took.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn write(&self, folder: &OutputFolder, with_figures: bool) -> io::Result<Duration> {
+    pub fn write(
+        &self,
+        folder: &OutputFolder,
+        document: &ResultDocument,
+        with_figures: bool,
+    ) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
         let mut batch = folder.batch();
         let mut write = |name: &str, text: &str| timed(&mut writing, || batch.write(name, text));
@@ -97,16 +103,19 @@ impl Run<'_> {
         for (name, table) in self.readings() {
             write(&name, &table.to_csv())?;
         }
-        let figures = if with_figures {
-            self.figures()
-        } else {
-            Vec::new()
-        };
-        for figure in figures {
-            write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+        if with_figures {
+            for figure in self.figures() {
+                write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            }
+            write("report.html", &self.page(document))?;
         }
         timed(&mut writing, || batch.finish())?;
         Ok(writing)
+    }
+
+    /// The page that people keep, of the run and its document: one HTML file that loads nothing.
+    pub fn page(&self, document: &ResultDocument) -> String {
+        fit_page(self, document)
     }
 
     /// The result document.
@@ -483,58 +492,91 @@ impl Run<'_> {
             self.functions_figure(),
             self.ratios_figure(),
         ]);
-        let problem = &self.model.problem;
-        let several = problem.experiments.len() > 1;
-        for (i, experiment) in problem.experiments.iter().enumerate() {
-            let predictions = &self.fit.best.evaluation.predictions[i];
-            for (c, (channel, predicted)) in experiment.channels.iter().zip(predictions).enumerate()
-            {
-                let mut list = self.channel_figures(i, c, channel, predicted);
-                let mut suffix = String::new();
-                if several {
-                    suffix = format!("-{}", i + 1);
-                }
-                if c > 0 {
-                    suffix = format!("{suffix}-{}", channel.kind().name());
-                }
-                list.iter_mut().for_each(|figure| figure.name += &suffix);
-                figures.extend(list);
-            }
+        for (experiment, channel) in self.channels() {
+            let mut list = self.channel_figures(experiment, channel);
+            let suffix = self.suffix(experiment, channel);
+            list.iter_mut().for_each(|figure| figure.name += &suffix);
+            figures.extend(list);
         }
         figures
     }
 
-    /// The figures of one channel: readings, readings beside the motion, residuals.
-    fn channel_figures(
-        &self,
-        experiment: usize,
-        index: usize,
-        channel: &Channel,
-        predicted: &[f64],
-    ) -> Vec<Figure> {
-        let note = self.note(experiment, index);
-        let (unit, factor) = (
-            measured::unit(channel, note),
-            note.map_or(1.0, |n| n.unit.factor()),
-        );
-        let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / factor).collect() };
-        let label = format!("{} {}", channel.kind().name(), channel.kind().symbol());
-        let times = channel.times();
-        let (observed, model) = (scaled(channel.observed()), scaled(predicted));
-        let beside = match channel.stride() {
-            Some(_) if factor == 1.0 => self.motion(experiment, times, channel.observed()),
-            _ => figures::channel((&label, unit), times, &observed, &model),
+    /// Indices of the experiments and their channels.
+    pub(super) fn channels(&self) -> Vec<(usize, usize)> {
+        let experiments = self.model.problem.experiments.iter().enumerate();
+        experiments
+            .flat_map(|(e, experiment)| (0..experiment.channels.len()).map(move |c| (e, c)))
+            .collect()
+    }
+
+    /// What tells the figures of one channel from those of others.
+    pub(super) fn suffix(&self, experiment: usize, channel: usize) -> String {
+        let experiments = &self.model.problem.experiments;
+        let number = match experiments.len() {
+            1 => String::new(),
+            _ => format!("-{}", experiment + 1),
         };
-        let residuals = scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
-        let diagnostics = measured::diagnostics(channel, predicted);
+        match channel {
+            0 => number,
+            _ => format!(
+                "{number}-{}",
+                experiments[experiment].channels[channel].kind().name()
+            ),
+        }
+    }
+
+    /// The figures of one channel: readings, readings beside the motion, residuals.
+    fn channel_figures(&self, experiment: usize, index: usize) -> Vec<Figure> {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let [beside, residuals] = self.fitted_figures(experiment, index);
+        let shown = self.shown(experiment, index);
+        let label = shown.label.as_str();
+        let beside = match channel.stride() {
+            Some(_) if shown.factor == 1.0 => {
+                self.motion(experiment, channel.times(), channel.observed())
+            }
+            _ => beside,
+        };
+        let observed = shown.scaled(channel.observed());
         vec![
-            figures::observation(&[(&label, unit, times, &observed)]),
+            figures::observation(&[(label, shown.unit, channel.times(), &observed)]),
             beside,
-            figures::residuals((&label, unit), times, &residuals, &diagnostics),
+            residuals,
         ]
     }
 
-    fn convergence(&self) -> Figure {
+    /// The readings of a channel with what the model says of them, and the residuals.
+    pub(super) fn fitted_figures(&self, experiment: usize, index: usize) -> [Figure; 2] {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let predicted = &self.fit.best.evaluation.predictions[experiment][index];
+        let shown = self.shown(experiment, index);
+        let label = (shown.label.as_str(), shown.unit);
+        let times = channel.times();
+        let residuals = shown.scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
+        let diagnostics = measured::diagnostics(channel, predicted);
+        [
+            figures::channel(
+                label,
+                times,
+                &shown.scaled(channel.observed()),
+                &shown.scaled(predicted),
+            ),
+            figures::residuals(label, times, &residuals, &diagnostics),
+        ]
+    }
+
+    /// How reports speak of a channel.
+    fn shown(&self, experiment: usize, index: usize) -> Shown<'_> {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let note = self.note(experiment, index);
+        Shown {
+            label: format!("{} {}", channel.kind().name(), channel.kind().symbol()),
+            unit: measured::unit(channel, note),
+            factor: note.map_or(1.0, |n| n.unit.factor()),
+        }
+    }
+
+    pub(super) fn convergence(&self) -> Figure {
         let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
         figures::convergence(
             &column(|r| r.iteration as f64),
@@ -543,7 +585,7 @@ impl Run<'_> {
         )
     }
 
-    fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+    pub(super) fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
         let grid_times = self.model.problem.oscillator.grid.times();
         let nodes = self.model.problem.experiments[experiment].nodes;
         let grid_times = &grid_times[..nodes];
@@ -565,30 +607,51 @@ impl Run<'_> {
         figures::motion(times, observed, &snapshots)
     }
 
-    fn functions_figure(&self) -> Figure {
+    pub(super) fn functions_figure(&self) -> Figure {
         let problem = &self.model.problem;
         let starts = problem.functions.values(&problem.start());
         let list = self.named_functions();
         let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
         let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
+        let times = problem.oscillator.grid.times();
+        let bands = self.known.bands.as_ref();
+        let bands = bands.map_or(Vec::new(), |b| ends(b, &b.functions, &times));
         let curves: Vec<FunctionCurve> = (list.iter().enumerate())
             .map(|(i, (function, found))| FunctionCurve {
+                band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
                 start: Some(&starts[i]),
                 truth: self.true_function(i),
                 ..FunctionCurve::new(&names[i], self.unit(function), found)
             })
             .collect();
-        figures::functions(&problem.oscillator.grid.times(), &curves)
+        figures::functions(&times, &curves)
     }
 
-    fn ratios_figure(&self) -> Figure {
+    pub(super) fn ratios_figure(&self) -> Figure {
         let found = Ratios::of(&self.fit.best.evaluation.device);
         let truth = self.model.truth.as_ref().map(Ratios::of);
+        let times = self.model.problem.oscillator.grid.times();
+        let bands = self.known.bands.as_ref();
+        let bands = bands.map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
         figures::ratios(
-            &self.model.problem.oscillator.grid.times(),
+            &times,
             &curves(&found),
             truth.as_ref().map(curves).as_ref(),
+            &bands,
         )
+    }
+}
+
+/// A channel in the unit of its file.
+struct Shown<'a> {
+    label: String,
+    unit: &'a str,
+    factor: f64,
+}
+
+impl Shown<'_> {
+    fn scaled(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().map(|v| v / self.factor).collect()
     }
 }
 
@@ -611,6 +674,32 @@ fn rung_summary(rung: &Rung) -> RungSummary {
         iterations: rung.iterations,
         status: rung.outcome.status.name().into(),
     }
+}
+
+/// The lower and upper ends of 95 % bands at `times`, by straight lines between those of `bands`.
+fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
+    let known = &bands.times;
+    if known.is_empty() {
+        return Vec::new();
+    }
+    let at = |values: &dyn Fn(usize) -> f64, t: f64| {
+        let next = known.partition_point(|k| *k < t).min(known.len() - 1);
+        let before = next.saturating_sub(1);
+        match known[next] - known[before] {
+            run if known[next] > t && run > 0.0 => {
+                let share = (t - known[before]) / run;
+                values(before) + share * (values(next) - values(before))
+            }
+            _ => values(next),
+        }
+    };
+    let side = |band: &Band, side: usize| -> Vec<f64> {
+        let value = |i: usize| band.pointwise(i)[side];
+        times.iter().map(|t| at(&value, *t)).collect()
+    };
+    list.iter()
+        .map(|band| [side(band, 0), side(band, 1)])
+        .collect()
 }
 
 fn curves(ratios: &Ratios) -> RatioCurves<'_> {
