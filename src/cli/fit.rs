@@ -21,7 +21,7 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
-    /// Write no figures.
+    /// Write no figures and no page.
     #[arg(long)]
     no_report: bool,
     /// Print where the time went.

@@ -179,8 +179,13 @@ impl Run<'_> {
     }
 
     /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
-    fn is_simulated(&self) -> bool {
+    pub(super) fn is_simulated(&self) -> bool {
         self.model.settings.solver != Solver::EquationError
+    }
+
+    /// The bands of functions and ratios, for models of few free values.
+    pub(super) fn bands(&self) -> Option<&Bands> {
+        self.known.bands.as_ref()
     }
 
     /// What was known before the fit; the equation error has no simulated motion to count about.
@@ -614,8 +619,9 @@ impl Run<'_> {
         let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
         let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
         let times = problem.oscillator.grid.times();
-        let bands = self.known.bands.as_ref();
-        let bands = bands.map_or(Vec::new(), |b| ends(b, &b.functions, &times));
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| ends(b, &b.functions, &times));
         let curves: Vec<FunctionCurve> = (list.iter().enumerate())
             .map(|(i, (function, found))| FunctionCurve {
                 band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
@@ -631,8 +637,9 @@ impl Run<'_> {
         let found = Ratios::of(&self.fit.best.evaluation.device);
         let truth = self.model.truth.as_ref().map(Ratios::of);
         let times = self.model.problem.oscillator.grid.times();
-        let bands = self.known.bands.as_ref();
-        let bands = bands.map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
         figures::ratios(
             &times,
             &curves(&found),

@@ -40,6 +40,7 @@ pub(super) fn page(comparison: &Comparison) -> String {
     body += &table(&comparison.measures);
     body += &format!("<p class=\"soft\">{}</p>\n", escape(&notes()));
     body += "<h2>In pictures</h2>\n";
+    body += &shell::help();
     body += &shell::figures(&figures::all(comparison));
     body += &format!(
         "<p class=\"soft\">Made by kmcfit {}.</p>\n",

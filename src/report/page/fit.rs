@@ -2,7 +2,7 @@
 //! repeat it.
 
 use super::table::{list, paragraph};
-use super::{figures, opening, page as shell, repeat, settings};
+use super::{figures, help, opening, page as shell, repeat, settings};
 use crate::report::Run;
 use crate::report::document::ResultDocument;
 use crate::report::figure::Figure;
@@ -34,7 +34,7 @@ pub(in crate::report) fn page(run: &Run, document: &ResultDocument) -> String {
         (
             "identifiability",
             "What the readings can show",
-            identifiability(document),
+            identifiability(run, document),
         ),
         (
             "predictions",
@@ -62,9 +62,10 @@ pub(in crate::report) fn page(run: &Run, document: &ResultDocument) -> String {
         )
     });
     let body = format!(
-        "{}<nav aria-label=\"Contents\">\n{}</nav>\n{}",
+        "{}<nav aria-label=\"Contents\">\n{}</nav>\n{}{}",
         opening::opening(document),
         links.collect::<String>(),
+        help(),
         parts.collect::<String>()
     );
     shell(&document.title, &body)
@@ -125,19 +126,26 @@ fn constraints(run: &Run, document: &ResultDocument) -> String {
     paragraph(&hold) + &active + &list(&said)
 }
 
-fn identifiability(document: &ResultDocument) -> String {
+/// What the fit had beside the readings, the numbers beside the functions, and where more is told.
+fn identifiability(run: &Run, document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let mut sentences = known.verdicts.clone();
-    sentences.extend(known.functions.iter().cloned());
-    sentences.extend(lines(|text| write_scalars(text, document)));
-    let told = match known.knowledge.is_empty() {
-        true => String::new(),
-        false => paragraph(&format!(
-            "What the fit was told: {}.",
-            known.knowledge.join("; ")
-        )),
+    let mut text = match known.knowledge.as_slice() {
+        [] => String::new(),
+        told => paragraph(&format!("What the fit was told: {}.", told.join("; "))),
     };
-    list(&sentences) + &told
+    text += &list(&lines(|text| write_scalars(text, document)));
+    if let Some(bands) = run.bands() {
+        let notes = bands.functions.iter().chain(&bands.ratios);
+        let notes = notes.flat_map(|b| b.notes.iter().map(|n| format!("{}: {n}", b.name)));
+        text += &list(&bands.notes.iter().cloned().chain(notes).collect::<Vec<_>>());
+    }
+    if run.is_simulated() && document.model.parameters > 0 {
+        text += &paragraph(
+            "Profiles, other devices with the same motion, and the experiment that would tell most:",
+        );
+        text += &repeat::command("study", document);
+    }
+    text
 }
 
 fn predictions(document: &ResultDocument) -> String {

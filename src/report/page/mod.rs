@@ -95,13 +95,14 @@ pub(super) fn figure(figure: &Figure) -> String {
     )
 }
 
-/// Figures under a heading; nothing where there are none.
+/// How the charts below are used, where they can be.
+pub(super) fn help() -> String {
+    format!("<p class=\"soft screen\">{}</p>\n", escape(KEYS))
+}
+
+/// Figures one below the other.
 pub(super) fn figures(figures: &[Figure]) -> String {
-    if figures.is_empty() {
-        return String::new();
-    }
-    let keys = format!("<p class=\"soft screen\">{}</p>\n", escape(KEYS));
-    figures.iter().fold(keys, |text, f| text + &figure(f))
+    figures.iter().map(figure).collect()
 }
 
 /// A drawing as part of a page, where it needs no name space.

@@ -16,7 +16,7 @@ pub(super) fn opening(document: &ResultDocument) -> String {
         text += &list(&known.functions);
     }
     if !known.verdicts.is_empty() {
-        text += "<h3>What stays open, and what would help</h3>\n";
+        text += "<h3>What can be seen, and what stays open</h3>\n";
         text += &list(&known.verdicts);
     }
     let notes: Vec<String> = (document.warnings.iter().map(|w| format!("warning: {w}")))
@@ -142,10 +142,10 @@ pub(super) fn records(document: &ResultDocument) -> String {
     let headings = [
         "record",
         "channel",
-        "readings",
-        "rms residual",
         "fit",
+        "rms residual",
         "sigma",
+        "readings",
     ];
     table(&headings, &rows) + &list(&notes)
 }
@@ -161,10 +161,10 @@ fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
     vec![
         name.into(),
         channel.kind.clone(),
-        channel.readings.to_string(),
-        with_unit(channel.rms_residual),
         format!("{:.2} %", channel.fit_percent),
+        with_unit(channel.rms_residual),
         sigma,
+        channel.readings.to_string(),
     ]
 }
 

@@ -23,12 +23,16 @@ pub(super) fn repeat(run: &Run, document: &ResultDocument) -> String {
             .map(|w| ("seed", format!("{} (choice of the weight)", w.seed))),
     );
     let source = &run.model.source;
-    let command = format!("kmcfit fit {}", quoted(&document.model.file));
-    block(&command)
+    command("fit", document)
         + &pairs(&rows)
         + &data(source)
         + "<h3>The model file</h3>\n"
         + &block(source.text.trim_end())
+}
+
+/// A command of the program on the model of the run.
+pub(super) fn command(name: &str, document: &ResultDocument) -> String {
+    block(&format!("kmcfit {name} {}", quoted(&document.model.file)))
 }
 
 fn data(source: &Source) -> String {

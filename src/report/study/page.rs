@@ -17,6 +17,7 @@ pub fn page(study: &StudyDocument) -> String {
         body += "</ul>\n";
     }
     body += "<h2>In pictures</h2>\n";
+    body += &shell::help();
     body += &shell::figures(&figures::all(study));
     body += &format!(
         "<p class=\"soft\">Made by kmcfit {}; seed {}, confidence {}; the study is {}.</p>\n",

@@ -49,6 +49,7 @@ class Chart {
     this.bar();
     const grid = element("div", { class: data.columns > 1 ? "panels beside" : "panels" }, this.live);
     this.panels = data.panels.map((panel, i) => new Panel(this, panel, `${index}-${i}`, grid, data.panels.length));
+    this.panels.forEach((panel, i) => panel.box.classList.toggle("shares", this.panels[i + 1]?.axis === panel.axis));
     this.legend();
     figure.querySelector(".still").after(this.live);
   }

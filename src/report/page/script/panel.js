@@ -6,10 +6,12 @@ class Panel {
   constructor(chart, data, name, parent, count) {
     Object.assign(this, { chart, name, title: data.title, x: data.x, y: data.y, yRange: null });
     this.marks = data.marks.map((mark) => this.prepared(mark));
-    const key = data.x.label.startsWith("time") ? `${data.x.label}|${data.x.unit}` : `${name.split("-")[0]}|${caption(data.x)}`;
-    this.axis = axisOf(`${key}|${data.x.log}`, data.x.log);
-    this.axis.panels.push(this);
     const own = data.x.limits ? data.x.limits.map((v) => even(data.x.log, v)) : this.xExtent();
+    // Charts over the same time go together; other axes belong to their chart.
+    const span = (own ?? []).map((end) => end.toPrecision(4)).join(" ");
+    const owner = data.x.label.startsWith("time") ? span : name.split("-")[0];
+    this.axis = axisOf([caption(data.x), data.x.log, owner].join("|"), data.x.log);
+    this.axis.panels.push(this);
     this.axis.full = union(this.axis.full, own);
     this.height = count === 1 ? 330 : 210;
     this.build(parent);
