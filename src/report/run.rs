@@ -514,8 +514,19 @@ impl Run<'_> {
             .collect()
     }
 
+    /// A figure of one channel with a name and a title of its own, where there are others.
+    pub(super) fn titled(&self, mut figure: Figure, experiment: usize, channel: usize) -> Figure {
+        figure.name += &self.suffix(experiment, channel);
+        if self.channels().len() > 1 {
+            let record = &self.model.problem.experiments[experiment];
+            let kind = record.channels[channel].kind().name();
+            figure.title = format!("{}: {}, {kind}", figure.title, record.name);
+        }
+        figure
+    }
+
     /// What tells the figures of one channel from those of others.
-    pub(super) fn suffix(&self, experiment: usize, channel: usize) -> String {
+    fn suffix(&self, experiment: usize, channel: usize) -> String {
         let experiments = &self.model.problem.experiments;
         let number = match experiments.len() {
             1 => String::new(),

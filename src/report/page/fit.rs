@@ -2,7 +2,7 @@
 //! repeat it.
 
 use super::table::{list, paragraph};
-use super::{figures, help, opening, page as shell, repeat, settings};
+use super::{figures, figures_without, help, opening, page as shell, repeat, settings};
 use crate::report::Run;
 use crate::report::document::ResultDocument;
 use crate::report::figure::Figure;
@@ -11,6 +11,9 @@ use crate::report::summary::{
     prediction_table, write_constraints, write_rungs, write_scalars, write_statistics,
 };
 use crate::report::text::escape;
+
+/// Where a fit starts may be far from what it finds.
+const START: &[&str] = &["start"];
 
 /// A part of the page: its anchor, its heading, and what is in it.
 type Section = (&'static str, &'static str, String);
@@ -21,12 +24,12 @@ pub(in crate::report) fn page(run: &Run, document: &ResultDocument) -> String {
         ("fit", "Data and fit", data_and_fit(run, document)),
         (
             "functions",
-            "Mass, damping, stiffness",
-            figures(&[run.functions_figure()]),
+            "The functions",
+            figures_without(START, &[run.functions_figure()]),
         ),
         (
             "ratios",
-            "What a free motion shows",
+            "Ratios, frequency and damping ratio",
             figures(&[run.ratios_figure()]),
         ),
         ("convergence", "Convergence", convergence(run, document)),
@@ -75,15 +78,8 @@ pub(in crate::report) fn page(run: &Run, document: &ResultDocument) -> String {
 fn data_and_fit(run: &Run, document: &ResultDocument) -> String {
     let mut drawn = Vec::new();
     for (experiment, channel) in run.channels() {
-        let suffix = run.suffix(experiment, channel);
-        let name = &run.model.problem.experiments[experiment].name;
-        for mut figure in run.fitted_figures(experiment, channel) {
-            figure.name += &suffix;
-            if run.channels().len() > 1 {
-                figure.title = format!("{}: {name}", figure.title);
-            }
-            drawn.push(figure);
-        }
+        let pair = run.fitted_figures(experiment, channel);
+        drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
     }
     opening::records(document)
         + &list(&lines(|text| write_statistics(text, document)))
@@ -96,11 +92,13 @@ fn convergence(run: &Run, document: &ResultDocument) -> String {
     if !run.fit.history.is_empty() {
         drawn.push(run.convergence());
     }
-    let first = run.model.problem.experiments.first();
-    let channel = first.and_then(|e| e.channels.first());
-    if let Some(channel) = channel.filter(|c| c.stride().is_some() && !run.fit.snapshots.is_empty())
-    {
-        drawn.push(run.motion(0, channel.times(), channel.observed()));
+    for (i, experiment) in run.model.problem.experiments.iter().enumerate() {
+        let channel = experiment.channels.first().filter(|c| c.stride().is_some());
+        let Some(channel) = channel.filter(|_| !run.fit.snapshots.is_empty()) else {
+            continue;
+        };
+        let motion = run.motion(i, channel.times(), channel.observed());
+        drawn.push(run.titled(motion, i, 0));
     }
     let work = paragraph(&opening::work(document));
     work + &list(&lines(|text| write_rungs(text, document))) + &figures(&drawn)

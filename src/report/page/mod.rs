@@ -74,8 +74,8 @@ fn hash(text: &str) -> String {
 
 /// A figure with its caption: a drawing, and its numbers for the chart. Title and description of the
 /// figure are its text for readers who cannot see it.
-pub(super) fn figure(figure: &Figure) -> String {
-    let drawn = chart::chart(figure);
+fn figure(figure: &Figure, off: &[&str]) -> String {
+    let drawn = chart::chart(figure, off);
     let thinned = match drawn.thinned {
         true => {
             " Long series are thinned for display: every peak is kept; all values are in the tables."
@@ -102,7 +102,13 @@ pub(super) fn help() -> String {
 
 /// Figures one below the other.
 pub(super) fn figures(figures: &[Figure]) -> String {
-    figures.iter().map(figure).collect()
+    figures_without(&[], figures)
+}
+
+/// Figures whose charts show the curves of these labels only when asked to: what is far away would make
+/// everything else flat.
+fn figures_without(off: &[&str], figures: &[Figure]) -> String {
+    figures.iter().map(|f| figure(f, off)).collect()
 }
 
 /// A drawing as part of a page, where it needs no name space.

@@ -50,7 +50,7 @@ class Chart {
     const grid = element("div", { class: data.columns > 1 ? "panels beside" : "panels" }, this.live);
     this.panels = data.panels.map((panel, i) => new Panel(this, panel, `${index}-${i}`, grid, data.panels.length));
     this.panels.forEach((panel, i) => panel.box.classList.toggle("shares", this.panels[i + 1]?.axis === panel.axis));
-    this.legend();
+    this.legend(data.off);
     figure.querySelector(".still").after(this.live);
   }
 
@@ -78,14 +78,16 @@ class Chart {
   }
 
   /** One key for each label with the same look. */
-  legend() {
+  legend(off) {
     const seen = new Map();
     for (const mark of this.panels.flatMap((panel) => panel.marks)) {
       mark.key = [mark.label, mark.kind, mark.colour, mark.dash, mark.width].join("|");
       if (mark.label && !seen.has(mark.key)) seen.set(mark.key, mark);
     }
     for (const [key, mark] of seen) {
-      const button = element("button", { type: "button", class: "key", "aria-pressed": "true" }, this.keys);
+      const shown = !off.includes(mark.label);
+      if (!shown) this.hidden.add(key);
+      const button = element("button", { type: "button", class: "key", "aria-pressed": String(shown) }, this.keys);
       const sample = shape(this.space, "svg", { viewBox: "0 0 28 12", "aria-hidden": "true" }, button);
       const paths = { points: "M5 6h0M14 6h0M23 6h0", band: "M0 1H28V11H0Z", span: "M0 1H28V11H0Z" };
       shape(this.space, "path", { ...looks(mark), d: paths[mark.kind] ?? "M0 6H28" }, sample);
