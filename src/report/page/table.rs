@@ -1,6 +1,6 @@
 //! Tables, lists and facts as HTML; every text is escaped here.
 
-use crate::report::text::escape;
+use crate::report::text::{decade, escape};
 
 /// A table with a heading for each column; the first cell of a row is its heading.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
@@ -63,7 +63,11 @@ pub(super) fn number(x: f64) -> String {
             let places = (4 - size.log10().floor() as i32).clamp(0, 8) as usize;
             format!("{x:.places$}")
         }
-        _ => format!("{x:.4e}"),
+        _ => {
+            let text = format!("{x:.4e}");
+            let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+            format!("{mantissa}×{}", decade(exponent.parse().unwrap_or(0)))
+        }
     };
     text.replace('-', "−")
 }
@@ -75,7 +79,14 @@ mod tests {
     #[test]
     fn numbers_have_five_digits() {
         let said = [0.0, -1.0 / 3.0, 12345.6, 1e-7, 2.5e9, f64::NAN].map(number);
-        let expected = ["0", "−0.33333", "12346", "1.0000e−7", "2.5000e9", "unknown"];
+        let expected = [
+            "0",
+            "−0.33333",
+            "12346",
+            "1.0000×10⁻⁷",
+            "2.5000×10⁹",
+            "unknown",
+        ];
         assert_eq!(said, expected);
     }
 

@@ -83,12 +83,18 @@ const ticksOf = (log, range, most) => {
     const values = linearTicks([10 ** range[0], 10 ** range[1]], most);
     return values.filter((t) => t.place > 0).map((t) => ({ ...t, place: Math.log10(t.place) }));
   }
+  // Where few decades are in sight, round values between them help.
+  const between = 2 >= last - first ? [1, 2, 5] : [1];
   const stride = Math.floor((last - first) / most) + 1;
   const ticks = [];
   for (let exponent = first; last >= exponent; exponent += 1) {
-    if (exponent % stride === 0) ticks.push({ place: exponent, label: decade(exponent) });
+    if (exponent % stride !== 0) continue;
+    for (const factor of between) {
+      const value = factor * 10 ** exponent;
+      ticks.push({ place: Math.log10(value), label: between.length > 1 ? number(value, 1) : decade(exponent) });
+    }
   }
-  return ticks;
+  return ticks.filter(({ place }) => range[1] + 1e-9 >= place);
 };
 
 /** The last index whose x is at most a value, in rising x; -1 where all are beyond. */
