@@ -212,12 +212,13 @@ impl Browser {
 
     /// What the page complained of: exceptions, errors and warnings, dialogs.
     pub fn complaints(&self) -> Vec<String> {
-        let bad = |e: &&Value| match e["method"].as_str() {
-            Some("Runtime.exceptionThrown" | "Page.javascriptDialogOpening") => true,
-            Some("Runtime.consoleAPICalled") => true,
-            Some("Log.entryAdded") => true,
-            _ => false,
-        };
+        const BAD: [&str; 4] = [
+            "Runtime.exceptionThrown",
+            "Runtime.consoleAPICalled",
+            "Log.entryAdded",
+            "Page.javascriptDialogOpening",
+        ];
+        let bad = |e: &&Value| e["method"].as_str().is_some_and(|m| BAD.contains(&m));
         self.events
             .iter()
             .filter(bad)

@@ -138,6 +138,16 @@ fn keys_zoom_and_read() {
     browser.key("+");
     browser.key("Escape");
     assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
+    // However far in, there is an axis, and a way out.
+    browser.evaluate(&format!(
+        "for (let i = 0; i < 200; i += 1) {}.dispatchEvent(new KeyboardEvent('keydown', {{key: '+', bubbles: true}}))",
+        plot("functions")
+    ));
+    browser.settle();
+    let [low, high] = range(&mut browser, "functions");
+    assert!(high - low > 0.0 && high - low < 1e-6, "{low} {high}");
+    browser.key("Escape");
+    assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
     // A logarithmic axis of its own.
     browser.evaluate(&format!("{}.focus()", plot("convergence")));
     let whole = range(&mut browser, "convergence");

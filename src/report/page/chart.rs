@@ -316,6 +316,32 @@ mod tests {
     }
 
     #[test]
+    fn any_data_give_numbers() {
+        let ugly = [
+            vec![],
+            vec![1.0],
+            vec![f64::NAN; 3],
+            vec![f64::INFINITY, 1.0, f64::NEG_INFINITY],
+            vec![f64::MAX, f64::MIN, 1.0],
+            vec![5e-324, 0.0, -0.0],
+            vec![1e15, 1e15 + 1.0],
+        ];
+        for (x, y) in ugly.iter().flat_map(|x| ugly.iter().map(move |y| (x, y))) {
+            for axis in [Axis::linear("", ""), Axis::log("", "")] {
+                let style = Style::nth(0);
+                let panel = Panel::new(axis.clone(), axis)
+                    .mark(Mark::line("", x, y, style))
+                    .mark(Mark::points("", y, x, style))
+                    .mark(Mark::band("", x, y, x, Colour::Blue))
+                    .mark(Mark::span("", f64::NAN, f64::INFINITY));
+                let json = chart(&Figure::new("", "", "").panel(panel), &[]).json;
+                let read: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+                assert_eq!(read["panels"][0]["marks"].as_array().map(Vec::len), Some(4));
+            }
+        }
+    }
+
+    #[test]
     fn no_text_ends_the_script() {
         let hostile = "</script><!-- & ]]>\u{ffff}";
         let panel = Panel::new(Axis::linear(hostile, ""), Axis::log("", hostile)).title(hostile);

@@ -36,7 +36,7 @@ pub(super) fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> 
 fn columns((x, scale): (&[f64], Scale), ys: &[(&[f64], Scale)], points: &[usize]) -> Vec<usize> {
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
     let column = |i: usize| (COLUMNS * (even(scale, x[i]) - low) / (high - low)).floor();
-    let alike = |a: &usize, b: &usize| column(*a) == column(*b);
+    let alike = |a: &usize, b: &usize| column(*a).total_cmp(&column(*b)).is_eq();
     let mut kept = Vec::new();
     for chunk in points.chunk_by(alike) {
         let mut few: Vec<usize> = chunk
@@ -144,6 +144,15 @@ mod tests {
                 assert!((line - curved[i]).abs() <= 1.01 * STRAIGHT * 0.01, "{i}");
             }
         }
+    }
+
+    #[test]
+    fn points_above_each_other_are_one_column() {
+        let (x, y) = (
+            vec![1.0; 9000],
+            (0..9000).map(f64::from).collect::<Vec<_>>(),
+        );
+        assert_eq!(kept((&x, LINEAR), &[(&y, LINEAR)], false).0, [0, 8999]);
     }
 
     #[test]

@@ -22,8 +22,9 @@ const refresh = (axis) => {
 const setRange = (axis, low, high) => {
   const [least, most] = axis.full;
   const room = most - least;
-  // Closer than a billionth of the whole nothing can be told apart.
-  const span = Math.min(room, Math.max(high - low, 1e-9 * room));
+  // Closer than a billionth of the whole, or than rounding allows, nothing can be told apart.
+  const closest = Math.max(1e-9 * room, 1e-12 * Math.max(Math.abs(least), Math.abs(most)));
+  const span = Math.min(room, Math.max(high - low, closest));
   const first = Math.min(Math.max(low, least), most - span);
   axis.range = [first, first + span];
   refresh(axis);

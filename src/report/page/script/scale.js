@@ -2,7 +2,8 @@
 
 /** The value in the space in which an axis is even; NaN where it cannot be drawn. */
 const even = (log, value) => {
-  if (value === null || !Number.isFinite(value)) return NaN;
+  // Beyond this no difference of two values is sure to be a number.
+  if (value === null || !(1e300 >= Math.abs(value))) return NaN;
   if (!log) return value;
   return value > 0 ? Math.log10(value) : NaN;
 };
@@ -67,8 +68,10 @@ const linearTicks = ([low, high], most) => {
   const plain = 1e5 > largest && largest >= 1e-3;
   const digits = Math.max(1, Math.ceil(Math.log10(largest / step) + 1e-9) + 1);
   const ticks = [];
-  for (let i = Math.ceil(low / step - 1e-6); high / step + 1e-6 >= i; i += 1) {
-    const value = i * step;
+  const first = Math.ceil(low / step - 1e-6);
+  for (let i = 0; most + 2 >= i; i += 1) {
+    const value = (first + i) * step;
+    if (value > high + 1e-6 * step) break;
     const label = plain ? value.toFixed(places).replace("-", "−") : number(value, digits);
     ticks.push({ place: value, label: Number(value.toFixed(places)) === 0 && plain ? (0).toFixed(places) : label });
   }
