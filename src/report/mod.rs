@@ -22,6 +22,7 @@ mod cost;
 mod csv;
 mod curve;
 pub mod document;
+mod drawn;
 pub mod figure;
 pub mod figures;
 mod files;
