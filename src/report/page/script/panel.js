@@ -70,7 +70,7 @@ class Panel {
     return {
       ...frame, bottom, outer: width, xAt, yAt,
       x: { log: this.x.log, range: x }, y: { log: this.y.log, range: y },
-      xTicks: ticksOf(this.x.log, x, Math.max(2, Math.min(8, Math.floor(frame.width / 80)))),
+      xTicks: ticksOf(this.x.log, x, Math.max(2, Math.min(8, Math.floor(frame.width / 65)))),
       yTicks: ticksOf(this.y.log, y, Math.max(2, Math.floor(frame.height / 40))),
       px: (value) => xAt(even(this.x.log, value)),
       py: (value) => yAt(even(this.y.log, value)),
