@@ -59,8 +59,8 @@
 //! 9. [`identifiability`] says what the readings can show, how far a fit may be off, and which record
 //!    would show more; [`study`] asks further: profiles, equivalent and extreme devices, many starts,
 //!    whether a function varies at all, bootstrap, prediction.
-//! 10. [`report`] writes tables, figures and the result document, loads them back ([`Run::open`]), and
-//!     compares runs.
+//! 10. [`report`] writes tables, figures, pages and the result document, loads them back
+//!     ([`Run::open`]), and compares runs.
 //! 11. [`cli`] is one file per command.
 //!
 //! Beside these, [`units`] knows units and their factors to SI, and [`signal`] what lies between

@@ -32,7 +32,7 @@ fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
         motion(t, y, &[(0, t, y), (10, t, t)]),
         functions(t, &[curve, curve, curve]),
         gradient_error(&[gradient(1000, "discrete"), gradient(2000, "continuous")]),
-        ratios(t, &found, Some(&found)),
+        ratios(t, &found, Some(&found), &[[y.to_vec(), t.to_vec()]]),
     ]
 }
 
@@ -100,7 +100,7 @@ fn figures_without_content_are_documents_too() {
     check(&render(&observation(&[])));
     check(&render(&gradient_error(&[])));
     check(&render(&functions(&[], &[])));
-    check(&render(&ratios(&[], &RatioCurves::default(), None)));
+    check(&render(&ratios(&[], &RatioCurves::default(), None, &[])));
     check(&render(&Figure::new("", "", "").columns(0).panel(
         Panel::new(
             Axis::linear("", "").limits(1.0, 1.0),

@@ -30,7 +30,7 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
-    /// Write no figures.
+    /// Write no figures and no page.
     #[arg(long)]
     no_report: bool,
     /// Print where the time went.
@@ -164,7 +164,9 @@ pub(super) fn fit_into(
     };
     let mut document = run.document();
     let mut stage = folder.stage().map_err(full)?;
-    let writing = run.write(&mut stage, with_figures).map_err(full)?;
+    let writing = run
+        .write(&mut stage, &document, with_figures)
+        .map_err(full)?;
     let before = &model.preparation;
     let outside = before.reading + writing;
     // A fit that was gone on with took longer than this clock saw.

@@ -12,6 +12,7 @@ mod guard;
 pub mod locate;
 mod model_file;
 pub mod scalar;
+mod source;
 pub mod spec;
 mod story;
 mod syntax;
@@ -22,4 +23,5 @@ pub use build::{
 };
 pub use model_file::ModelFile;
 pub use scalar::{Number, NumberOrColumn, Text};
+pub use source::{DataFile, Source};
 pub use story::Story;

@@ -10,6 +10,20 @@ use crate::solvers::{PathPoint, WeightPath, WeightRule};
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
 
+/// A band may reach this many times the range of the curves beyond them.
+const WIDE_BAND: f64 = 1.5;
+/// What stays within this share of its size is flat to the eye.
+const FLAT: f64 = 0.1;
+
+/// Lowest and highest finite value.
+fn extent<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
+    let finite = values.copied().filter(|v| v.is_finite());
+    finite.fold(None, |range: Option<(f64, f64)>, v| match range {
+        None => Some((v, v)),
+        Some((low, high)) => Some((low.min(v), high.max(v))),
+    })
+}
+
 fn time() -> Axis {
     Axis::linear("time t", "s")
 }
@@ -186,11 +200,31 @@ impl<'a> FunctionCurve<'a> {
         }
     }
 
+    /// What is shown where the band would make the curves flat lines: the curves with room around them.
+    fn room(&self) -> Option<(f64, f64)> {
+        let (low, high) = self.band?;
+        let curves = [Some(self.found), self.start, self.truth];
+        let curves = extent(curves.into_iter().flatten().flatten())?;
+        let band = extent(low.iter().chain(high))?;
+        let size = curves.0.abs().max(curves.1.abs());
+        let room = WIDE_BAND * (curves.1 - curves.0).max(FLAT * size);
+        let limits = (curves.0 - room, curves.1 + room);
+        let is_wide = room > 0.0 && (band.0 < limits.0 || band.1 > limits.1);
+        is_wide.then(|| (limits.0.max(band.0), limits.1.min(band.1)))
+    }
+
     /// The function against the times `t` in s.
     fn panel(&self, t: &[f64]) -> Panel {
-        let band = |(low, high)| Mark::band("uncertainty", t, low, high, Colour::Blue);
+        let band = |(low, high)| Mark::band("95 % band", t, low, high, Colour::Blue);
         let start = |y| Mark::line("start", t, y, Style::new(Colour::Green).dash(Dash::Dotted));
-        Panel::new(time(), Axis::linear(self.name, self.unit))
+        let mut axis = Axis::linear(self.name, self.unit);
+        let mut beyond = "";
+        if let Some((low, high)) = self.room() {
+            axis = axis.limits(low, high);
+            beyond = "the band reaches beyond this panel";
+        }
+        Panel::new(time(), axis)
+            .title(beyond)
             .maybe(self.band.map(band))
             .maybe(self.start.map(start))
             .mark(Mark::line(
@@ -300,8 +334,14 @@ impl<'a> RatioCurves<'a> {
 }
 
 /// The ratios of the coefficient functions against the times `t` in s, and the true ones where
-/// known; a ratio that was not found has no panel.
-pub fn ratios(t: &[f64], found: &RatioCurves, truth: Option<&RatioCurves>) -> Figure {
+/// known; a ratio that was not found has no panel. `bands` are the lower and upper ends of their bands,
+/// as many as are known.
+pub fn ratios(
+    t: &[f64],
+    found: &RatioCurves,
+    truth: Option<&RatioCurves>,
+    bands: &[[Vec<f64>; 2]],
+) -> Figure {
     let names = [
         ("k/m", "s⁻²"),
         ("c/m", "s⁻¹"),
@@ -315,11 +355,13 @@ pub fn ratios(t: &[f64], found: &RatioCurves, truth: Option<&RatioCurves>) -> Fi
         "Stiffness and damping over mass, natural frequency and damping ratio against time.",
     )
     .columns(2);
-    for ((name, unit), (found, truth)) in names.iter().zip(found.each().iter().zip(truth.each())) {
+    let pairs = found.each().into_iter().zip(truth.each());
+    for (i, ((name, unit), (found, truth))) in names.iter().zip(pairs).enumerate() {
         if !found.is_empty() {
             let truth = (!truth.is_empty()).then_some(truth);
             let curve = FunctionCurve {
                 truth,
+                band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
                 ..FunctionCurve::new(name, unit, found)
             };
             figure = figure.panel(curve.panel(t));

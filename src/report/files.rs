@@ -12,8 +12,13 @@ const ON_ITS_WAY: &str = ".kmcfit-";
 const FOLDERS: [&str; 2] = ["figures", "readings"];
 /// The file without which a folder holds no run.
 const RESULT: &str = "result.json";
-/// The tables of a run.
-const TABLES: [&str; 3] = ["history.csv", "functions.csv", "trajectory.csv"];
+/// The tables and the page of a run.
+const TABLES: [&str; 4] = [
+    "history.csv",
+    "functions.csv",
+    "trajectory.csv",
+    "report.html",
+];
 
 /// A folder that can be written to, and by nobody else as long as this lives.
 #[derive(Debug)]

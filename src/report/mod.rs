@@ -3,7 +3,7 @@
 //! The way from data to picture runs through the files in this order: [`figures`] states what each
 //! standard figure shows, in the data model of [`figure`] and [`mark`]; `layout`, `panel`,
 //! `legend`, `axis` and `curve` turn it into plain shapes in pixels; [`svg`] writes the shapes.
-//! Only `svg` knows the plotting crate.
+//! Only `svg` knows the plotting crate. `page` puts figures and what is said of them into pages.
 //!
 //! ```
 //! use kmcfit::report::{render, Axis, Colour, Figure, Mark, Panel, Style};
@@ -23,12 +23,12 @@ mod cost;
 mod csv;
 mod curve;
 pub mod document;
+mod drawn;
 pub mod figure;
 pub mod figures;
 mod files;
 mod finished;
 mod fit_journal;
-mod html;
 mod journal;
 mod knowledge;
 mod layout;
@@ -36,6 +36,7 @@ mod legend;
 mod lock;
 pub mod mark;
 mod measured;
+mod page;
 mod panel;
 mod predict;
 mod run;

@@ -7,11 +7,10 @@ use super::document::{
     FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary,
     PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
-use super::figure::Figure;
-use super::figures::{self, FunctionCurve, RatioCurves};
 use super::files::Stage;
 use super::knowledge::knowledge;
 use super::measured::{self, ChannelSummary, StatisticsSummary};
+use super::page::fit_page;
 use super::render;
 use super::timings::TimingsSummary;
 use crate::config::{ChannelNote, Model};
@@ -20,7 +19,6 @@ use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction, Ratios};
 use crate::identifiability::{BandSettings, Bands, count, verdicts};
-use crate::objective::Channel;
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
@@ -82,12 +80,17 @@ impl Known {
 }
 
 impl FittedModel<'_> {
-    /// Writes tables and, if asked for, figures: all but the result document, which comes last
-    /// ([`Stage::commit_run`]). Returns what the writing took.
+    /// Writes tables and, if asked for, figures and the page of `document`: all but the result document
+    /// itself, which comes last ([`Stage::commit_run`]). Returns what the writing took.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn write(&self, stage: &mut Stage, with_figures: bool) -> io::Result<Duration> {
+    pub fn write(
+        &self,
+        stage: &mut Stage,
+        document: &ResultDocument,
+        with_figures: bool,
+    ) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
         let mut batch = stage.batch();
         let mut write = |name: &str, text: &str| timed(&mut writing, || batch.write(name, text));
@@ -97,16 +100,19 @@ impl FittedModel<'_> {
         for (name, table) in self.readings() {
             write(&name, &table.to_csv())?;
         }
-        let figures = if with_figures {
-            self.figures()
-        } else {
-            Vec::new()
-        };
-        for figure in figures {
-            write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+        if with_figures {
+            for figure in self.figures() {
+                write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            }
+            write("report.html", &self.page(document))?;
         }
         timed(&mut writing, || batch.finish())?;
         Ok(writing)
+    }
+
+    /// The page that people keep, of the run and its document: one HTML file that loads nothing.
+    pub fn page(&self, document: &ResultDocument) -> String {
+        fit_page(self, document)
     }
 
     /// The result document.
@@ -170,8 +176,13 @@ impl FittedModel<'_> {
     }
 
     /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
-    fn is_simulated(&self) -> bool {
+    pub(super) fn is_simulated(&self) -> bool {
         self.model.settings.solver != Solver::EquationError
+    }
+
+    /// The bands of functions and ratios, for models of few free values.
+    pub(super) fn bands(&self) -> Option<&Bands> {
+        self.known.bands.as_ref()
     }
 
     /// What was known before the fit; the equation error has no simulated motion to count about.
@@ -282,13 +293,13 @@ impl FittedModel<'_> {
     }
 
     /// All functions with what they are and what they are called, those of single experiments last.
-    fn named_functions(&self) -> Vec<(&CoefficientFunction, Vec<f64>)> {
+    pub(super) fn named_functions(&self) -> Vec<(&CoefficientFunction, Vec<f64>)> {
         let functions = &self.model.problem.functions;
         let values = functions.values(&self.fit.best.parameters);
         functions.iter().zip(values).collect()
     }
 
-    fn true_function(&self, index: usize) -> Option<&[f64]> {
+    pub(super) fn true_function(&self, index: usize) -> Option<&[f64]> {
         self.model.truth.as_ref()?.functions().nth(index)
     }
 
@@ -347,7 +358,7 @@ impl FittedModel<'_> {
     }
 
     /// SI unit of a function: of a rotation if the channels are.
-    fn unit(&self, function: &CoefficientFunction) -> &'static str {
+    pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
         let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
         match units.any(|unit| unit.is_angular()) {
             true => function.quantity.angular_unit(),
@@ -355,7 +366,7 @@ impl FittedModel<'_> {
         }
     }
 
-    fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
+    pub(super) fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
         self.model.notes.get(experiment)?.get(channel)
     }
 
@@ -474,122 +485,6 @@ impl FittedModel<'_> {
         }
         tables
     }
-
-    /// The figures of a fit.
-    pub fn figures(&self) -> Vec<Figure> {
-        let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
-        figures.extend([
-            self.convergence(),
-            self.functions_figure(),
-            self.ratios_figure(),
-        ]);
-        let problem = &self.model.problem;
-        let several = problem.experiments.len() > 1;
-        for (i, experiment) in problem.experiments.iter().enumerate() {
-            let predictions = &self.fit.best.evaluation.predictions[i];
-            for (c, (channel, predicted)) in experiment.channels.iter().zip(predictions).enumerate()
-            {
-                let mut list = self.channel_figures(i, c, channel, predicted);
-                let mut suffix = String::new();
-                if several {
-                    suffix = format!("-{}", i + 1);
-                }
-                if c > 0 {
-                    suffix = format!("{suffix}-{}", channel.kind().name());
-                }
-                list.iter_mut().for_each(|figure| figure.name += &suffix);
-                figures.extend(list);
-            }
-        }
-        figures
-    }
-
-    /// The figures of one channel: readings, readings beside the motion, residuals.
-    fn channel_figures(
-        &self,
-        experiment: usize,
-        index: usize,
-        channel: &Channel,
-        predicted: &[f64],
-    ) -> Vec<Figure> {
-        let note = self.note(experiment, index);
-        let (unit, factor) = (
-            measured::unit(channel, note),
-            note.map_or(1.0, |n| n.unit.factor()),
-        );
-        let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / factor).collect() };
-        let label = format!("{} {}", channel.kind().name(), channel.kind().symbol());
-        let times = channel.times();
-        let (observed, model) = (scaled(channel.observed()), scaled(predicted));
-        let beside = match channel.stride() {
-            Some(_) if factor == 1.0 => self.motion(experiment, times, channel.observed()),
-            _ => figures::channel((&label, unit), times, &observed, &model),
-        };
-        let residuals = scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
-        let diagnostics = measured::diagnostics(channel, predicted);
-        vec![
-            figures::observation(&[(&label, unit, times, &observed)]),
-            beside,
-            figures::residuals((&label, unit), times, &residuals, &diagnostics),
-        ]
-    }
-
-    fn convergence(&self) -> Figure {
-        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
-        figures::convergence(
-            &column(|r| r.iteration as f64),
-            &column(|r| r.cost_ratio),
-            &column(|r| r.gradient_norm_squared_ratio),
-        )
-    }
-
-    fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
-        let grid_times = self.model.problem.oscillator.grid.times();
-        let nodes = self.model.problem.experiments[experiment].nodes;
-        let grid_times = &grid_times[..nodes];
-        let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
-            .map(|s| {
-                let motion = &s.trajectories[experiment];
-                (
-                    s.iteration as usize,
-                    grid_times,
-                    motion.displacement.as_slice(),
-                )
-            })
-            .collect();
-        let last = self.fit.history.len();
-        if snapshots.last().is_none_or(|s| s.0 != last) {
-            let motion = &self.fit.best.evaluation.trajectories[experiment];
-            snapshots.push((last, grid_times, &motion.displacement));
-        }
-        figures::motion(times, observed, &snapshots)
-    }
-
-    fn functions_figure(&self) -> Figure {
-        let problem = &self.model.problem;
-        let starts = problem.functions.values(&problem.start());
-        let list = self.named_functions();
-        let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
-        let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
-        let curves: Vec<FunctionCurve> = (list.iter().enumerate())
-            .map(|(i, (function, found))| FunctionCurve {
-                start: Some(&starts[i]),
-                truth: self.true_function(i),
-                ..FunctionCurve::new(&names[i], self.unit(function), found)
-            })
-            .collect();
-        figures::functions(&problem.oscillator.grid.times(), &curves)
-    }
-
-    fn ratios_figure(&self) -> Figure {
-        let found = Ratios::of(&self.fit.best.evaluation.device);
-        let truth = self.model.truth.as_ref().map(Ratios::of);
-        figures::ratios(
-            &self.model.problem.oscillator.grid.times(),
-            &curves(&found),
-            truth.as_ref().map(curves).as_ref(),
-        )
-    }
 }
 
 fn active_summary(group: ActiveGroup) -> ActiveSummary {
@@ -610,15 +505,6 @@ fn rung_summary(rung: &Rung) -> RungSummary {
         cost: known(rung.cost),
         iterations: rung.iterations,
         status: rung.outcome.status.name().into(),
-    }
-}
-
-fn curves(ratios: &Ratios) -> RatioCurves<'_> {
-    RatioCurves {
-        k_over_m: &ratios.k_over_m,
-        c_over_m: &ratios.c_over_m,
-        frequency: &ratios.frequency,
-        damping_ratio: &ratios.damping_ratio,
     }
 }
 

@@ -65,7 +65,11 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
 }
 
 /// How well one channel is matched.
-fn write_channel(text: &mut String, name: &str, channel: &ChannelSummary) -> std::fmt::Result {
+pub(super) fn write_channel(
+    text: &mut String,
+    name: &str,
+    channel: &ChannelSummary,
+) -> std::fmt::Result {
     write!(
         text,
         "{name}: {} within {:.4e} {} rms, fit {:.2} %, {}",
@@ -90,7 +94,7 @@ fn write_channel(text: &mut String, name: &str, channel: &ChannelSummary) -> std
 }
 
 /// All readings together, and what half the step changes.
-fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let statistics = &document.statistics;
     if let Some(reduced) = statistics.reduced_chi_square {
         write!(
@@ -115,7 +119,7 @@ fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::R
 }
 
 /// The numbers that were fitted beside the functions.
-fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+pub(super) fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     for scalar in &document.scalars {
         write!(text, "{} {:.6} {}", scalar.name, scalar.value, scalar.unit)?;
         match scalar.standard_error {
@@ -127,7 +131,7 @@ fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
 }
 
 /// The iterations of the last fit, and of the fits on the way to its weight, if a rule chose that.
-fn iterations(document: &ResultDocument) -> String {
+pub(super) fn iterations(document: &ResultDocument) -> String {
     let last = count(document.counts.iterations as usize, "iteration");
     match &document.weights {
         Some(weights) => {
@@ -140,7 +144,7 @@ fn iterations(document: &ResultDocument) -> String {
 }
 
 /// A number of things, in the singular where there is one.
-fn count(number: usize, thing: &str) -> String {
+pub(super) fn count(number: usize, thing: &str) -> String {
     match number {
         1 => format!("1 {thing}"),
         _ => format!("{number} {thing}s"),
@@ -148,7 +152,7 @@ fn count(number: usize, thing: &str) -> String {
 }
 
 /// Five decimals; what rounds to zero has no sign.
-fn decimals(x: f64) -> String {
+pub(super) fn decimals(x: f64) -> String {
     let text = format!("{x:.5}");
     match text.strip_prefix('-') {
         Some(zero) if zero.bytes().all(|b| b == b'0' || b == b'.') => zero.into(),
@@ -194,7 +198,7 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
     Ok(())
 }
 
-fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     if let Some(weights) = &document.weights {
         writeln!(
             text,
@@ -221,7 +225,7 @@ fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::
 }
 
 /// The ladder, where more than one start was tried.
-fn write_rungs(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     if document.rungs.len() < 2 {
         return Ok(());
     }

@@ -13,9 +13,9 @@ pub use experiments::{ChannelNote, HoldOut};
 pub use penalties::WeightSearch;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
-use super::ModelFile;
 use super::scalar::ScalarOr;
 use super::spec::InitialSpec;
+use super::{ModelFile, Source};
 use crate::dynamics::{Device, Oscillator, State};
 use crate::error::{InputError, Place};
 use crate::functions::Functions;
@@ -53,6 +53,8 @@ pub struct Model {
     pub warnings: Vec<String>,
     /// What was chosen for the user, and why.
     pub remarks: Vec<String>,
+    /// What it was made from.
+    pub source: Source,
     /// What it took to build it.
     pub preparation: Preparation,
 }
@@ -163,6 +165,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         velocity: s.velocity.0,
     };
     let study = study::build(file, &problem)?;
+    let source = timed(&mut reading, || Source::of(file));
     Ok(Model {
         file: file.path.clone(),
         study,
@@ -177,6 +180,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         remarks,
+        source,
         preparation: Preparation {
             reading,
             total: clock.elapsed(),

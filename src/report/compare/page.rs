@@ -5,8 +5,8 @@ use super::figures::{self, style};
 use super::measures::Measures;
 use super::table::{Row, known_rows};
 use super::{CLOSE, Comparison, MATCHED, RECOVERED};
-use crate::report::html;
 use crate::report::mark::Style;
+use crate::report::page as shell;
 use crate::report::svg::sample;
 use crate::report::text::escape;
 
@@ -40,14 +40,13 @@ pub(super) fn page(comparison: &Comparison) -> String {
     body += &table(&comparison.measures);
     body += &format!("<p class=\"soft\">{}</p>\n", escape(&notes()));
     body += "<h2>In pictures</h2>\n";
-    for figure in figures::all(comparison) {
-        body += &html::figure(&figure);
-    }
+    body += &shell::help();
+    body += &shell::figures(&figures::all(comparison));
     body += &format!(
         "<p class=\"soft\">Made by kmcfit {}.</p>\n",
         env!("CARGO_PKG_VERSION")
     );
-    html::page(&title, &body)
+    shell::page(&title, &body)
 }
 
 /// What the reader takes away.

@@ -3,7 +3,7 @@
 use super::StudyDocument;
 use super::figures;
 use super::text::sections;
-use crate::report::html;
+use crate::report::page as shell;
 use crate::report::text::escape;
 
 /// One file, nothing to load.
@@ -17,9 +17,8 @@ pub fn page(study: &StudyDocument) -> String {
         body += "</ul>\n";
     }
     body += "<h2>In pictures</h2>\n";
-    for figure in figures::all(study) {
-        body += &html::figure(&figure);
-    }
+    body += &shell::help();
+    body += &shell::figures(&figures::all(study));
     body += &format!(
         "<p class=\"soft\">Made by kmcfit {}; seed {}, confidence {}; the study is {}.</p>\n",
         escape(&study.version),
@@ -27,5 +26,5 @@ pub fn page(study: &StudyDocument) -> String {
         study.confidence,
         escape(&study.status)
     );
-    html::page(&format!("What the data tell: {}", study.title), &body)
+    shell::page(&format!("What the data tell: {}", study.title), &body)
 }

@@ -1,0 +1,90 @@
+//! What a model was made from: its text and its data files, so that a run can be repeated.
+
+use super::ModelFile;
+use data_encoding::HEXLOWER;
+use sha2::{Digest, Sha256};
+
+/// The text of a model and the data files that it names.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Source {
+    /// The text of the model file.
+    pub text: String,
+    /// In the order in which the text names them, each once.
+    pub data: Vec<DataFile>,
+}
+
+/// A data file as it was when the model was built.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DataFile {
+    /// As the model names it: relative paths start from the model.
+    pub name: String,
+    /// Size and SHA-256 in hexadecimal digits; `None` if the file cannot be read any more.
+    pub content: Option<(usize, String)>,
+}
+
+impl Source {
+    /// The text of a model file, and the files behind its keys `data`.
+    pub fn of(file: &ModelFile) -> Self {
+        let mut names = Vec::new();
+        // The text has been parsed before.
+        if let Ok(value) = serde_yaml::from_str(&file.text) {
+            collect(&value, &mut names);
+        }
+        let data = names.into_iter().map(|name| DataFile {
+            content: (std::fs::read(file.resolve(&name)).ok())
+                .map(|bytes| (bytes.len(), HEXLOWER.encode(&Sha256::digest(&bytes)))),
+            name,
+        });
+        Self {
+            text: file.text.clone(),
+            data: data.collect(),
+        }
+    }
+}
+
+fn collect(value: &serde_yaml::Value, names: &mut Vec<String>) {
+    match value {
+        serde_yaml::Value::Sequence(list) => list.iter().for_each(|value| collect(value, names)),
+        serde_yaml::Value::Mapping(map) => {
+            for (key, value) in map {
+                match (key.as_str(), value.as_str()) {
+                    (Some("data"), Some(name)) if !names.iter().any(|n| n == name) => {
+                        names.push(name.into());
+                    }
+                    _ => collect(value, names),
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_data_file_is_named_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("a.csv"), "abc").expect("a file");
+        let text = "format: 1
+experiments:
+  - {data: a.csv, columns: {force: {data: b.csv, column: f}}, initial: {displacement: 1, velocity: 0}}
+  - {data: a.csv, initial: {displacement: 1, velocity: 0}}
+functions: {mass: {fixed: 1}, damping: {fixed: {data: b.csv, column: c}}, stiffness: {fixed: 1}}
+fit: {initial: data}
+";
+        let file = ModelFile::parse(folder.path().join("model.yaml"), text).expect("a model");
+        let source = Source::of(&file);
+        assert_eq!(source.text, text);
+        let digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        let expected = [("a.csv", Some((3, digest.to_string()))), ("b.csv", None)];
+        let found: Vec<_> = (source.data.into_iter())
+            .map(|file| (file.name, file.content))
+            .collect();
+        assert_eq!(
+            found,
+            expected.map(|(name, content)| (name.to_string(), content))
+        );
+    }
+}

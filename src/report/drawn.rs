@@ -1,0 +1,229 @@
+//! The figures of a fit, from the run.
+
+use super::FittedModel;
+use super::figure::Figure;
+use super::figures::{self, FunctionCurve, RatioCurves};
+use super::measured;
+use crate::functions::{CoefficientFunction, Ratios};
+use crate::identifiability::{Band, Bands};
+use crate::solvers::Row;
+
+impl FittedModel<'_> {
+    /// The figures of a fit.
+    pub fn figures(&self) -> Vec<Figure> {
+        let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
+        figures.extend([
+            self.convergence(),
+            self.functions_figure(),
+            self.ratios_figure(),
+        ]);
+        for (experiment, channel) in self.channels() {
+            let mut list = self.channel_figures(experiment, channel);
+            let suffix = self.suffix(experiment, channel);
+            list.iter_mut().for_each(|figure| figure.name += &suffix);
+            figures.extend(list);
+        }
+        figures
+    }
+
+    /// Indices of the experiments and their channels.
+    pub(super) fn channels(&self) -> Vec<(usize, usize)> {
+        let experiments = self.model.problem.experiments.iter().enumerate();
+        experiments
+            .flat_map(|(e, experiment)| (0..experiment.channels.len()).map(move |c| (e, c)))
+            .collect()
+    }
+
+    /// A figure of one channel with a name and a title of its own, where there are others.
+    pub(super) fn titled(&self, mut figure: Figure, experiment: usize, channel: usize) -> Figure {
+        figure.name += &self.suffix(experiment, channel);
+        if self.channels().len() > 1 {
+            let record = &self.model.problem.experiments[experiment];
+            let kind = record.channels[channel].kind().name();
+            figure.title = format!("{}: {}, {kind}", figure.title, record.name);
+        }
+        figure
+    }
+
+    /// What tells the figures of one channel from those of others.
+    fn suffix(&self, experiment: usize, channel: usize) -> String {
+        let experiments = &self.model.problem.experiments;
+        let number = match experiments.len() {
+            1 => String::new(),
+            _ => format!("-{}", experiment + 1),
+        };
+        match channel {
+            0 => number,
+            _ => format!(
+                "{number}-{}",
+                experiments[experiment].channels[channel].kind().name()
+            ),
+        }
+    }
+
+    /// The figures of one channel: readings, readings beside the motion, residuals.
+    fn channel_figures(&self, experiment: usize, index: usize) -> Vec<Figure> {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let [beside, residuals] = self.fitted_figures(experiment, index);
+        let shown = self.shown(experiment, index);
+        let label = shown.label.as_str();
+        let beside = match channel.stride() {
+            Some(_) if shown.factor == 1.0 => {
+                self.motion(experiment, channel.times(), channel.observed())
+            }
+            _ => beside,
+        };
+        let observed = shown.scaled(channel.observed());
+        vec![
+            figures::observation(&[(label, shown.unit, channel.times(), &observed)]),
+            beside,
+            residuals,
+        ]
+    }
+
+    /// The readings of a channel with what the model says of them, and the residuals.
+    pub(super) fn fitted_figures(&self, experiment: usize, index: usize) -> [Figure; 2] {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let predicted = &self.fit.best.evaluation.predictions[experiment][index];
+        let shown = self.shown(experiment, index);
+        let label = (shown.label.as_str(), shown.unit);
+        let times = channel.times();
+        let residuals = shown.scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
+        let diagnostics = measured::diagnostics(channel, predicted);
+        [
+            figures::channel(
+                label,
+                times,
+                &shown.scaled(channel.observed()),
+                &shown.scaled(predicted),
+            ),
+            figures::residuals(label, times, &residuals, &diagnostics),
+        ]
+    }
+
+    /// How reports speak of a channel.
+    fn shown(&self, experiment: usize, index: usize) -> Shown<'_> {
+        let channel = &self.model.problem.experiments[experiment].channels[index];
+        let note = self.note(experiment, index);
+        Shown {
+            label: format!("{} {}", channel.kind().name(), channel.kind().symbol()),
+            unit: measured::unit(channel, note),
+            factor: note.map_or(1.0, |n| n.unit.factor()),
+        }
+    }
+
+    pub(super) fn convergence(&self) -> Figure {
+        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
+        figures::convergence(
+            &column(|r| r.iteration as f64),
+            &column(|r| r.cost_ratio),
+            &column(|r| r.gradient_norm_squared_ratio),
+        )
+    }
+
+    pub(super) fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+        let grid_times = self.model.problem.oscillator.grid.times();
+        let nodes = self.model.problem.experiments[experiment].nodes;
+        let grid_times = &grid_times[..nodes];
+        let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
+            .map(|s| {
+                let motion = &s.trajectories[experiment];
+                (
+                    s.iteration as usize,
+                    grid_times,
+                    motion.displacement.as_slice(),
+                )
+            })
+            .collect();
+        let last = self.fit.history.len();
+        if snapshots.last().is_none_or(|s| s.0 != last) {
+            let motion = &self.fit.best.evaluation.trajectories[experiment];
+            snapshots.push((last, grid_times, &motion.displacement));
+        }
+        figures::motion(times, observed, &snapshots)
+    }
+
+    pub(super) fn functions_figure(&self) -> Figure {
+        let problem = &self.model.problem;
+        let starts = problem.functions.values(&problem.start());
+        let list = self.named_functions();
+        let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
+        let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
+        let times = problem.oscillator.grid.times();
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| ends(b, &b.functions, &times));
+        let curves: Vec<FunctionCurve> = (list.iter().enumerate())
+            .map(|(i, (function, found))| FunctionCurve {
+                band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
+                start: Some(&starts[i]),
+                truth: self.true_function(i),
+                ..FunctionCurve::new(&names[i], self.unit(function), found)
+            })
+            .collect();
+        figures::functions(&times, &curves)
+    }
+
+    pub(super) fn ratios_figure(&self) -> Figure {
+        let found = Ratios::of(&self.fit.best.evaluation.device);
+        let truth = self.model.truth.as_ref().map(Ratios::of);
+        let times = self.model.problem.oscillator.grid.times();
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
+        figures::ratios(
+            &times,
+            &curves(&found),
+            truth.as_ref().map(curves).as_ref(),
+            &bands,
+        )
+    }
+}
+
+/// A channel in the unit of its file.
+struct Shown<'a> {
+    label: String,
+    unit: &'a str,
+    factor: f64,
+}
+
+impl Shown<'_> {
+    fn scaled(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().map(|v| v / self.factor).collect()
+    }
+}
+
+/// The lower and upper ends of 95 % bands at `times`, by straight lines between those of `bands`.
+fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
+    let known = &bands.times;
+    if known.is_empty() {
+        return Vec::new();
+    }
+    let at = |values: &dyn Fn(usize) -> f64, t: f64| {
+        let next = known.partition_point(|k| *k < t).min(known.len() - 1);
+        let before = next.saturating_sub(1);
+        match known[next] - known[before] {
+            run if known[next] > t && run > 0.0 => {
+                let share = (t - known[before]) / run;
+                values(before) + share * (values(next) - values(before))
+            }
+            _ => values(next),
+        }
+    };
+    let side = |band: &Band, side: usize| -> Vec<f64> {
+        let value = |i: usize| band.pointwise(i)[side];
+        times.iter().map(|t| at(&value, *t)).collect()
+    };
+    list.iter()
+        .map(|band| [side(band, 0), side(band, 1)])
+        .collect()
+}
+
+fn curves(ratios: &Ratios) -> RatioCurves<'_> {
+    RatioCurves {
+        k_over_m: &ratios.k_over_m,
+        c_over_m: &ratios.c_over_m,
+        frequency: &ratios.frequency,
+        damping_ratio: &ratios.damping_ratio,
+    }
+}

@@ -1,0 +1,165 @@
+//! The page of one run: what was found, how well, how sure, and all that is needed to trust it or to
+//! repeat it.
+
+use super::table::{list, paragraph};
+use super::{figures, figures_without, help, opening, page as shell, repeat, settings};
+use crate::report::FittedModel;
+use crate::report::document::ResultDocument;
+use crate::report::figure::Figure;
+use crate::report::figures::weight_path;
+use crate::report::summary::{
+    prediction_table, write_constraints, write_rungs, write_scalars, write_statistics,
+};
+use crate::report::text::escape;
+
+/// Where a fit starts may be far from what it finds.
+const START: &[&str] = &["start"];
+
+/// A part of the page: its anchor, its heading, and what is in it.
+type Section = (&'static str, &'static str, String);
+
+/// The page of a run.
+pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
+    let sections: Vec<Section> = [
+        ("fit", "Data and fit", data_and_fit(run, document)),
+        (
+            "functions",
+            "The functions",
+            figures_without(START, &[run.functions_figure()]),
+        ),
+        (
+            "ratios",
+            "Ratios, frequency and damping ratio",
+            figures(&[run.ratios_figure()]),
+        ),
+        ("convergence", "Convergence", convergence(run, document)),
+        ("constraints", "Constraints", constraints(run, document)),
+        (
+            "identifiability",
+            "What the readings can show",
+            identifiability(run, document),
+        ),
+        (
+            "predictions",
+            "From other initial states",
+            predictions(document),
+        ),
+        ("settings", "Settings", settings::settings(run, document)),
+        (
+            "repeat",
+            "How to repeat this run",
+            repeat::repeat(run, document),
+        ),
+        ("cite", "How to cite", repeat::cite()),
+    ]
+    .into_iter()
+    .filter(|(_, _, body)| !body.is_empty())
+    .collect();
+    let links = sections
+        .iter()
+        .map(|(anchor, heading, _)| format!("<a href=\"#{anchor}\">{}</a>\n", escape(heading)));
+    let parts = sections.iter().map(|(anchor, heading, body)| {
+        format!(
+            "<section id=\"{anchor}\">\n<h2>{}</h2>\n{body}</section>\n",
+            escape(heading)
+        )
+    });
+    let body = format!(
+        "{}<nav aria-label=\"Contents\">\n{}</nav>\n{}{}",
+        opening::opening(document),
+        links.collect::<String>(),
+        help(),
+        parts.collect::<String>()
+    );
+    shell(&document.title, &body)
+}
+
+/// Every record with its residuals, and how well it is matched.
+fn data_and_fit(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut drawn = Vec::new();
+    for (experiment, channel) in run.channels() {
+        let pair = run.fitted_figures(experiment, channel);
+        drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
+    }
+    opening::records(document)
+        + &list(&lines(|text| write_statistics(text, document)))
+        + &figures(&drawn)
+}
+
+/// The way to the optimum.
+fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
+    if !run.fit.history.is_empty() {
+        drawn.push(run.convergence());
+    }
+    for (i, experiment) in run.model.problem.experiments.iter().enumerate() {
+        let channel = experiment.channels.first().filter(|c| c.stride().is_some());
+        let Some(channel) = channel.filter(|_| !run.fit.snapshots.is_empty()) else {
+            continue;
+        };
+        let motion = run.motion(i, channel.times(), channel.observed());
+        drawn.push(run.titled(motion, i, 0));
+    }
+    let work = paragraph(&opening::work(document));
+    work + &list(&lines(|text| write_rungs(text, document))) + &figures(&drawn)
+}
+
+fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
+    let problem = &run.model.problem;
+    let asked =
+        problem.constraints.groups.len() + problem.constraints.cones.len() + problem.soft.len();
+    let worst = document.constraints.max_violation;
+    let said = lines(|text| write_constraints(text, document));
+    let hold = match (asked, worst) {
+        (0, _) => "The model has no constraints.".to_string(),
+        (_, 0.0) => "All constraints hold.".to_string(),
+        _ => {
+            format!("The largest violation of a constraint is {worst:.1e} of the scale of its row.")
+        }
+    };
+    let active = match (asked, document.constraints.active.is_empty()) {
+        (1.., true) => paragraph("None of them is active: the readings alone decide."),
+        _ => String::new(),
+    };
+    paragraph(&hold) + &active + &list(&said)
+}
+
+/// What the fit had beside the readings, the numbers beside the functions, and where more is told.
+fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
+    let known = &document.identifiability;
+    let mut text = match known.knowledge.as_slice() {
+        [] => String::new(),
+        told => paragraph(&format!("What the fit was told: {}.", told.join("; "))),
+    };
+    text += &list(&lines(|text| write_scalars(text, document)));
+    if let Some(bands) = run.bands() {
+        let notes = bands.functions.iter().chain(&bands.ratios);
+        let notes = notes.flat_map(|b| b.notes.iter().map(|n| format!("{}: {n}", b.name)));
+        text += &list(&bands.notes.iter().cloned().chain(notes).collect::<Vec<_>>());
+    }
+    if run.is_simulated() && document.model.parameters > 0 {
+        text += &paragraph(
+            "Profiles, other devices with the same motion, and the experiment that would tell most:",
+        );
+        text += &repeat::command("study", document);
+    }
+    text
+}
+
+fn predictions(document: &ResultDocument) -> String {
+    match document.predictions.as_slice() {
+        [] => String::new(),
+        some => format!(
+            "<pre tabindex=\"0\">{}</pre>\n",
+            escape(&prediction_table(some))
+        ),
+    }
+}
+
+/// What a writer of the summary says, line by line.
+fn lines(write: impl Fn(&mut String) -> std::fmt::Result) -> Vec<String> {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write(&mut text);
+    text.lines().map(str::to_owned).collect()
+}

@@ -1,0 +1,184 @@
+//! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
+
+use super::table::{list, number, table};
+use crate::report::document::{FunctionSummary, ResultDocument};
+use crate::report::measured::ChannelSummary;
+use crate::report::summary::{count, iterations};
+use crate::report::text::escape;
+use crate::solvers::Status;
+
+/// Everything above the contents.
+pub(super) fn opening(document: &ResultDocument) -> String {
+    let known = &document.identifiability;
+    let mut text = state(document) + &facts(document) + &found(document);
+    if !known.functions.is_empty() {
+        text += "<h3>How sure</h3>\n";
+        text += &list(&known.functions);
+    }
+    if !known.verdicts.is_empty() {
+        text += "<h3>What can be seen, and what stays open</h3>\n";
+        text += &list(&known.verdicts);
+    }
+    let notes: Vec<String> = (document.warnings.iter().map(|w| format!("warning: {w}")))
+        .chain(document.remarks.iter().map(|r| format!("note: {r}")))
+        .collect();
+    text + &list(&notes)
+}
+
+/// How it ended, as a coloured word and a reason.
+fn state(document: &ResultDocument) -> String {
+    let outcome = &document.outcome;
+    let is = |status: Status| outcome.status == status.name();
+    let colour = match () {
+        () if is(Status::Converged) || is(Status::Completed) => "good",
+        () if is(Status::Failed) || is(Status::Infeasible) => "bad",
+        () => "warn",
+    };
+    format!(
+        "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
+        escape(&outcome.status),
+        escape(&outcome.reason)
+    )
+}
+
+/// The numbers that matter.
+fn facts(document: &ResultDocument) -> String {
+    let readings: usize = document.experiments.iter().map(|e| e.readings).sum();
+    let mut facts = vec![("misfit left, J/J0", number(document.cost.ratio))];
+    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    let worst = channels()
+        .map(|c| c.fit_percent)
+        .fold(f64::INFINITY, f64::min);
+    if worst.is_finite() {
+        let name = match channels().count() {
+            1 => "fit of the readings",
+            _ => "fit of the worst channel",
+        };
+        facts.push((name, format!("{worst:.2} %")));
+    }
+    if let Some(reduced) = document.statistics.reduced_chi_square {
+        facts.push(("chi-square per degree of freedom", number(reduced)));
+    }
+    facts.push(("readings", readings.to_string()));
+    facts.push(("free values", document.model.parameters.to_string()));
+    let known = &document.identifiability;
+    if known.seen < known.of && !known.verdicts.is_empty() {
+        facts.push((
+            "directions that can be seen",
+            format!("{} at most", known.seen),
+        ));
+    }
+    let fact = |(name, value): &(&str, String)| {
+        format!(
+            "<div><dt>{}</dt><dd>{}</dd></div>\n",
+            escape(name),
+            escape(value)
+        )
+    };
+    let facts: String = facts.iter().map(fact).collect();
+    format!("<dl class=\"facts\">\n{facts}</dl>\n")
+}
+
+/// The functions in the order of the equation of motion, then those of single experiments.
+fn found(document: &ResultDocument) -> String {
+    let all = &document.functions;
+    let main = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
+    let main: Vec<&str> = main.collect();
+    let own = all
+        .keys()
+        .map(String::as_str)
+        .filter(|name| !main.contains(name));
+    let named = main.iter().copied().chain(own);
+    let functions: Vec<(&str, &FunctionSummary)> = named
+        .filter_map(|name| Some((name, all.get(name)?)))
+        .collect();
+    let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
+    let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
+    let mut headings = vec!["function", "smallest", "largest"];
+    headings.extend(has_error.then_some("standard error"));
+    if has_truth {
+        headings.extend(["largest error", "rms error"]);
+    }
+    let known = |x: Option<f64>| x.map_or(String::new(), number);
+    let row = |(name, f): &(&str, &FunctionSummary)| {
+        let mut cells = vec![name.to_string(), number(f.min), number(f.max)];
+        cells.extend(has_error.then(|| known(f.standard_error)));
+        if has_truth {
+            cells.extend([known(f.truth_max_error), known(f.truth_rms_error)]);
+        }
+        cells
+    };
+    let rows: Vec<Vec<String>> = functions.iter().map(row).collect();
+    table(&headings, &rows)
+}
+
+/// How well each record is matched, those that were held out included.
+pub(super) fn records(document: &ResultDocument) -> String {
+    let fitted = document
+        .experiments
+        .iter()
+        .map(|e| (e.name.clone(), &e.channels));
+    let held = document.held_out.iter();
+    let held = held.map(|e| (format!("{} (held out)", e.name), &e.channels));
+    let mut rows = Vec::new();
+    let mut notes = Vec::new();
+    for (name, channels) in fitted.chain(held) {
+        for channel in channels {
+            rows.push(record(&name, channel));
+            let about = format!("{name}, {}", channel.kind);
+            if channel.sigma.is_some() {
+                notes.push(format!("{about}: {}", channel.whiteness));
+            }
+            notes.extend(channel.ignored.iter().map(|ignored| {
+                let readings = count(ignored.readings, "reading");
+                format!("{about}: {readings} not used: {}", ignored.reason)
+            }));
+        }
+    }
+    for out in &document.held_out {
+        let failure = out.failure.as_ref();
+        notes.extend(failure.map(|f| format!("{} (held out): no motion: {f}", out.name)));
+    }
+    let headings = [
+        "record",
+        "channel",
+        "fit",
+        "rms residual",
+        "sigma",
+        "readings",
+    ];
+    table(&headings, &rows) + &list(&notes)
+}
+
+fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
+    let with_unit = |x: f64| format!("{} {}", number(x), channel.unit);
+    let sigma = channel
+        .sigma
+        .map_or("–".into(), |sigma| match channel.sigma_estimated {
+            true => format!("{}, estimated", with_unit(sigma)),
+            false => with_unit(sigma),
+        });
+    vec![
+        name.into(),
+        channel.kind.clone(),
+        format!("{:.2} %", channel.fit_percent),
+        with_unit(channel.rms_residual),
+        sigma,
+        channel.readings.to_string(),
+    ]
+}
+
+/// The cost and the work in one line.
+pub(super) fn work(document: &ResultDocument) -> String {
+    let (cost, counts) = (&document.cost, &document.counts);
+    format!(
+        "J fell from {} to {} in {}, with {}, {}, {} and {}.",
+        number(cost.initial),
+        number(cost.r#final),
+        iterations(document),
+        count(counts.forward as usize, "forward solve"),
+        count(counts.adjoint as usize, "adjoint solve"),
+        count(counts.tangent as usize, "tangent solve"),
+        count(counts.qp as usize, "quadratic program"),
+    )
+}

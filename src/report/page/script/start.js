@@ -1,0 +1,28 @@
+// Every figure of the page becomes a chart; without this script its drawing stays.
+
+/** Equally spaced values are written by their ends. */
+const spread = (xs) => (Array.isArray(xs) ? xs : Array.from({ length: xs.count }, (_, i) => xs.from + i * xs.step));
+
+const begin = () => {
+  const charts = [...document.querySelectorAll("figure.chart")].map((figure, index) => {
+    const data = JSON.parse(figure.querySelector("script").textContent);
+    const xs = data.xs.map(spread);
+    for (const panel of data.panels) {
+      for (const mark of panel.marks) if (mark.x !== undefined) mark.x = xs[mark.x];
+    }
+    const chart = new Chart(figure, data, index);
+    figure.classList.add("ready");
+    return chart;
+  });
+  for (const axis of axes.values()) {
+    const full = axis.full ?? [0, 1];
+    axis.full = full[1] > full[0] ? full : padded(full, 0);
+    axis.range = axis.full;
+    refresh(axis);
+  }
+  const observer = new ResizeObserver(() => axes.forEach(refresh));
+  for (const chart of charts) observer.observe(chart.live);
+};
+
+begin();
+document.documentElement.classList.add("scripted");

@@ -1,0 +1,166 @@
+//! Fewer points for the same picture: a page of a long record stays small.
+
+use crate::report::axis::{even, extent};
+use crate::report::figure::Scale;
+
+/// So many points of a curve are kept as they are.
+const FEW: usize = 4000;
+/// Columns of a longer one, in each of which its first, lowest, highest and last point are kept: more
+/// than a chart has pixels.
+const COLUMNS: f64 = 700.0;
+/// Points that lie on a straight line to this share of the curve's range are left out.
+const STRAIGHT: f64 = 1e-6;
+
+/// The points to be kept of curves `ys` over one `x`, and whether that leaves out any that can be seen
+/// when zoomed. `joined` says that the points are joined by lines.
+pub(super) fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>, bool) {
+    let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
+    let all: Vec<usize> = (0..count).collect();
+    let thinned = count > FEW;
+    let points = if thinned { columns(x, ys, &all) } else { all };
+    let [(y, scale)] = ys else {
+        return (points, thinned);
+    };
+    let straight = match joined {
+        true => corners(x, (y, *scale), &points),
+        false => points.clone(),
+    };
+    // Curves over the same points share them, so that leaving out a few gains nothing.
+    match straight.len() < points.len() / 2 {
+        true => (straight, thinned),
+        false => (points, thinned),
+    }
+}
+
+/// In each column the first, the last, and the lowest and highest of every curve.
+fn columns((x, scale): (&[f64], Scale), ys: &[(&[f64], Scale)], points: &[usize]) -> Vec<usize> {
+    let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
+    let column = |i: usize| (COLUMNS * (even(scale, x[i]) - low) / (high - low)).floor();
+    let alike = |a: &usize, b: &usize| column(*a).total_cmp(&column(*b)).is_eq();
+    let mut kept = Vec::new();
+    for chunk in points.chunk_by(alike) {
+        let mut few: Vec<usize> = chunk
+            .first()
+            .into_iter()
+            .chain(chunk.last())
+            .copied()
+            .collect();
+        for (y, scale) in ys {
+            let place = |i: &&usize| even(*scale, y[**i]);
+            let finite = || chunk.iter().filter(|i| place(i).is_finite());
+            few.extend(finite().min_by(|a, b| place(a).total_cmp(&place(b))));
+            few.extend(finite().max_by(|a, b| place(a).total_cmp(&place(b))));
+            few.extend(chunk.iter().find(|i| place(i).is_nan()));
+        }
+        few.sort_unstable();
+        few.dedup();
+        kept.extend(few);
+    }
+    kept
+}
+
+/// The ends of the straight pieces of a curve: all points between them lie within [`STRAIGHT`] of the
+/// lines that join these.
+fn corners(x: (&[f64], Scale), y: (&[f64], Scale), points: &[usize]) -> Vec<usize> {
+    let Some((low, high)) = extent(y.1, y.0) else {
+        return points.to_vec();
+    };
+    let room = STRAIGHT * (high - low);
+    let at = |i: usize| (even(x.1, x.0[i]), even(y.1, y.0[i]));
+    let mut kept: Vec<usize> = points.first().into_iter().copied().collect();
+    let mut slopes = (f64::NEG_INFINITY, f64::INFINITY);
+    for pair in points.windows(2) {
+        let (before, now) = (pair[0], pair[1]);
+        let from = |anchor: usize| {
+            let ((x0, y0), (x1, y1)) = (at(anchor), at(now));
+            let run = x1 - x0;
+            (
+                (y1 - y0) / run,
+                room / run,
+                run > 0.0 && (y1 - y0).is_finite(),
+            )
+        };
+        let anchor = kept.last().copied().unwrap_or(before);
+        let (slope, wide, drawable) = from(anchor);
+        if drawable && slopes.0 <= slope && slope <= slopes.1 {
+            slopes = (slopes.0.max(slope - wide), slopes.1.min(slope + wide));
+            continue;
+        }
+        if anchor != before {
+            kept.push(before);
+        }
+        let (slope, wide, drawable) = from(before);
+        slopes = (slope - wide, slope + wide);
+        if !drawable {
+            kept.push(now);
+            slopes = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+    }
+    kept.extend(points.last());
+    kept.dedup();
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINEAR: Scale = Scale::Linear;
+
+    #[test]
+    fn short_curves_stay_whole_and_long_ones_keep_their_peaks() {
+        let x: Vec<f64> = (0..65_000).map(f64::from).collect();
+        let mut y: Vec<f64> = x.iter().map(|x| (0.3 * x).sin()).collect();
+        y[40_001] = 9.0;
+        y[50_001] = f64::NAN;
+        let (points, thinned) = kept((&x, LINEAR), &[(&y, LINEAR)], true);
+        assert!(thinned && points.len() <= 4 * 701 + 1, "{}", points.len());
+        assert!(
+            [0, 40_001, 50_001, 64_999]
+                .iter()
+                .all(|i| points.contains(i))
+        );
+        assert!(points.is_sorted());
+        let (points, thinned) = kept((&x[..4000], LINEAR), &[(&y[..4000], LINEAR)], true);
+        assert!(!thinned && points.len() == 4000);
+    }
+
+    #[test]
+    fn straight_pieces_are_their_ends() {
+        let x: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 0.01).collect();
+        let bent: Vec<f64> = x.iter().map(|x| (x - 4.0).abs()).collect();
+        let of = |y: &[f64]| kept((&x, LINEAR), &[(y, LINEAR)], true).0;
+        assert_eq!(of(&bent), [0, 400, 1000]);
+        assert_eq!(of(&vec![2.0; 1001]), [0, 1000]);
+        // What is left out lies on the lines that are left.
+        let curved: Vec<f64> = x.iter().map(|x| (1e-3 * x).sin()).collect();
+        let corners = of(&curved);
+        assert!(corners.len() < 500, "{}", corners.len());
+        for pair in corners.windows(2) {
+            let (a, b) = (pair[0], pair[1]);
+            for i in a..b {
+                let share = (x[i] - x[a]) / (x[b] - x[a]);
+                let line = curved[a] + share * (curved[b] - curved[a]);
+                assert!((line - curved[i]).abs() <= 1.01 * STRAIGHT * 0.01, "{i}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_above_each_other_are_one_column() {
+        let (x, y) = (
+            vec![1.0; 9000],
+            (0..9000).map(f64::from).collect::<Vec<_>>(),
+        );
+        assert_eq!(kept((&x, LINEAR), &[(&y, LINEAR)], false).0, [0, 8999]);
+    }
+
+    #[test]
+    fn gaps_stay_gaps() {
+        let x: Vec<f64> = (0..100).map(f64::from).collect();
+        let mut y = vec![1.0; 100];
+        y[50] = f64::NAN;
+        let (points, _) = kept((&x, LINEAR), &[(&y, LINEAR)], true);
+        assert_eq!(points, [0, 49, 50, 51, 99]);
+    }
+}

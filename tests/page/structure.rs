@@ -1,0 +1,268 @@
+//! What stands in the pages.
+
+use crate::pages::{HOSTILE, PAGES, pages, repository};
+use roxmltree::{Document, Node, ParsingOptions};
+use serde_json::Value;
+
+/// The page as XML, which it is as well.
+fn parsed(html: &str) -> Document<'_> {
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    Document::parse_with_options(html, options).expect("well-formed")
+}
+
+fn all<'a>(page: &'a Document, name: &'a str) -> impl Iterator<Item = Node<'a, 'a>> {
+    page.descendants().filter(move |n| n.has_tag_name(name))
+}
+
+fn text_of(node: Node) -> String {
+    let texts = node.descendants().filter(Node::is_text);
+    texts.filter_map(|n| n.text()).collect()
+}
+
+/// The numbers of a chart.
+fn numbers(figure: Node) -> Value {
+    let script = figure.children().find(|n| n.has_tag_name("script"));
+    let text = text_of(script.expect("the numbers of the chart"));
+    serde_json::from_str(&text).expect("JSON")
+}
+
+/// How many finite numbers a mark has.
+fn size(mark: &Value) -> usize {
+    let finite = |key: &str| -> usize {
+        let list = mark[key].as_array();
+        list.map_or(0, |list| list.iter().filter(|v| v.is_number()).count())
+    };
+    let alone = ["at", "from"].iter().filter(|k| mark[**k].is_number());
+    finite("y").max(finite("low")) + alone.count()
+}
+
+#[test]
+fn every_figure_has_its_texts_and_its_numbers() {
+    for name in PAGES {
+        let html = pages().read(name);
+        let page = parsed(&html);
+        assert!(all(&page, "figure").count() >= 3, "{name}");
+        for figure in all(&page, "figure") {
+            let caption = figure.children().find(|n| n.has_tag_name("figcaption"));
+            assert!(!text_of(caption.expect("a caption")).trim().is_empty());
+            let svg = figure.descendants().find(|n| n.has_tag_name("svg"));
+            let svg = svg.expect("a drawing");
+            assert_eq!(svg.attribute("role"), Some("img"));
+            for told in ["title", "desc"] {
+                let node = svg.children().find(|n| n.has_tag_name(told));
+                assert!(node.is_some_and(|n| !text_of(n).is_empty()), "{told}");
+            }
+            let data = numbers(figure);
+            let panels = data["panels"].as_array().expect("panels");
+            assert!(!panels.is_empty());
+            for panel in panels {
+                let marks = panel["marks"].as_array().expect("marks");
+                assert!(marks.iter().map(size).sum::<usize>() > 0, "{name}: {panel}");
+            }
+        }
+    }
+}
+
+/// All that a report must tell.
+#[test]
+fn a_report_is_complete() {
+    let html = pages().read("runs/plain/report.html");
+    let page = parsed(&html);
+    let ids: Vec<&str> = (page.descendants())
+        .filter_map(|n| n.attribute("id"))
+        .collect();
+    for id in [
+        "fit",
+        "functions",
+        "ratios",
+        "convergence",
+        "constraints",
+        "identifiability",
+        "predictions",
+        "settings",
+        "repeat",
+        "cite",
+        "figure-channel",
+        "figure-residuals",
+        "figure-functions",
+        "figure-ratios",
+        "figure-convergence",
+        "figure-motion",
+    ] {
+        assert_eq!(ids.iter().filter(|other| **other == id).count(), 1, "{id}");
+    }
+    for link in all(&page, "a").filter_map(|n| n.attribute("href")) {
+        let to = link.strip_prefix('#').expect("a place in the page");
+        assert!(ids.contains(&to), "{link}");
+    }
+    let text = text_of(page.root_element());
+    let result: Value =
+        serde_json::from_str(&pages().read("runs/plain/result.json")).expect("JSON");
+    let sentences = |pointer: &str| -> Vec<String> {
+        let list = result.pointer(pointer).and_then(Value::as_array);
+        let list = list.unwrap_or_else(|| panic!("{pointer}"));
+        list.iter()
+            .filter_map(|v| v.as_str().or(v["sentence"].as_str()).map(String::from))
+            .collect()
+    };
+    for pointer in [
+        "/identifiability/verdicts",
+        "/identifiability/functions",
+        "/constraints/active",
+    ] {
+        let said = sentences(pointer);
+        assert!(!said.is_empty(), "{pointer}");
+        said.iter()
+            .for_each(|s| assert!(text.contains(s.as_str()), "{s}"));
+    }
+    for told in [
+        result["outcome"]["reason"].as_str().expect("a reason"),
+        result["model"]["cost_definition"]
+            .as_str()
+            .expect("a sentence"),
+        "kmcfit fit plain.yaml",
+        env!("CARGO_PKG_VERSION"),
+        "Buchta",
+        "readings.csv",
+        "truth.csv",
+        "basis: polynomial",
+    ] {
+        assert!(text.contains(told), "{told}");
+    }
+    // The bands of the functions and of the ratios, and the truth beside them.
+    for figure in ["figure-functions", "figure-ratios"] {
+        let figure = page
+            .descendants()
+            .find(|n| n.attribute("id") == Some(figure));
+        let data = numbers(figure.expect("the figure"));
+        let labels: Vec<&str> = (data["panels"].as_array().expect("panels").iter())
+            .flat_map(|p| p["marks"].as_array().expect("marks"))
+            .filter_map(|m| m["label"].as_str())
+            .collect();
+        for label in ["95 % band", "found", "truth"] {
+            assert!(labels.contains(&label), "{label} in {labels:?}");
+        }
+    }
+}
+
+/// Whatever loads anything is not there, whoever wrote it.
+#[test]
+fn nothing_is_loaded() {
+    for name in PAGES {
+        let html = pages().read(name);
+        let page = parsed(&html);
+        for node in page.descendants().filter(Node::is_element) {
+            let tag = node.tag_name().name();
+            assert!(
+                ![
+                    "link", "img", "iframe", "object", "embed", "base", "use", "image"
+                ]
+                .contains(&tag),
+                "{tag}"
+            );
+            for attribute in node.attributes() {
+                let (key, value) = (attribute.name(), attribute.value());
+                assert!(
+                    !["src", "srcset", "action", "style"].contains(&key),
+                    "{key}={value}"
+                );
+                assert!(!key.starts_with("on"), "{key}={value}");
+                assert!(key != "href" || value.starts_with('#'), "{value}");
+                assert!(!value.contains("url("), "{value}");
+            }
+        }
+        let style = text_of(all(&page, "style").next().expect("a style sheet"));
+        assert!(!style.contains("url(") && !style.contains("@import"));
+        let policy = all(&page, "meta").find(|n| n.attribute("http-equiv").is_some());
+        let policy = policy
+            .and_then(|n| n.attribute("content"))
+            .expect("a policy");
+        assert!(policy.starts_with("default-src 'none';") && !policy.contains("unsafe"));
+        assert!(
+            !html.contains("http://") && !html.contains("https://"),
+            "{name}"
+        );
+    }
+}
+
+/// Titles, names and the model's text are shown as they are, and are nothing but text.
+#[test]
+fn hostile_texts_are_texts() {
+    for name in ["runs/hostile/report.html", "runs/compare/compare.html"] {
+        let html = pages().read(name);
+        assert!(!html.contains("<script>alert"), "{name}");
+        let page = parsed(&html);
+        assert!(text_of(page.root_element()).contains(HOSTILE), "{name}");
+        let runs = |n: &Node| n.attribute("type") != Some("application/json");
+        assert_eq!(all(&page, "script").filter(runs).count(), 1, "{name}");
+        // In HTML a script ends at its first end tag.
+        let ends = html.matches("</script").count();
+        assert_eq!(ends, all(&page, "script").count(), "{name}");
+    }
+}
+
+/// A long record makes a page of at most 2 MB; what is left out keeps its peaks.
+#[test]
+fn long_records_make_small_pages() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let readings: String = (0..65_000)
+        .map(|i| {
+            let t = f64::from(i) * 0.01;
+            let spike = if i == 40_000 { 5.0 } else { 0.0 };
+            format!("{t},{}\n", (3.0 * t).cos() + 0.1 * (77.0 * t).sin() + spike)
+        })
+        .collect();
+    std::fs::write(
+        folder.path().join("readings.csv"),
+        "t_s,y_m\n".to_string() + &readings,
+    )
+    .expect("a file");
+    let model = "format: 1
+title: Long
+experiments:
+  - {data: readings.csv, sigma: {displacement: 0.1}, initial: {displacement: 1.0, velocity: 0.0}}
+functions:
+  mass: {basis: piecewise-linear, knots: 20, start: 1.0}
+  damping: {basis: constant, start: 0.0}
+  stiffness: {fixed: 9.0}
+fit: {stop: {iterations: 2}}
+";
+    std::fs::write(folder.path().join("long.yaml"), model).expect("a file");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        .current_dir(folder.path())
+        .args(["fit", "long.yaml"])
+        .output()
+        .expect("the program runs");
+    assert!(
+        output.status.code().is_some_and(|c| c == 0 || c == 3),
+        "{output:?}"
+    );
+    let html =
+        std::fs::read_to_string(folder.path().join("runs/long/report.html")).expect("a page");
+    assert!(html.len() < 2_000_000, "{} bytes", html.len());
+    let page = parsed(&html);
+    let channel = page
+        .descendants()
+        .find(|n| n.attribute("id") == Some("figure-channel"));
+    let channel = channel.expect("the figure");
+    assert!(text_of(channel).contains("thinned for display"));
+    let data = numbers(channel);
+    let readings = data["panels"][0]["marks"][0]["y"]
+        .as_array()
+        .expect("numbers");
+    let largest = readings
+        .iter()
+        .filter_map(Value::as_f64)
+        .fold(0.0, f64::max);
+    assert!(largest > 4.0, "the spike is lost: {largest}");
+}
+
+/// The README names the page that it shows how to make.
+#[test]
+fn the_readme_tells_of_the_page() {
+    let readme = std::fs::read_to_string(repository("README.md")).expect("a file");
+    assert!(readme.contains("`report.html`"));
+}
