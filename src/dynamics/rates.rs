@@ -192,22 +192,22 @@ fn prepare<A: Arithmetic, const S: usize>(
         for q in 0..3 {
             p[q] = p[q] * per_mass[q];
         }
-        for s in 0..S {
+        for (s, stage) in brought.iter_mut().enumerate().take(S) {
             let [next, end] = factors(tableau, rhs.dt, s);
             let p = p[tableau.position[s] as usize];
-            brought[s].next.kinds[k] = (p * Eight::splat(arithmetic, next)).row();
-            brought[s].end.kinds[k] = (p * Eight::splat(arithmetic, end)).row();
+            stage.next.kinds[k] = (p * Eight::splat(arithmetic, next)).row();
+            stage.end.kinds[k] = (p * Eight::splat(arithmetic, end)).row();
         }
     }
     let force = window::stepwise(rhs.excitation.and_then(|e| e.force.as_ref()), i);
     let base = window::stepwise(rhs.excitation.and_then(|e| e.base.as_ref()), i);
-    for s in 0..S {
+    for (s, stage) in brought.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
         let push = Eight::load(arithmetic, &force[q]) * per_mass[q];
         let drive = push - Eight::load(arithmetic, &base[q]);
         let [next, end] = factors(tableau, rhs.dt, s);
-        brought[s].next.drive = (drive * Eight::splat(arithmetic, next)).row();
-        brought[s].end.drive = (drive * Eight::splat(arithmetic, end)).row();
+        stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();
+        stage.end.drive = (drive * Eight::splat(arithmetic, end)).row();
     }
 }
 
@@ -237,16 +237,16 @@ fn step<const S: usize>(
 ) {
     let (mut y_s, mut v_s) = (*y, *v);
     let (mut y_end, mut v_end) = (*y, *v);
-    for s in 0..S {
+    for (s, stage) in brought.iter().enumerate().take(S) {
         let phi = Phi::at(there, width, y_s, v_s);
         let [next, end] = factors(tableau, dt, s);
         if end != 0.0 {
             y_end += end * v_s;
-            v_end = phi.add(&brought[s].end, there, l, v_end);
+            v_end = phi.add(&stage.end, there, l, v_end);
         }
         if s + 1 < S {
             y_s = *y + next * v_s;
-            v_s = phi.add(&brought[s].next, there, l, *v);
+            v_s = phi.add(&stage.next, there, l, *v);
         }
     }
     (*y, *v) = (y_end, v_end);

@@ -43,7 +43,7 @@ impl Problem {
     /// # Panics
     /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
-        let (euclidean, l2) = match kind {
+        let (mut euclidean, mut l2) = match kind {
             GradientKind::Discrete => {
                 let euclidean = self.discrete_gradient(evaluation);
                 let l2 = self.functions.gram_solve(&euclidean);
@@ -51,16 +51,6 @@ impl Problem {
             }
             GradientKind::Continuous => self.continuous_gradient(evaluation),
         };
-        self.with_penalties(theta, euclidean, l2)
-    }
-
-    /// The gradient of `J` from that of the misfit in the parameters, `dJ/dtheta` without the penalties.
-    pub(crate) fn gradient_from_misfit(&self, theta: &[f64], euclidean: Vec<f64>) -> Gradient {
-        let l2 = self.functions.gram_solve(&euclidean);
-        self.with_penalties(theta, euclidean, l2)
-    }
-
-    fn with_penalties(&self, theta: &[f64], mut euclidean: Vec<f64>, mut l2: Vec<f64>) -> Gradient {
         if self.is_regularised() {
             let push = self.penalty_gradient(theta);
             let push_l2 = self.functions.gram_solve(&push);

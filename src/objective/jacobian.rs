@@ -14,21 +14,7 @@ impl Problem {
     /// The change of every prediction (rows: readings of all channels of all experiments, in order)
     /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        self.predictions_jacobian_in(evaluation, DMatrix::zeros(0, 0))
-    }
-
-    /// [`Problem::predictions_jacobian`] in the storage of an older one.
-    pub(crate) fn predictions_jacobian_in(
-        &self,
-        evaluation: &Evaluation,
-        old: DMatrix<f64>,
-    ) -> DMatrix<f64> {
-        let (rows, columns) = (self.reading_count(), self.parameters());
-        // Every entry of a channel's rows is written.
-        let mut jacobian = match old.shape() == (rows, columns) {
-            true => old,
-            false => DMatrix::zeros(rows, columns),
-        };
+        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
             let count = experiment.reading_count();

@@ -126,11 +126,6 @@ impl<'a, 'p> Work<'a, 'p> {
         })
     }
 
-    /// Whether gradients are those of the discretised cost, by whatever way.
-    pub fn has_discrete_gradient(&self) -> bool {
-        self.kind == GradientKind::Discrete
-    }
-
     /// Counts tangent solves.
     pub fn count_tangents(&mut self, solves: u64) {
         *self.problem.counts.entry(TANGENT).or_insert(0) += solves;

@@ -1,14 +1,12 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
 use super::triangle::Triangle;
-use crate::lanes::sum::dot;
-use crate::objective::{Evaluation, Gradient};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use nalgebra::{DMatrix, DVector};
 
 /// The linearised predictions, and how their residuals are weighed.
-#[derive(Clone)]
 pub struct Linearised {
     /// `dz/dtheta` (readings x parameters), for the predictions `z` of all channels.
     jacobian: DMatrix<f64>,
@@ -21,23 +19,8 @@ pub struct Linearised {
 impl Linearised {
     /// At an evaluated point: one tangent solve for each parameter.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let nowhere = Self {
-            jacobian: DMatrix::zeros(0, 0),
-            roots: Vec::with_capacity(problem.reading_count()),
-            residuals: Vec::with_capacity(problem.reading_count()),
-        };
-        nowhere.moved_to(problem, evaluation)
-    }
-
-    /// At another point, in the same storage: page for page new memory would take as long as filling it.
-    pub fn moved_to(self, problem: &Problem, evaluation: &Evaluation) -> Self {
-        let Self {
-            jacobian,
-            mut roots,
-            mut residuals,
-        } = self;
-        roots.clear();
-        residuals.clear();
+        let mut roots = Vec::with_capacity(problem.reading_count());
+        let mut residuals = Vec::with_capacity(problem.reading_count());
         for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
             for (channel, predicted) in experiment.channels.iter().zip(predictions) {
                 let first = roots.len();
@@ -57,31 +40,19 @@ impl Linearised {
             }
         }
         Self {
-            jacobian: problem.predictions_jacobian_in(evaluation, jacobian),
+            jacobian: problem.predictions_jacobian(evaluation),
             roots,
             residuals,
         }
     }
 
-    /// `2 A' W r` and the penalties' part: the gradient of the cost from what is known here, without an
-    /// adjoint solve. `None` where that leaves the finite numbers.
-    pub fn gradient(&self, problem: &Problem, theta: &[f64]) -> Option<Gradient> {
-        let weighted: Vec<f64> = (self.residuals.iter().zip(&self.roots))
-            .map(|(r, root)| 2.0 * root * r)
-            .collect();
-        let columns = self.jacobian.as_slice().chunks_exact(weighted.len().max(1));
-        let misfit: Vec<f64> = columns.map(|column| dot(column, &weighted)).collect();
-        let finite = misfit.len() == theta.len() && misfit.iter().all(|g| g.is_finite());
-        finite.then(|| problem.gradient_from_misfit(theta, misfit))
-    }
-
     /// The subproblem in `delta theta`: `|R delta - b|^2` with the triangular factor `R` of the weighted
     /// Jacobian, and the rest of the residuals as a row of its own.
-    pub fn subproblem(&self) -> Subproblem {
+    pub fn subproblem(self) -> Subproblem {
         let n = self.jacobian.ncols();
         let mut sub = Subproblem::new(n);
         if self.jacobian.nrows() <= n {
-            let (jacobian, residuals) = self.clone().weighted();
+            let (jacobian, residuals) = self.weighted();
             for (row, r) in jacobian.row_iter().zip(&residuals) {
                 let entries = row.iter().copied().enumerate().filter(|(_, a)| *a != 0.0);
                 sub.residuals.push(entries, -r);

@@ -52,14 +52,6 @@ const SMALLEST_CHANGE: f64 = 1e-9;
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
-    /// The readings linearised where the last step led to: its gradient came from there.
-    ahead: Option<Ahead>,
-}
-
-/// Linearised readings and the parameters that they were linearised at.
-struct Ahead {
-    parameters: Vec<f64>,
-    linearised: dense::Linearised,
 }
 
 impl Default for GaussNewton {
@@ -67,7 +59,6 @@ impl Default for GaussNewton {
         Self {
             damping: FIRST_DAMPING,
             first_cost: None,
-            ahead: None,
         }
     }
 }
@@ -92,7 +83,7 @@ impl Descend for GaussNewton {
         if point.evaluation.cost <= NO_DECREASE * first_cost {
             return Step::Minimum("the cost is zero to rounding".into());
         }
-        let mut sub = self.linearise(work, point);
+        let mut sub = linearise(work, point);
         let scales = proximal_scales(problem, point);
         let mut evaluation = problem.workspace();
         let mut trouble = None;
@@ -124,7 +115,7 @@ impl Descend for GaussNewton {
                     self.damping = before;
                 }
                 return Step::Moved {
-                    point: Box::new(self.complete(work, proposal.parameters, evaluation)),
+                    point: Box::new(work.complete(proposal.parameters, evaluation)),
                     length: 1.0,
                     hindered: trouble.is_some(),
                 };
@@ -164,47 +155,6 @@ impl Descend for GaussNewton {
 }
 
 impl GaussNewton {
-    /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
-    fn linearise(&mut self, work: &mut Work, point: &Point) -> Subproblem {
-        let problem = work.problem();
-        let known = self.ahead.as_ref();
-        if let Some(ahead) = known.filter(|a| a.parameters == point.parameters) {
-            let mut sub = work.algebra(|| ahead.linearised.subproblem());
-            work.algebra(|| add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub));
-            return sub;
-        }
-        work.count_tangents(linearisation_tangents(problem));
-        linearise_at(problem, point, &mut work.timings).0
-    }
-
-    /// The point that an evaluation belongs to. Where few parameters let the Jacobian be formed, the
-    /// gradient is read off it, and the next step begins with it; otherwise an adjoint solve gives it.
-    fn complete(&mut self, work: &mut Work, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
-        let problem = work.problem();
-        let old = self.ahead.take();
-        if !work.has_discrete_gradient() || problem.parameters() > FEW_PARAMETERS {
-            return work.complete(parameters, evaluation);
-        }
-        work.count_tangents(linearisation_tangents(problem));
-        let linearised = timed(&mut work.timings.tangent, || match old {
-            Some(old) => old.linearised.moved_to(problem, &evaluation),
-            None => dense::Linearised::at(problem, &evaluation),
-        });
-        let gradient = work.algebra(|| linearised.gradient(problem, &parameters));
-        self.ahead = Some(Ahead {
-            parameters: parameters.clone(),
-            linearised,
-        });
-        match gradient {
-            Some(gradient) => Point {
-                parameters,
-                evaluation,
-                gradient,
-            },
-            None => work.complete(parameters, evaluation),
-        }
-    }
-
     fn learn(&mut self, gain: f64) {
         if gain > GOOD {
             self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
@@ -335,6 +285,13 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
         }
     }
     misfit
+}
+
+/// The subproblem at a point: readings, penalties, constraints, without the proximal term.
+fn linearise(work: &mut Work, point: &Point) -> Subproblem {
+    let problem = work.problem();
+    work.count_tangents(linearisation_tangents(problem));
+    linearise_at(problem, point, &mut work.timings).0
 }
 
 /// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
