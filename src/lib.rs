@@ -123,6 +123,7 @@
     clippy::result_large_err,
     reason = "an input error ends the program: its size costs nothing, its detail helps"
 )]
+pub mod builder;
 pub mod cli;
 pub mod config;
 pub mod constraints;

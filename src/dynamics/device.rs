@@ -1,7 +1,7 @@
 //! A device on the grid, and a state of its motion.
 
 /// Displacement (m) and velocity (m/s) at one time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
     /// Displacement `y` in m.
     pub displacement: f64,

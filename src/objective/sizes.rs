@@ -2,9 +2,11 @@
 
 use super::Evaluation;
 use crate::dynamics::quadrature::curvature;
-use crate::dynamics::{MOST_TERMS, Term, Trajectory};
+use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
 use crate::functions::largest;
 use crate::problem::Problem;
+use crate::signal::Spectrum;
+use std::f64::consts::TAU;
 
 impl Problem {
     /// For each function of the list the larger of its own largest value and of the value at which
@@ -111,4 +113,21 @@ fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
         four[3] += d * d;
     }
     sums.copy_from_slice(&four[..sums.len()]);
+}
+
+/// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
+/// (s) apart: their rms, and their dominant frequency.
+pub(crate) fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+    let rms = (centred.iter().map(|v| v * v).sum::<f64>() / centred.len() as f64).sqrt();
+    let spectrum = Spectrum::of(&centred, spacing);
+    let omega = TAU * spectrum.map_or(1.0, |s| s.dominant());
+    let omega = if omega > 0.0 { omega } else { 1.0 };
+    let displacement = match kind {
+        ChannelKind::Displacement => rms,
+        ChannelKind::Velocity => rms / omega,
+        ChannelKind::Acceleration => rms / (omega * omega),
+    };
+    [displacement, displacement * omega]
 }

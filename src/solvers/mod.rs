@@ -45,6 +45,7 @@ pub use timings::Timings;
 pub(crate) use timings::timed;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
+use crate::dynamics::Breakdown;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
 use point::Work;
@@ -96,6 +97,38 @@ pub struct FitSettings {
     pub stopping: Stopping,
     /// Set from outside (Ctrl-C) to end the run after the current iteration.
     pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl Default for FitSettings {
+    /// Those of a model file that says nothing of them: Gauss–Newton from the functions' start, with exact
+    /// gradients, until nothing changes.
+    fn default() -> Self {
+        Self {
+            solver: Solver::GaussNewton,
+            initial: Initial::Functions,
+            gradient: GradientKind::Discrete,
+            stopping: Stopping::default(),
+            interrupt: None,
+        }
+    }
+}
+
+impl Problem {
+    /// Fits from the problem's start with the usual settings.
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if the start itself has no motion.
+    pub fn fit(&self) -> Result<Fit, Breakdown> {
+        self.fit_with(&FitSettings::default())
+    }
+
+    /// Fits from the problem's start.
+    ///
+    /// # Errors
+    /// As [`Problem::fit`].
+    pub fn fit_with(&self, settings: &FitSettings) -> Result<Fit, Breakdown> {
+        fit(self, &self.start(), settings, &mut |_| {})
+    }
 }
 
 /// Where one iteration led.

@@ -10,6 +10,7 @@ use crate::dynamics::{ChannelKind, Grid, Surroundings};
 use crate::error::InputError;
 use crate::functions::{Scalar, Value};
 use crate::objective::{Channel, Loss, Sensor, Weighting, integral_over};
+use crate::observations::times::{even_spacing, median_spacing};
 use crate::problem::Experiment;
 use crate::signal::{self, SecondOrder};
 use crate::units::{Kind, Unit};
@@ -22,8 +23,6 @@ const BAND_ORDER: usize = 2;
 const HUBER: f64 = 1.345;
 /// Degrees of freedom of Student's t.
 const STUDENT: f64 = 4.0;
-/// How far readings may be from equal spacing, in spacings.
-const REGULAR: f64 = 1e-6;
 /// Spacings that differ by less than this share look like rounded times.
 const ROUNDED: f64 = 0.05;
 /// First guess of a sigma that is estimated, as a share of the readings' size.
@@ -245,7 +244,7 @@ fn read_one(
             })
             .expected(format!("at least {}", Grid::FEWEST_NODES)));
     }
-    let spacing = spacing(&times);
+    let spacing = even_spacing(&times);
     if spacing.is_none() && missing == 0 && nearly_equal(&times) {
         warnings.push(format!(
             "{key}: the times are nearly equally spaced but not quite, as if they had been printed \
@@ -273,26 +272,11 @@ fn read_one(
     })
 }
 
-/// The spacing of equally spaced times.
-fn spacing(times: &[f64]) -> Option<f64> {
-    let intervals = (times.len() - 1) as f64;
-    let spacing = (times[times.len() - 1] - times[0]) / intervals;
-    let astray =
-        |(i, t): (usize, &f64)| (t - (times[0] + i as f64 * spacing)).abs() > REGULAR * spacing;
-    (!times.iter().enumerate().any(astray)).then_some(spacing)
-}
-
 /// Whether all spacings are within some per cent of their median.
 fn nearly_equal(times: &[f64]) -> bool {
     let median = median_spacing(times);
     let off = |w: &[f64]| (w[1] - w[0] - median).abs() > ROUNDED * median;
     !times.windows(2).any(off)
-}
-
-fn median_spacing(times: &[f64]) -> f64 {
-    let mut spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings[spacings.len() / 2]
 }
 
 /// Keeps every `factor`-th reading after a low-pass filter.
@@ -311,7 +295,7 @@ fn decimate(
             .expected("an integer, 1 or more"));
     }
     let whole = source.values.iter().all(|v| !v.is_nan());
-    if !whole || source.times.len() < 2 || spacing(&source.times).is_none() {
+    if !whole || source.times.len() < 2 || even_spacing(&source.times).is_none() {
         return Err(file
             .error_at(
                 &at,
@@ -490,7 +474,7 @@ pub fn place(
         (Some(weighting), _) => weighting,
         (None, Some(_)) => Weighting::Integral {
             // As the paper's: the length over the intervals.
-            spacing: spacing(&raw.times).unwrap_or(raw.median_spacing),
+            spacing: even_spacing(&raw.times).unwrap_or(raw.median_spacing),
         },
         (None, None) => integral_over(&raw.times),
     };

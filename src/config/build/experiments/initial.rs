@@ -8,8 +8,7 @@ use crate::config::spec::{EstimateValue, InitialSpec};
 use crate::dynamics::{ChannelKind, State};
 use crate::error::InputError;
 use crate::functions::{Scalar, Value};
-use crate::signal::Spectrum;
-use std::f64::consts::TAU;
+use crate::objective::state_sizes;
 
 /// The initial state, and which scalars it is where it is sought.
 pub fn build(
@@ -60,19 +59,8 @@ pub fn build(
 
 /// How large displacement and velocity are, from the channel nearest to a displacement.
 fn sizes(record: &Record) -> [f64; 2] {
-    let Some(channel) = record.channels.iter().min_by_key(|c| c.kind) else {
-        return [1.0; 2];
-    };
-    let mean = channel.values.iter().sum::<f64>() / channel.values.len() as f64;
-    let centred: Vec<f64> = channel.values.iter().map(|v| v - mean).collect();
-    let rms = (centred.iter().map(|v| v * v).sum::<f64>() / centred.len() as f64).sqrt();
-    let spectrum = Spectrum::of(&centred, channel.median_spacing);
-    let omega = TAU * spectrum.map_or(1.0, |s| s.dominant());
-    let omega = if omega > 0.0 { omega } else { 1.0 };
-    let displacement = match channel.kind {
-        ChannelKind::Displacement => rms,
-        ChannelKind::Velocity => rms / omega,
-        ChannelKind::Acceleration => rms / (omega * omega),
-    };
-    [displacement, displacement * omega]
+    match record.channels.iter().min_by_key(|c| c.kind) {
+        Some(c) => state_sizes(c.kind, &c.values, c.median_spacing),
+        None => [1.0; 2],
+    }
 }

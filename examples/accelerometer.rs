@@ -1,0 +1,43 @@
+// A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness, and how sure.
+
+use kmcfit::builder::{Builder, Part, Record};
+use kmcfit::identifiability::{BandSettings, Bands};
+use kmcfit::observations::Table;
+use kmcfit::signal::Interpolation;
+use std::error::Error;
+
+/// Value and standard error of mass (kg), damping (N s/m) and stiffness (N/m).
+pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
+    let table = Table::read("data/shaker.csv")?;
+    let times = table.column("t_s")?;
+    let record = Record::new("shaker")
+        .from_state(0.0, 0.0)
+        .force(times, table.column("f_N")?)
+        // The sweep is smooth between its samples; lines would be five standard errors off.
+        .interpolation(Interpolation::Cubic)
+        .acceleration(times, table.column("a_m_per_s2")?)
+        .sigma(0.02);
+    let device = [
+        Part::constant(3.0),
+        Part::constant(0.0),
+        Part::constant(200.0),
+    ];
+    let problem = Builder::new(device).record(record).nodes(4801).build()?;
+    let fit = problem.fit()?;
+    println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
+
+    let best = &fit.best;
+    let settings = BandSettings::default();
+    let bands = Bands::at(&problem, &best.parameters, &best.evaluation, &settings);
+    Ok([0, 1, 2].map(|j| {
+        let band = &bands.functions[j];
+        [band.values[0], band.standard_error[0]]
+    }))
+}
+
+pub fn main() -> Result<(), Box<dyn Error>> {
+    for (name, [value, error]) in ["m", "c", "k"].into_iter().zip(found()?) {
+        println!("{name} = {value:.4} +- {error:.4}");
+    }
+    Ok(())
+}

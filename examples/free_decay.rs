@@ -1,0 +1,32 @@
+// A free decay from arrays: which damping and stiffness, if the mass is known?
+
+use kmcfit::builder::{Builder, Part, Record};
+use std::error::Error;
+
+/// Damping (N s/m) and stiffness (N/m).
+pub fn found() -> Result<[f64; 2], Box<dyn Error>> {
+    // m = 1 kg, c = 2 N s/m, k = 2500 N/m: a ring-down at 8 Hz, here from its closed form.
+    let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
+    let omega = 2499.0f64.sqrt();
+    let decay = |t: &f64| 0.01 * (-t).exp() * ((omega * t).cos() + (omega * t).sin() / omega);
+    let motion: Vec<f64> = times.iter().map(decay).collect();
+
+    let device = [
+        Part::fixed(1.0),
+        Part::constant(1.0).min(0.0),
+        Part::constant(2000.0).min(0.0),
+    ];
+    let record = Record::new("ring-down")
+        .from_state(0.01, 0.0)
+        .displacement(&times, &motion);
+    let fit = Builder::new(device).record(record).build()?.fit()?;
+
+    println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
+    Ok([0, 1].map(|j| fit.best.evaluation.device.coefficients[j][0]))
+}
+
+pub fn main() -> Result<(), Box<dyn Error>> {
+    let [c, k] = found()?;
+    println!("c = {c:.3} N s/m, k = {k:.1} N/m");
+    Ok(())
+}

@@ -1,0 +1,28 @@
+// Results load back: what `kmcfit fit models/linear-mass.yaml` wrote, and the motion from another start.
+
+use kmcfit::Run;
+use kmcfit::dynamics::State;
+use std::error::Error;
+use std::path::Path;
+
+/// The ratio J/J0, and the largest displacement (m) of the found device when it is let go at 1 m.
+pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
+    let run = Run::open(folder)?;
+    let let_go = State {
+        displacement: 1.0,
+        velocity: 0.0,
+    };
+    let motion = run.oscillator.forward(&run.device, let_go, None)?;
+    let most = motion
+        .displacement
+        .iter()
+        .fold(0.0, |most: f64, y| most.max(y.abs()));
+    Ok([run.document.cost.ratio, most])
+}
+
+pub fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args().nth(1);
+    let [ratio, most] = found(Path::new(folder.as_deref().unwrap_or("runs/linear-mass")))?;
+    println!("J/J0 = {ratio:.1e}; let go at 1 m it swings to {most:.2} m");
+    Ok(())
+}
