@@ -174,6 +174,11 @@ impl Experiment {
         self.excitation.as_ref().is_none_or(Excitation::is_zero)
     }
 
+    /// Whether anything was measured.
+    pub fn is_read(&self) -> bool {
+        !self.channels.is_empty()
+    }
+
     /// Number of readings of all channels.
     pub fn reading_count(&self) -> usize {
         self.channels.iter().map(Channel::len).sum()

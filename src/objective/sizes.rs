@@ -4,14 +4,14 @@ use super::Evaluation;
 use crate::dynamics::quadrature::curvature;
 use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
 use crate::functions::largest;
-use crate::problem::Problem;
+use crate::problem::{Experiment, Problem};
 use crate::signal::Spectrum;
 use std::f64::consts::TAU;
 
 impl Problem {
     /// For each function of the list the larger of its own largest value and of the value at which
     /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
-    /// the experiments that it takes part in. So a damping on its way to zero still has a size, that
+    /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
     /// of a damping that matters.
     pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
         let terms = &self.oscillator.terms;
@@ -19,13 +19,14 @@ impl Problem {
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
             .map(|motion| squares(motion, terms, step))
             .collect();
+        let any_read = self.experiments.iter().any(Experiment::is_read);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.assemblies().iter().enumerate() {
             let device = evaluation.device_of(which);
             // Of the accelerations first, then of what each term sees.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
-                let own = own.filter(|(experiment, _)| experiment.device == which);
+                let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
             let mass = largest(&device.mass);
