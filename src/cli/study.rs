@@ -3,7 +3,7 @@
 use super::compare::{entries, side_by_side, verdict};
 use super::fit::search;
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, stem, unwritable};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, say, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, Story, build};
 use crate::error::{InputError, Place};
 use crate::identifiability::count;
@@ -133,10 +133,10 @@ fn study(
     let mut model = build(&file, Purpose::Fit)?;
     can_be_studied(&file, &model)?;
     for remark in &model.remarks {
-        eprintln!("note: {remark}");
+        say("note", remark);
     }
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        say("warning", warning);
     }
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));

@@ -105,14 +105,14 @@ fn names(text: &str, mark: char) -> impl Iterator<Item = (usize, &str)> {
     let lines = lines.filter(|(_, line)| !line.trim_start().starts_with('#'));
     lines.flat_map(move |(begin, line)| {
         line.match_indices(mark).filter_map(move |(index, _)| {
-            let begins = line[..index]
-                .chars()
-                .next_back()
-                .is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
-            let name = line[index + 1..]
+            let before = line[..index].chars().next_back();
+            // A text full of marks would be searched to its end from each of them.
+            let begins = before.is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
+            let rest = begins.then(|| &line[index + 1..])?;
+            let name = rest
                 .split(|c: char| c.is_whitespace() || "[]{},".contains(c))
                 .next()?;
-            (begins && !name.is_empty()).then_some((begin + index, name))
+            (!name.is_empty()).then_some((begin + index, name))
         })
     })
 }
