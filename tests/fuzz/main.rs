@@ -16,7 +16,7 @@ use targets::{TARGETS, Target};
 use watched::Watched;
 
 /// Mutations of each target where nobody asks for more: a few seconds each.
-const MUTATIONS: [usize; 5] = [3000, 30_000, 2000, 700, 500];
+const MUTATIONS: [usize; 5] = [12_000, 6000, 6000, 4000, 1000];
 
 fn mutations(index: usize) -> usize {
     match std::env::var("KMCFIT_FUZZ") {
