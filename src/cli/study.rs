@@ -9,7 +9,7 @@ use crate::error::{InputError, Place};
 use crate::identifiability::count;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::report::study::{StudyDocument, gather};
+use crate::report::study::{FitPiece, StudyDocument, gather};
 use crate::report::{FitHeading, FitJournal, Heading, Journal, OutputFolder, Run, json};
 use crate::solvers::{Keeper, Status};
 use std::io::{self, IsTerminal};
@@ -371,6 +371,11 @@ impl Work<'_> {
             Ok::<_, String>(gather::fit(problem, &found))
         };
         let whole = || !flag.load(Ordering::Relaxed);
+        let is_right = |kept: &Result<FitPiece, String>| {
+            kept.as_ref()
+                .map_or(true, |fit| gather::is_of(&model.problem, fit))
+        };
+        self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.piece("fit", compute, whole)?;
         let Some(fitted) = fitted else {
             // The best so far is told, and the journal of the fit has what it goes on from.

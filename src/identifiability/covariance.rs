@@ -20,8 +20,8 @@ pub(super) struct Information {
     measured: DMatrix<f64>,
     /// Rows that only pull: penalties and broken soft constraints.
     pulled: DMatrix<f64>,
-    /// Rounding of a motion as large as the largest reading, which adds up from step to step as a random
-    /// walk does.
+    /// Rounding of a motion as large as the largest reading, which at worst adds up from step to
+    /// step.
     rounding: f64,
 }
 
@@ -67,7 +67,7 @@ impl Information {
             measured,
             pulled,
             sensitivity,
-            rounding: f64::EPSILON * largest * (problem.oscillator.grid.nodes() as f64).sqrt(),
+            rounding: f64::EPSILON * largest * problem.oscillator.grid.nodes() as f64,
         }
     }
 
