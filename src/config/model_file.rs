@@ -14,7 +14,7 @@ const MODEL_FILE: &str = "a model file (YAML)";
 
 /// Most experiments: each reads its own files, so that a short text could ask for more than fits into
 /// memory.
-const MOST_EXPERIMENTS: usize = 1000;
+const MOST_EXPERIMENTS: usize = 2000;
 
 /// A model file that was read: where it is, its text, and what it says.
 #[derive(Debug, Clone, PartialEq)]

@@ -93,10 +93,10 @@ fn models_that_mean_more_than_they_say() {
     let rest = &MODEL[MODEL.find("functions").expect("a key")..];
     let said = refuse(format!(
         "format: 1\nexperiments:\n{}{rest}",
-        record.repeat(1001)
+        record.repeat(2001)
     ));
     assert!(
-        said.contains("too many experiments\n  found: 1001\n  expected: at most 1000"),
+        said.contains("too many experiments\n  found: 2001\n  expected: at most 2000"),
         "{said}"
     );
 }
