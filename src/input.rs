@@ -1,7 +1,8 @@
 //! Reading text files, with errors that say what is wrong with the file.
 
+use std::borrow::Cow;
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
@@ -13,6 +14,13 @@ const LONGEST_QUOTE: usize = 40;
 
 /// Most names that are listed in a message.
 const MOST_NAMES: usize = 30;
+
+/// Longest table that is read, in bytes: some ten million rows, which fit into memory.
+pub const LONGEST_TABLE: u64 = 1 << 30;
+
+/// Longest line of a table, in bytes: hundreds of columns take a hundredth of it. A longer one is no
+/// table, and would be taken apart into more fields than there is memory for.
+pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Reads a text file of at most `limit` bytes; a byte order mark is dropped.
 ///
@@ -31,13 +39,42 @@ pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputErr
 ///
 /// # Errors
 ///
-/// When there is no such file, it is a folder, it cannot be read, or it is longer than `limit`.
+/// When there is no such file, it is a folder, a device or somebody else's pipe, it cannot be read, or
+/// it is longer than `limit`.
 pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
-    if path.is_dir() {
-        return Err(InputError::file(path, "this is a folder, not a file").expected(what));
+    let metadata = fs::metadata(path).map_err(|error| unreadable(path, what, &error))?;
+    if let Some(other) = no_file(path, &metadata) {
+        return Err(InputError::file(path, format!("this is {other}, not a file")).expected(what));
+    }
+    // Nothing is read of what is too long, or may not even be there: a file can have holes.
+    if metadata.len() > limit {
+        return Err(too_long(path, limit).expected(what));
     }
     let file = File::open(path).map_err(|error| unreadable(path, what, &error))?;
     read_bytes_from(path, file, limit).map_err(|error| error.expected_if_none(what))
+}
+
+/// What stands at a path in the place of a file. A device may never end, and a pipe never begin; but the
+/// program's own (`/dev/stdin`) was begun by whoever started it.
+fn no_file(path: &Path, metadata: &Metadata) -> Option<&'static str> {
+    let is_own = ["/dev", "/proc"].iter().any(|own| path.starts_with(own));
+    match () {
+        () if metadata.is_file() => None,
+        () if metadata.is_dir() => Some("a folder"),
+        () if !is_pipe(metadata) => Some("a device"),
+        () => (!is_own).then_some("a pipe"),
+    }
+}
+
+#[cfg(unix)]
+fn is_pipe(metadata: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    metadata.file_type().is_fifo()
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Metadata) -> bool {
+    false
 }
 
 /// Reads at most `limit` bytes from a reader; `path` is what messages call it.
@@ -52,12 +89,35 @@ pub fn read_bytes_from(path: &Path, reader: impl Read, limit: u64) -> Result<Vec
         .read_to_end(&mut bytes)
         .map_err(|error| InputError::file(path, format!("the file cannot be read: {error}")))?;
     if bytes.len() as u64 > limit {
-        return Err(InputError::file(
-            path,
-            format!("the file is longer than {limit} bytes"),
-        ));
+        return Err(too_long(path, limit));
     }
     Ok(bytes)
+}
+
+fn too_long(path: &Path, limit: u64) -> InputError {
+    InputError::file(path, format!("the file is longer than {limit} bytes"))
+}
+
+/// Refuses a table with a line longer than any table has.
+///
+/// # Errors
+///
+/// At the first such line.
+pub fn check_lines(path: &Path, text: &str) -> Result<(), InputError> {
+    let mut lines = text.split('\n');
+    let Some(index) = lines.position(|line| line.len() > LONGEST_LINE) else {
+        return Ok(());
+    };
+    let place = Place::Line {
+        file: path.to_path_buf(),
+        line: index + 1,
+        column: 1,
+    };
+    Err(InputError::new(
+        place,
+        format!("the line is longer than {LONGEST_LINE} bytes"),
+    )
+    .expected("one row of a table in each line"))
 }
 
 /// A short quotation of somebody's text for a message: one line, cut where it is long.
@@ -75,6 +135,23 @@ pub fn quote(text: &str) -> String {
     }
     quoted.push('`');
     quoted
+}
+
+/// A text as it may be shown on a terminal: control characters, which could command it, become escapes;
+/// line ends and tabs stay.
+pub fn harmless(text: &str) -> Cow<'_, str> {
+    let commands = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(commands) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::new();
+    for c in text.chars() {
+        match commands(c) {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    Cow::Owned(shown)
 }
 
 /// Names in a row: `a, b, c`; the first of them where there are many.

@@ -1,6 +1,6 @@
 //! `kmcfit check`
 
-use super::{Failure, NOT_CONVERGED, OK, print, unwritable};
+use super::{Failure, NOT_CONVERGED, OK, print, say, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
 use crate::dynamics::Breakdown;
 use crate::objective::GradientKind;
@@ -81,10 +81,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = ModelFile::read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
     for remark in &model.remarks {
-        eprintln!("note: {remark}");
+        say("note", remark);
     }
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        say("warning", warning);
     }
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         print(&describe(&model));

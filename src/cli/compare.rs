@@ -2,7 +2,7 @@
 
 use super::fit::{begun, fit_into};
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, unwritable};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, say, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
@@ -147,7 +147,7 @@ impl Compared {
             return Ok(());
         }
         for warning in &model.warnings {
-            eprintln!("warning: {name}: {warning}");
+            say("warning", format!("{name}: {warning}"));
         }
         model.settings.interrupt = Some(Arc::clone(flag));
         let progress = Progress::new(model.settings.stopping.iterations).named(name);
@@ -161,7 +161,7 @@ impl Compared {
                 Ok(())
             }
             Err(Failure::Numerical(reason)) => {
-                eprintln!("failed: {name}: {reason}");
+                say("failed", format!("{name}: {reason}"));
                 self.leave_out(name, reason);
                 Ok(())
             }

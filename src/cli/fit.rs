@@ -1,7 +1,7 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, exit_code, interrupt, print, stem, unwritable};
+use super::{Failure, exit_code, interrupt, print, say, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
@@ -100,10 +100,10 @@ fn run_in(
 ) -> Result<u8, Failure> {
     model.settings.interrupt = Some(flag);
     for remark in &model.remarks {
-        eprintln!("note: {remark}");
+        say("note", remark);
     }
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        say("warning", warning);
     }
     let progress = Progress::new(model.settings.stopping.iterations);
     let (document, status) = fit_into(folder, &model, &progress, with_figures, journal)?;

@@ -11,8 +11,10 @@ mod simulate;
 mod study;
 
 use crate::error::{InputError, Place};
+use crate::input::harmless;
 use crate::solvers::Status;
 use clap::{Parser, Subcommand};
+use std::fmt::Display;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
@@ -75,11 +77,11 @@ pub fn main() -> ExitCode {
     ExitCode::from(match result {
         Ok(code) => code,
         Err(Failure::Input(error)) => {
-            eprintln!("error: {error}");
+            say("error", error);
             BAD_INPUT
         }
         Err(Failure::Numerical(reason)) => {
-            eprintln!("failed: {reason}");
+            say("failed", reason);
             NOT_CONVERGED
         }
     })
@@ -116,12 +118,20 @@ fn unwritable(path: &Path, error: &io::Error) -> InputError {
     .expected("a place that can be written to")
 }
 
+/// Says something beside the results.
+fn say(kind: &str, what: impl Display) {
+    eprintln!("{kind}: {}", harmless(&what.to_string()));
+}
+
 /// Prints results; a reader that has gone away (`| head`) is no error, a full disk ends the
 /// program.
 fn print(text: &str) {
     use io::Write;
     let mut out = io::stdout();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out
+        .write_all(harmless(text).as_bytes())
+        .and_then(|()| out.flush())
+    {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             eprintln!("error: the output cannot be written: {error}");
             std::process::exit(BAD_INPUT.into());

@@ -3,13 +3,13 @@
 use super::compare::{entries, side_by_side, verdict};
 use super::fit::search;
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, stem, unwritable};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, say, stem, unwritable};
 use crate::config::{Model, ModelFile, Purpose, Story, build};
 use crate::error::{InputError, Place};
 use crate::identifiability::count;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::report::study::{StudyDocument, gather};
+use crate::report::study::{FitPiece, StudyDocument, gather};
 use crate::report::{FitHeading, FitJournal, Heading, Journal, OutputFolder, Run, json};
 use crate::solvers::{Keeper, Status};
 use std::io::{self, IsTerminal};
@@ -133,10 +133,10 @@ fn study(
     let mut model = build(&file, Purpose::Fit)?;
     can_be_studied(&file, &model)?;
     for remark in &model.remarks {
-        eprintln!("note: {remark}");
+        say("note", remark);
     }
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        say("warning", warning);
     }
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));
@@ -371,6 +371,11 @@ impl Work<'_> {
             Ok::<_, String>(gather::fit(problem, &found))
         };
         let whole = || !flag.load(Ordering::Relaxed);
+        let is_right = |kept: &Result<FitPiece, String>| {
+            kept.as_ref()
+                .map_or(true, |fit| gather::is_of(&model.problem, fit))
+        };
+        self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.piece("fit", compute, whole)?;
         let Some(fitted) = fitted else {
             // The best so far is told, and the journal of the fit has what it goes on from.

@@ -20,7 +20,13 @@ pub(super) const LONGEST_MODEL: u64 = 1 << 18;
 /// for a file full of them.
 const MOST_OPEN_BRACKETS: usize = 200;
 
-/// Refuses a text that is too long, nested too deeply, or gives an anchor twice.
+/// Most aliases (`*name`), and as many anchors (`&name`), in a file.
+///
+/// A model needs a dozen. Each alias repeats all that is behind its anchor, so that a short file of many
+/// of them means a long one.
+const MOST_ALIASES: usize = 1000;
+
+/// Refuses a text that is too long, nested too deeply, repeats too much, or gives an anchor twice.
 pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
     if text.len() as u64 > LONGEST_MODEL {
         return Err(InputError::file(
@@ -61,6 +67,14 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     if names(text, '*').next().is_none() {
         return Ok(());
     }
+    for mark in ['*', '&'] {
+        if let Some((index, _)) = names(text, mark).nth(MOST_ALIASES) {
+            let at = place(file, Position::of(text, index));
+            return Err(InputError::new(at, "too many aliases or anchors")
+                .found(format!("more than {MOST_ALIASES} times `{mark}name`"))
+                .expected(format!("at most {MOST_ALIASES}")));
+        }
+    }
     let mut seen = BTreeMap::new();
     for (index, name) in names(text, '&') {
         let here = Position::of(text, index);
@@ -82,16 +96,23 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
 
 /// The words that begin with `mark` where a value can begin, outside comment lines.
 fn names(text: &str, mark: char) -> impl Iterator<Item = (usize, &str)> {
-    text.match_indices(mark).filter_map(move |(index, _)| {
-        let before = &text[..index];
-        let line = before.rsplit('\n').next().unwrap_or_default();
-        let begins = before
-            .chars()
-            .next_back()
-            .is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
-        let name = text[index + 1..]
-            .split(|c: char| c.is_whitespace() || "[]{},".contains(c))
-            .next()?;
-        (begins && !name.is_empty() && !line.trim_start().starts_with('#')).then_some((index, name))
+    let mut line_begin = 0;
+    let lines = text.split_inclusive('\n').map(move |line| {
+        let begin = line_begin;
+        line_begin += line.len();
+        (begin, line)
+    });
+    let lines = lines.filter(|(_, line)| !line.trim_start().starts_with('#'));
+    lines.flat_map(move |(begin, line)| {
+        line.match_indices(mark).filter_map(move |(index, _)| {
+            let before = line[..index].chars().next_back();
+            // A text full of marks would be searched to its end from each of them.
+            let begins = before.is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
+            let rest = begins.then(|| &line[index + 1..])?;
+            let name = rest
+                .split(|c: char| c.is_whitespace() || "[]{},".contains(c))
+                .next()?;
+            (!name.is_empty()).then_some((begin + index, name))
+        })
     })
 }

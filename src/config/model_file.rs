@@ -12,6 +12,10 @@ use crate::input::read_text;
 /// What a model file should be, in messages.
 const MODEL_FILE: &str = "a model file (YAML)";
 
+/// Most experiments: each reads its own files, so that a short text could ask for more than fits into
+/// memory.
+const MOST_EXPERIMENTS: usize = 2000;
+
 /// A model file that was read: where it is, its text, and what it says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
@@ -79,6 +83,14 @@ impl ModelFile {
                 .error_at("experiments", "there is no experiment")
                 .found("an empty list")
                 .expected("at least one experiment"));
+        }
+        let experiments = model.spec.experiments.len();
+        if experiments > MOST_EXPERIMENTS {
+            let key = format!("experiments[{MOST_EXPERIMENTS}]");
+            return Err(model
+                .error_at(&key, "there are too many experiments")
+                .found(experiments)
+                .expected(format!("at most {MOST_EXPERIMENTS}")));
         }
         Ok(model)
     }

@@ -1,6 +1,7 @@
 //! What a model was made from: its text and its data files, so that a run can be repeated.
 
 use super::ModelFile;
+use crate::input::{LONGEST_TABLE, read_bytes};
 use data_encoding::HEXLOWER;
 use sha2::{Digest, Sha256};
 
@@ -31,7 +32,7 @@ impl Source {
             collect(&value, &mut names);
         }
         let data = names.into_iter().map(|name| DataFile {
-            content: (std::fs::read(file.resolve(&name)).ok())
+            content: (read_bytes(&file.resolve(&name), "readings", LONGEST_TABLE).ok())
                 .map(|bytes| (bytes.len(), HEXLOWER.encode(&Sha256::digest(&bytes)))),
             name,
         });

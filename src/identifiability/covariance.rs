@@ -20,6 +20,9 @@ pub(super) struct Information {
     measured: DMatrix<f64>,
     /// Rows that only pull: penalties and broken soft constraints.
     pulled: DMatrix<f64>,
+    /// Rounding of a motion as large as the largest reading, which at worst adds up from step to
+    /// step.
+    rounding: f64,
 }
 
 /// `Cov = F F^T` on the directions that are seen, nothing on the others.
@@ -58,10 +61,13 @@ impl Information {
         for penalty in &problem.penalties {
             pulled = stacked(&pulled, &roughness(problem, penalty, directions));
         }
+        let readings = problem.channels().flat_map(|c| c.observed());
+        let largest = readings.fold(0.0f64, |most, y| most.max(y.abs()));
         Self {
             measured,
             pulled,
             sensitivity,
+            rounding: f64::EPSILON * largest * problem.oscillator.grid.nodes() as f64,
         }
     }
 
@@ -142,7 +148,8 @@ impl Information {
     }
 
     /// `sum r^2 / (n - effective parameters)` over the readings without a sigma; infinite where there
-    /// are no more readings than that.
+    /// are no more readings than that. A fit that leaves nothing leaves the rounding of the motion:
+    /// else all would be known for certain, also what they do not see.
     fn variance(&self, answers: &DMatrix<f64>) -> Option<f64> {
         let s = &self.sensitivity;
         let without: Vec<usize> = (0..s.roots.len()).filter(|i| !s.has_sigma[*i]).collect();
@@ -154,10 +161,11 @@ impl Information {
             .map(|&i| (s.residuals[i] / s.roots[i]).powi(2));
         let effective: f64 = without.iter().map(|&i| answers.row(i).norm_squared()).sum();
         let left = without.len() as f64 - effective;
-        Some(if left > 0.5 {
-            squares.sum::<f64>() / left
-        } else {
-            f64::INFINITY
+        let squares: f64 = squares.sum();
+        Some(match () {
+            () if left <= 0.5 => f64::INFINITY,
+            () if squares == 0.0 => self.rounding.powi(2),
+            () => squares / left,
         })
     }
 }

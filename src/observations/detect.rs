@@ -81,13 +81,14 @@ fn signs(format: &TableFormat) -> impl Iterator<Item = (char, char)> + use<> {
     })
 }
 
-/// The first lines of a text.
+/// The first lines of a text, one at least.
 fn beginning(text: &str) -> &str {
-    match text.as_bytes().get(..SAMPLE) {
-        Some(bytes) => match bytes.iter().rposition(|&b| b == b'\n') {
-            Some(end) => &text[..=end],
-            None => text,
-        },
+    let Some(sample) = text.as_bytes().get(..SAMPLE) else {
+        return text;
+    };
+    let last = sample.iter().rposition(|&b| b == b'\n');
+    match last.or_else(|| text.find('\n')) {
+        Some(end) => &text[..=end],
         None => text,
     }
 }

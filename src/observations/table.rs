@@ -11,10 +11,10 @@ use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
 use super::rows::{Source, with_newlines};
 use crate::error::{InputError, Place};
-use crate::input::{listed, quote, read_bytes, read_bytes_from};
+use crate::input::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
 
-/// Longest table that is read, in bytes: some ten million rows, which fit into memory.
-const LONGEST_TABLE: u64 = 1 << 30;
+/// Most columns: each takes some hundred bytes, whatever its fields take.
+const MOST_COLUMNS: usize = 10_000;
 
 /// What a table should be, in messages.
 const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
@@ -199,6 +199,7 @@ impl Table {
         format.check()?;
         let (text, encoding) = decode(path, bytes)?;
         let text = with_newlines(text);
+        check_lines(path, &text)?;
         let layout = detect(path, &text, format);
         let skipped = format.skip.unwrap_or(0);
         let mut table = Self {
@@ -227,6 +228,7 @@ impl Table {
         let mut count = 0;
         while let Some(line) = rows.read(&mut fields)? {
             let row = Some(count);
+            check_width(&path, line, fields.len())?;
             if row == layout.header {
                 check_headers(&path, line, &fields, layout.decimal)?;
                 self.headers = fields.iter().map(str::to_owned).collect();
@@ -307,6 +309,21 @@ fn empty(path: &Path, skipped: usize) -> InputError {
         0 => error,
         lines => error.found(format!("nothing after the {lines} lines that are skipped")),
     }
+}
+
+/// A row with more fields than any table has.
+fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError> {
+    if fields <= MOST_COLUMNS {
+        return Ok(());
+    }
+    let place = Place::Line {
+        file: path.to_path_buf(),
+        line,
+        column: 1,
+    };
+    Err(InputError::new(place, "the table has too many columns")
+        .found(format!("{fields} fields"))
+        .expected(format!("at most {MOST_COLUMNS}")))
 }
 
 /// Column names: each once, and not all numbers.

@@ -1,12 +1,10 @@
 //! Tables that a run wrote, read back.
 
 use crate::error::{InputError, Place};
-use crate::input::{one_of, quote, read_text};
+use crate::input::{LONGEST_TABLE, check_lines, one_of, quote, read_text};
 use crate::near::did_you_mean;
 use std::path::{Path, PathBuf};
 
-/// Longest table of a run that is read, bytes.
-const LONGEST: u64 = 1 << 30;
 const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
 /// A table that a run wrote: unlike a user's, it may have no rows and empty fields, and every field
@@ -25,7 +23,8 @@ impl Columns {
     /// If there is no such file, or a row has another number of fields than the header, or a field that
     /// is neither empty nor a number.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let text = read_text(path, TABLE, LONGEST)?;
+        let text = read_text(path, TABLE, LONGEST_TABLE)?;
+        check_lines(path, &text)?;
         let mut lines = text.lines();
         let header = lines.next().filter(|header| !header.is_empty());
         let header = header.ok_or_else(|| {

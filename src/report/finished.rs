@@ -7,6 +7,7 @@ use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::input::read_text;
 use crate::solvers::Row;
+use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -162,7 +163,7 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
                 .expected("the result of a run that found one"),
         );
     }
-    serde_json::from_value(value.clone()).map_err(|error| {
+    ResultDocument::deserialize(value).map_err(|error| {
         InputError::file(&path, "the result is not complete")
             .found(error)
             .expected("a result written by `kmcfit fit`")

@@ -130,6 +130,19 @@ impl Journal {
         self.done.contains_key(name)
     }
 
+    /// Forgets a piece that is not as it must be, so that it is computed again.
+    pub fn forget_unless<T: DeserializeOwned>(
+        &mut self,
+        name: &str,
+        is_right: impl Fn(&T) -> bool,
+    ) {
+        let kept = self.done.get(name).cloned();
+        let read = kept.and_then(|kept| serde_json::from_value(kept).ok());
+        if !read.as_ref().is_some_and(is_right) {
+            self.done.remove(name);
+        }
+    }
+
     /// The result of a piece: as it was kept, or computed now and kept; nothing if it is not `whole`
     /// after it was computed.
     ///

@@ -233,3 +233,24 @@ fn a_record_at_rest() {
     assert!(stdout.contains("the readings see 0 of"), "{stdout}");
     assert!(!stdout.contains("NaN"), "{stdout}");
 }
+
+/// A journal that somebody changed costs the pieces that were changed, and no panic.
+#[test]
+fn a_journal_of_another_shape() {
+    let bench = Workbench::with_shipped_models();
+    let run = ["study", "models/linear-mass.yaml", "--out", "run"];
+    bench.run_to(0, &run);
+    let (journal, study) = (
+        bench.read("run/study.journal"),
+        bench.read("run/study.json"),
+    );
+    for (from, to) in [
+        ("\"parameters\":[", "\"parameters\":[1.0,"),
+        ("\"sigmas\":[", "\"sigmas\":[1.0,"),
+    ] {
+        assert!(journal.contains(from), "{from}");
+        bench.write("run/study.journal", &journal.replacen(from, to, 1));
+        bench.run_to(0, &["resume", "run"]);
+        assert_eq!(bench.read("run/study.json"), study, "{from}");
+    }
+}

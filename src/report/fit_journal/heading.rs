@@ -2,14 +2,12 @@
 
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::input::read_bytes;
+use crate::input::{LONGEST_TABLE, read_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Version of the format.
 pub(super) const FORMAT: u32 = 1;
-/// Longest file that is looked at: that of a table.
-const LONGEST: u64 = 1 << 30;
 
 /// What the journal of a fit is about.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +43,7 @@ impl FitHeading {
             hash: hash(file.text.as_bytes()),
         }];
         for path in file.data_files() {
-            let bytes = read_bytes(&path, "a file of readings", LONGEST);
+            let bytes = read_bytes(&path, "a file of readings", LONGEST_TABLE);
             sources.push(Source {
                 file: path,
                 hash: bytes.map_or("not read".into(), |bytes| hash(&bytes)),

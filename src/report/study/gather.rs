@@ -60,6 +60,18 @@ pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
     }
 }
 
+/// Whether a fit that was kept has the shape of this problem's: a journal may be damaged.
+pub fn is_of(problem: &Problem, fit: &FitPiece) -> bool {
+    let lengths = [fit.parameters.len(), fit.weights.len(), fit.sigmas.len()];
+    let expected = [
+        problem.parameters(),
+        problem.penalties.len(),
+        problem.channels().count(),
+    ];
+    let is_positive = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
+    lengths == expected && fit.sigmas.iter().flatten().all(is_positive)
+}
+
 /// The problem with the sigmas that the fit estimated and the weights that it chose.
 pub fn as_fitted(problem: &Problem, fit: &FitPiece) -> Problem {
     let mut problem = problem.clone();

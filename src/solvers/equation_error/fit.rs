@@ -42,9 +42,11 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
             counts.qp = u64::from(minimum.program.is_some());
             let point = cost.point(minimum.parameters.clone());
             let device = &point.evaluation.device;
-            let reason = reason(problem, &minimum, device.mass.iter().all(|m| *m > 0.0));
+            let has_mass = device.mass.iter().all(|m| *m > 0.0);
+            let reason = reason(problem, &minimum, has_mass);
             let status = match minimum.program {
                 Some(ConicStatus::Almost) => Status::Stalled,
+                _ if !has_mass => Status::Infeasible,
                 _ => Status::Converged,
             };
             (Outcome::new(status, reason), Some(point))
@@ -88,7 +90,9 @@ fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> String {
     };
     let but = match has_mass {
         true => "",
-        false => "; its mass is not positive at all times, so the device has no motion",
+        false => {
+            "; its mass is not positive at all times, so no device moves so: give the mass a `min`"
+        }
     };
     format!("the equation error is convex, and its minimum was found by {how}{but}")
 }

@@ -1,0 +1,202 @@
+//! Inputs that are nearly right: changes to those of the corpus, drawn by a generator with a fixed seed.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeSet;
+
+/// Longest input that is made.
+const LONGEST: usize = 1 << 15;
+/// Seeds that are longer are only run as they are.
+const LONGEST_SEED: usize = 1 << 14;
+/// Most changes of one input.
+const CHANGES: usize = 6;
+
+/// Numbers that are hard on readers.
+const NUMBERS: &[&str] = &[
+    "0",
+    "-0",
+    "-1",
+    "1",
+    "2",
+    "1e18",
+    "1e-18",
+    "1e999",
+    "-1e999",
+    "1e308",
+    "1e-308",
+    "5e-324",
+    ".nan",
+    ".inf",
+    "-.inf",
+    "NaN",
+    "inf",
+    "null",
+    "9223372036854775807",
+    "18446744073709551615",
+    "18446744073709551616",
+    "-9223372036854775808",
+    "4294967296",
+    "1000000000000",
+    "400",
+    "0x10",
+    "1_0",
+    "2e3",
+    "1,5",
+    "1.",
+    ".5",
+    "0.1",
+    "1e",
+    "--",
+    "",
+];
+
+/// Pieces of the formats.
+const PIECES: &[&str] = &[
+    "{",
+    "}",
+    "[",
+    "]",
+    ":",
+    ": ",
+    "- ",
+    ",",
+    ";",
+    "\n",
+    "\r",
+    "\r\n",
+    "\t",
+    " ",
+    "  ",
+    "\"",
+    "'",
+    "&a ",
+    "*a",
+    "!t ",
+    "!!float ",
+    "#",
+    "---\n",
+    "...\n",
+    "|\n",
+    ">\n",
+    "? ",
+    "<<: ",
+    "~",
+    "\u{feff}",
+    "\0",
+    "%",
+    "@",
+    "\\",
+    "`",
+    "é",
+    "../../..",
+    "/dev/zero",
+    "estimate",
+    "auto",
+    "[[[[",
+    "]]]]",
+    "true",
+    "nan",
+];
+
+/// Makes inputs.
+pub struct Mutator {
+    random: ChaCha8Rng,
+    seeds: Vec<Vec<u8>>,
+    words: Vec<Vec<u8>>,
+}
+
+impl Mutator {
+    pub fn new(mut seeds: Vec<Vec<u8>>) -> Self {
+        seeds.retain(|seed| seed.len() <= LONGEST_SEED);
+        let is_word = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-');
+        let words = seeds.iter().flat_map(|seed| seed.split(|b| !is_word(b)));
+        let words: BTreeSet<&[u8]> = words.filter(|w| (2..30).contains(&w.len())).collect();
+        Self {
+            random: ChaCha8Rng::seed_from_u64(1),
+            words: words.into_iter().map(<[u8]>::to_vec).collect(),
+            seeds,
+        }
+    }
+
+    /// The next input.
+    pub fn next(&mut self) -> Vec<u8> {
+        let which = self.below(self.seeds.len());
+        let mut bytes = self.seeds[which].clone();
+        for _ in 0..=self.below(CHANGES) {
+            self.change(&mut bytes);
+        }
+        bytes.truncate(LONGEST);
+        bytes
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        self.random.random_range(0..end.max(1))
+    }
+
+    fn change(&mut self, bytes: &mut Vec<u8>) {
+        let at = self.below(bytes.len() + 1);
+        let length = 1 + self.below(8);
+        let end = (at + length).min(bytes.len());
+        match self.below(9) {
+            0 if at < bytes.len() => bytes[at] ^= 1 << self.below(8),
+            1 if at < bytes.len() => bytes[at] = self.random.next_u32() as u8,
+            2 => drop(bytes.drain(at..end)),
+            3 => {
+                let piece = PIECES[self.below(PIECES.len())];
+                bytes.splice(at..at, piece.bytes());
+            }
+            4 => self.other_number(bytes, at),
+            5 => self.other_word(bytes, at),
+            6 => self.splice(bytes, at),
+            7 => self.twice(bytes, at),
+            _ => bytes.truncate(at),
+        }
+    }
+
+    /// Another number in the place of the next one.
+    fn other_number(&mut self, bytes: &mut Vec<u8>, at: usize) {
+        let number = NUMBERS[self.below(NUMBERS.len())];
+        let is_part = |b: &u8| b.is_ascii_digit() || b".+-e".contains(b);
+        let Some(begin) = bytes[at..].iter().position(u8::is_ascii_digit) else {
+            return;
+        };
+        let begin = at + begin;
+        let length = bytes[begin..].iter().position(|b| !is_part(b));
+        let end = length.map_or(bytes.len(), |length| begin + length);
+        bytes.splice(begin..end, number.bytes());
+    }
+
+    /// Another word of the corpus in the place of the next one.
+    fn other_word(&mut self, bytes: &mut Vec<u8>, at: usize) {
+        if self.words.is_empty() {
+            return;
+        }
+        let which = self.below(self.words.len());
+        let Some(begin) = bytes[at..].iter().position(u8::is_ascii_alphabetic) else {
+            return;
+        };
+        let begin = at + begin;
+        let length = bytes[begin..]
+            .iter()
+            .position(|b| !b.is_ascii_alphanumeric());
+        let end = length.map_or(bytes.len(), |length| begin + length);
+        bytes.splice(begin..end, self.words[which].iter().copied());
+    }
+
+    /// Some lines of another input.
+    fn splice(&mut self, bytes: &mut Vec<u8>, at: usize) {
+        let which = self.below(self.seeds.len());
+        let (from, length) = (self.below(self.seeds[which].len()), 1 + self.below(200));
+        let other = &self.seeds[which];
+        let piece = other[from..(from + length).min(other.len())].to_vec();
+        bytes.splice(at..at, piece);
+    }
+
+    /// A piece several times.
+    fn twice(&mut self, bytes: &mut Vec<u8>, at: usize) {
+        let end = (at + 1 + self.below(60)).min(bytes.len());
+        let times = 1 + self.below(20);
+        let piece = bytes[at..end].repeat(times);
+        bytes.splice(at..at, piece);
+    }
+}

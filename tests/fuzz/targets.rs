@@ -1,0 +1,397 @@
+//! What is fuzzed, as plain functions of bytes: each reads its input as the program would, and whatever
+//! the bytes are, it must come back with a value or a message. The tests run them over the corpus and
+//! over mutations of it; `fuzz/` drives the same functions.
+
+use kmcfit::Run;
+use kmcfit::config::scalar::{Count, Nodes};
+use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::dynamics::State;
+use kmcfit::error::InputError;
+use kmcfit::observations::{ColumnName, Table, TableFormat, times};
+use kmcfit::report::study::StudyDocument;
+use kmcfit::report::{
+    CHECKPOINT, FIT_JOURNAL, FitHeading, FitJournal, FittedModel, Heading, JOURNAL, Journal, Known,
+    OutputFolder, json, predict,
+};
+use kmcfit::solvers::{Fit, Watch, fit_with_noise_watched};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use tempfile::TempDir;
+
+/// A function that is fuzzed.
+pub type Target = fn(&[u8]);
+
+/// All of them, by the names of their folders in the corpus.
+pub const TARGETS: [(&str, Target); 5] = [
+    ("model", model),
+    ("table", table),
+    ("run", run),
+    ("fit_journal", fit_journal),
+    ("study_journal", study_journal),
+];
+
+/// Nodes beyond which a model is built on fewer: what a model asks for takes time, and is no fault.
+const MANY_NODES: usize = 300;
+/// Nodes beyond which no machine has the memory: refused, so left as they are.
+const TOO_MANY_NODES: usize = 1_000_000_000;
+/// Lines that are kept of each file of readings.
+const LINES: usize = 60;
+
+const METHODS: [&str; 4] = [
+    "lbfgs",
+    "gauss-newton",
+    "projected-gradient",
+    "steepest-descent",
+];
+
+/// Names, models and readings that the targets work on.
+struct Workshop {
+    folder: TempDir,
+    /// A model and what it fits, for each method.
+    fits: Vec<(FitHeading, Model)>,
+}
+
+impl Workshop {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}
+
+/// The workshop: the shipped readings, cut short, and a finished run.
+fn workshop() -> &'static Workshop {
+    static WORKSHOP: OnceLock<Workshop> = OnceLock::new();
+    WORKSHOP.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let shipped = match shipped.join("data").is_dir() {
+            true => shipped.join("data"),
+            false => shipped.join("../data"),
+        };
+        for name in ["data", "models", "run", "fit", "study"] {
+            fs::create_dir(folder.path().join(name)).expect("a folder");
+        }
+        for entry in fs::read_dir(shipped).expect("the folder of readings") {
+            let path = entry.expect("an entry").path();
+            let text = fs::read(&path).expect("readings");
+            let lines: Vec<&[u8]> = text.split_inclusive(|b| *b == b'\n').take(LINES).collect();
+            let name = path.file_name().expect("a name");
+            fs::write(folder.path().join("data").join(name), lines.concat()).expect("room");
+        }
+        let fits = METHODS.map(|method| small(folder.path(), method));
+        let workshop = Workshop {
+            folder,
+            fits: fits.into(),
+        };
+        finish(&workshop);
+        workshop
+    })
+}
+
+/// A small problem.
+fn small(folder: &Path, method: &str) -> (FitHeading, Model) {
+    let text = format!(
+        "format: 1\ntitle: Small\nexperiments:\n  - {{data: ../data/paper.csv, sigma: {{displacement: 0.1}}, \
+         initial: {{displacement: 3.3, velocity: 1.0}}}}\ngrid: {{method: midpoint}}\nfunctions:\n  \
+         mass: {{basis: polynomial, degree: 1, start: 2.0, min: 0.1}}\n  damping: {{basis: constant, \
+         start: 1.0}}\n  stiffness: {{fixed: 1.0}}\nfit: {{method: {method}, \
+         stop: {{iterations: 5}}}}\n"
+    );
+    let text = match method {
+        "lbfgs" | "steepest-descent" => text.replace(", min: 0.1", ""),
+        _ => text,
+    };
+    let file = ModelFile::parse(folder.join("models/m.yaml"), text).expect("a model");
+    let heading = FitHeading {
+        format: 1,
+        version: String::new(),
+        model: "m.yaml".into(),
+        figures: false,
+        // Making files durable takes most of the time.
+        checkpoint: Some(1e9),
+        sources: Vec::new(),
+    };
+    (heading, build(&file, Purpose::Fit).expect("a problem"))
+}
+
+/// Fits a model, keeping a journal.
+fn fitted(model: &Model, journal: &mut FitJournal) -> Fit {
+    let start = model.problem.start();
+    let mut observe = |_: &_| {};
+    let mut watch = Watch::new(&mut observe).keeping(journal);
+    let found = fit_with_noise_watched(&model.problem, &start, &model.settings, &mut watch);
+    found.expect("a motion").1
+}
+
+/// Writes the finished run.
+fn finish(workshop: &Workshop) {
+    let (heading, model) = &workshop.fits[0];
+    let mut journal = FitJournal::begin(&workshop.path("fit"), heading).expect("room");
+    let fit = fitted(model, &mut journal);
+    let known = Known::of(model, &fit);
+    let finished = FittedModel {
+        model,
+        fit: &fit,
+        predictions: &[],
+        weights: None,
+        known: &known,
+    };
+    let folder = OutputFolder::prepare(&workshop.path("run")).expect("a folder");
+    let mut stage = folder.stage().expect("room");
+    let document = finished.document();
+    finished
+        .write(&mut stage, &document, false)
+        .expect("a run is written");
+    stage.commit_run(&json(&document)).expect("a run");
+}
+
+/// Inputs that the program itself makes, for the targets whose files hold what depends on the build.
+pub fn made(target: &str) -> Vec<Vec<u8>> {
+    let workshop = workshop();
+    match target {
+        "run" => [
+            "result.json",
+            "functions.csv",
+            "history.csv",
+            "trajectory.csv",
+        ]
+        .map(|name| fs::read(workshop.path("run").join(name)).expect("a run"))
+        .into(),
+        "fit_journal" => (METHODS.iter().zip(&workshop.fits))
+            .map(|(method, (heading, model))| {
+                let folder = workshop.path("fit");
+                let heading = FitHeading {
+                    checkpoint: Some(0.0),
+                    ..heading.clone()
+                };
+                let mut journal = FitJournal::begin(&folder, &heading).expect("room");
+                fitted(model, &mut journal);
+                let read = |name| fs::read_to_string(folder.join(name)).expect("a journal");
+                let (journal, checkpoint) = (read(FIT_JOURNAL), read(CHECKPOINT));
+                let rows = journal.split_once('\n').expect("lines").1;
+                let standing = checkpoint.split_once(',').expect("keys").1;
+                format!("{method}\n{rows}{SEPARATOR}{standing}").into_bytes()
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Between a journal and a checkpoint.
+const SEPARATOR: &str = "---\n";
+
+/// A message is one of text, and begins with the place.
+fn told(error: &InputError) {
+    let text = error.to_string();
+    assert!(!text.is_empty());
+    let is_odd = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    assert!(!text.contains(is_odd), "{text:?}");
+}
+
+/// A model file: taken apart, built for every purpose, and evaluated once.
+pub fn model(bytes: &[u8]) {
+    let place = workshop().path("models/m.yaml");
+    let text = String::from_utf8_lossy(bytes);
+    let mut file = match ModelFile::parse(&place, text) {
+        Ok(file) => file,
+        Err(error) => return told(&error),
+    };
+    file.data_files();
+    if let Some(grid) = &mut file.spec.grid
+        && let Some(Nodes::Count(count)) = &mut grid.nodes
+        && (MANY_NODES..TOO_MANY_NODES).contains(&count.0)
+    {
+        *count = Count(MANY_NODES);
+    }
+    let purposes = [
+        Purpose::Fit,
+        Purpose::Check { nodes: None },
+        Purpose::Simulate { nodes: Some(21) },
+    ];
+    for purpose in purposes {
+        match build(&file, purpose) {
+            Err(error) => told(&error),
+            Ok(model) => {
+                let start = model.problem.start();
+                assert!(start.iter().all(|x| x.is_finite()));
+                if let Ok(evaluation) = model.problem.evaluate(&start) {
+                    assert!(evaluation.cost.is_finite());
+                }
+            }
+        }
+    }
+}
+
+/// A table in any format.
+pub fn table(bytes: &[u8]) {
+    let any = TableFormat::default();
+    let formats = [
+        TableFormat {
+            delimiter: Some(' '),
+            units_row: Some(true),
+            ..any
+        },
+        TableFormat {
+            decimal: Some(','),
+            skip: Some(2),
+            ..any
+        },
+        TableFormat {
+            header: Some(false),
+            units_row: Some(true),
+            ..any
+        },
+        TableFormat {
+            header: Some(true),
+            ..any
+        },
+    ];
+    for format in [any, formats[bytes.len() % formats.len()]] {
+        match Table::parse_with("t.csv", bytes, &format) {
+            Err(error) => told(&error),
+            Ok(table) => columns(&table),
+        }
+    }
+}
+
+fn columns(table: &Table) {
+    assert!(table.rows() > 0 && table.rows() == table.lines().len());
+    assert!(table.lines().is_sorted());
+    for index in 0..table.width().min(20) {
+        assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
+        table.unit(index);
+        if let Ok(readings) = table.readings(index) {
+            assert_eq!(readings.len(), table.rows());
+        }
+    }
+    for name in table.headers().iter().take(20) {
+        if let Err(error) = times::equally_spaced(table, name) {
+            told(&error);
+        }
+    }
+}
+
+/// A file of a finished run, in the place of the right one: which it is, is told from its beginning.
+pub fn run(bytes: &[u8]) {
+    let folder = workshop().path("run");
+    let head = &bytes[..bytes.len().min(64)];
+    let has = |word: &str| head.windows(word.len()).any(|w| w == word.as_bytes());
+    let name = match () {
+        () if has("{") => "result.json",
+        () if has("iter") => "history.csv",
+        () if has("mass") => "functions.csv",
+        () => "trajectory.csv",
+    };
+    let path = folder.join(name);
+    let right = fs::read(&path).expect("a run");
+    fs::write(&path, bytes).expect("room");
+    let opened = Run::open(&folder);
+    fs::write(&path, right).expect("room");
+    match opened {
+        Err(error) => told(&error),
+        Ok(run) => {
+            let state = State {
+                displacement: 1.0,
+                velocity: 0.0,
+            };
+            let _ = predict(&run.oscillator, &run.device, run.truth.as_ref(), &[state]);
+            run.band("mass");
+        }
+    }
+}
+
+/// What a fit left that was killed: the name of a method, the lines of its journal behind the heading, and
+/// its checkpoint behind the beginning, which names the fit. The fit goes on from it to a named end.
+pub fn fit_journal(bytes: &[u8]) {
+    let folder = workshop().path("fit");
+    let text = bytes.to_vec();
+    let method = METHODS.iter().position(|m| text.starts_with(m.as_bytes()));
+    let body: Vec<u8> = match text.iter().position(|b| *b == b'\n') {
+        Some(end) => text[end + 1..].to_vec(),
+        None => text,
+    };
+    let mark = SEPARATOR.as_bytes();
+    let cut = body.windows(mark.len()).position(|w| w == mark);
+    let (rows, standing) = match cut {
+        Some(at) => (&body[..at], &body[at + mark.len()..]),
+        None => (&body[..], &[][..]),
+    };
+    let (heading, model) = &workshop().fits[method.unwrap_or(0)];
+    drop(FitJournal::begin(&folder, heading).expect("room"));
+    let append = |name: &str, begin: Vec<u8>, rest: &[u8]| {
+        fs::write(folder.join(name), [&begin, rest].concat()).expect("room");
+    };
+    let begin = fs::read(folder.join(FIT_JOURNAL)).expect("a heading");
+    append(FIT_JOURNAL, begin, rows);
+    append(CHECKPOINT, beginning(heading), standing);
+    match FitJournal::go_on(&folder, heading) {
+        Err(error) => told(&error),
+        Ok(mut journal) => {
+            let found = fitted(model, &mut journal);
+            assert!(found.best.evaluation.cost.is_finite());
+            assert!(found.best.evaluation.device.mass.iter().all(|m| *m > 0.0));
+        }
+    }
+}
+
+/// How a checkpoint of a fit begins: with the hash (FNV-1a) of its heading.
+fn beginning(heading: &FitHeading) -> Vec<u8> {
+    let text = serde_json::to_string(heading).expect("a heading");
+    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("{{\"fit\":\"{hash:016x}\",").into_bytes()
+}
+
+/// The lines of a study's journal behind the heading: what is kept is told and drawn.
+pub fn study_journal(bytes: &[u8]) {
+    let folder = workshop().path("study");
+    let heading = Heading {
+        format: 1,
+        model: "m.yaml".into(),
+        fingerprint: "0".into(),
+    };
+    let mut text = serde_json::to_vec(&heading).expect("a heading");
+    text.push(b'\n');
+    text.extend_from_slice(bytes);
+    fs::write(folder.join(JOURNAL), text).expect("room");
+    let mut journal = match Journal::go_on(&folder, &heading) {
+        Ok(journal) => journal,
+        Err(error) => return told(&error),
+    };
+    let mut document = StudyDocument {
+        fit: kept::<Result<_, String>>(&mut journal, "fit").and_then(Result::ok),
+        spectrum: kept(&mut journal, "spectrum"),
+        bands: kept(&mut journal, "bands"),
+        candidates: kept(&mut journal, "candidates").unwrap_or_default(),
+        equivalents: kept(&mut journal, "equivalents").unwrap_or_default(),
+        multistart: kept(&mut journal, "starts"),
+        ..StudyDocument::default()
+    };
+    let profile = kept::<Result<_, String>>(&mut journal, "profile 0");
+    document.profiles.extend(profile.and_then(Result::ok));
+    if let Some(Ok(varies)) = kept::<Result<_, String>>(&mut journal, "varies") {
+        document.varies = varies;
+    }
+    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "refits") {
+        document.bootstrap = refits;
+    }
+    if let Some((tubes, predictions)) = kept(&mut journal, "tubes") {
+        document.tubes = tubes;
+        document.predictions = predictions;
+    }
+    document.text();
+    let out = OutputFolder::prepare(&folder).expect("a folder");
+    document.write(&out).expect("room");
+}
+
+fn kept<T: Serialize + DeserializeOwned>(journal: &mut Journal, name: &str) -> Option<T> {
+    let none = || -> Option<T> { None };
+    let has = journal.has(name);
+    match has {
+        true => journal.piece(name, none, || false).ok().flatten().flatten(),
+        false => None,
+    }
+}

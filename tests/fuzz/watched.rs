@@ -1,0 +1,89 @@
+//! Runs inputs, and watches what they take.
+
+use crate::targets::Target;
+use peak_alloc::PeakAlloc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// One target at a time: memory is counted for the whole program.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// No input takes a second; one that takes so long hangs.
+const HANGS: Duration = Duration::from_secs(60);
+
+/// Memory that reading may take at once: so many bytes for each of the input, and besides so many for what
+/// does not depend on it. Both are stated in the README.
+const PER_BYTE: usize = 256;
+const BESIDES: usize = 128 << 20;
+
+/// What an input took, in bytes, if it came back.
+type Taken = Option<usize>;
+
+/// A target whose inputs are run one by one on a thread of their own.
+pub struct Watched {
+    inputs: Sender<Vec<u8>>,
+    taken: Receiver<Taken>,
+    count: usize,
+    /// The most that one took.
+    most: (usize, String),
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Watched {
+    pub fn new(name: &str, target: Target) -> Self {
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let (inputs, received) = channel::<Vec<u8>>();
+        let (told, taken) = channel();
+        let run = move || {
+            for bytes in received {
+                let before = MEMORY.current_usage();
+                MEMORY.reset_peak_usage();
+                let held = std::panic::catch_unwind(|| target(&bytes));
+                let most = MEMORY.peak_usage().saturating_sub(before);
+                if told.send(held.ok().map(|()| most)).is_err() {
+                    return;
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name(name.to_owned());
+        thread.spawn(run).expect("a thread");
+        Self {
+            inputs,
+            taken,
+            count: 0,
+            most: (0, String::new()),
+            _alone: alone,
+        }
+    }
+
+    /// Runs an input, which must come back in time, without a panic, and without too much memory.
+    pub fn hold(&mut self, name: &str, bytes: Vec<u8>) {
+        let length = bytes.len();
+        let shown = String::from_utf8_lossy(&bytes[..length.min(4000)]).into_owned();
+        self.inputs.send(bytes).expect("the thread lives");
+        let taken = self.taken.recv_timeout(HANGS);
+        let taken = taken.unwrap_or_else(|_| panic!("{name} hangs:\n{shown}"));
+        let taken = taken.unwrap_or_else(|| panic!("{name} panics:\n{shown}"));
+        let most = PER_BYTE * length + BESIDES;
+        assert!(
+            taken <= most,
+            "{name} takes {taken} bytes of {most}:\n{shown}"
+        );
+        self.count += 1;
+        if taken > self.most.0 {
+            self.most = (taken, name.to_owned());
+        }
+    }
+
+    pub fn told(&self) -> String {
+        let (most, name) = &self.most;
+        format!(
+            "{} inputs; the most memory, {most} bytes, for {name}",
+            self.count
+        )
+    }
+}
