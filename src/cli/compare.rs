@@ -26,6 +26,17 @@ pub struct Arguments {
     json: bool,
 }
 
+impl Arguments {
+    /// A comparison of models in a folder.
+    pub(super) fn of(runs: Vec<PathBuf>, out: PathBuf) -> Self {
+        Self {
+            runs,
+            out,
+            json: false,
+        }
+    }
+}
+
 /// One argument, read and found usable.
 pub(super) enum Entry {
     /// To be fitted into a folder.

@@ -1,8 +1,8 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, exit_code, interrupt, print, stem, unwritable};
-use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
+use super::{Failure, Overrides, exit_code, interrupt, print, stem, unwritable};
+use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
@@ -27,6 +27,8 @@ pub struct Arguments {
     /// Folder for the results [default: runs/NAME].
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    set: Overrides,
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
@@ -58,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .expected("a number of seconds, 0 (after every iteration) or greater")
         .into());
     }
-    let file = ModelFile::read(&arguments.model)?;
+    let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
     let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint);
     let flag = interrupt::flag();
@@ -82,7 +84,7 @@ pub(super) fn begun(folder: &OutputFolder, heading: &FitHeading) -> Result<FitJo
 
 /// Goes on with a fit that did not come to its end.
 pub(super) fn go_on(place: &Path, heading: &FitHeading, printed: &Printed) -> Result<u8, Failure> {
-    let file = ModelFile::read(&heading.model)?;
+    let file = ModelFile::read_with(&heading.model, &Override::parse_all(&heading.overrides)?)?;
     let model = build(&file, Purpose::Fit)?;
     let now = FitHeading::new(&file, heading.figures, heading.checkpoint);
     let flag = interrupt::flag();
