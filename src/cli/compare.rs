@@ -161,7 +161,7 @@ impl Compared {
             eprintln!("warning: {name}: {warning}");
         }
         model.settings.interrupt = Some(Arc::clone(flag));
-        let progress = Progress::new(model.settings.stopping.iterations).named(name);
+        let progress = Progress::new(&model.settings.stopping).named(name);
         match fit_into(folder, &model, &progress, true, journal) {
             Ok((_, status)) => {
                 self.interrupted |= status == Status::Interrupted;

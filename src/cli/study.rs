@@ -379,7 +379,7 @@ impl Work<'_> {
     /// The fit, from the journal if it is there; `None` if it was interrupted.
     fn fit(&mut self) -> Result<Option<(Problem, Vec<f64>, Evaluation)>, Trouble> {
         let model = self.model;
-        let progress = Progress::new(model.settings.stopping.iterations);
+        let progress = Progress::new(&model.settings.stopping);
         let (folder, heading, go_on) = (self.folder, &self.heading, self.go_on);
         let flag = Arc::clone(&self.flag);
         let mut interrupted = None;

@@ -107,16 +107,18 @@ impl Override {
                 list.get_mut(*index).ok_or_else(|| {
                     self.error(format!("the list {} has no such element", above()))
                         .found(format!("position {index}"))
-                        .expected(format!("0 to {last}"))
+                        .expected(match last {
+                            0 => "the position 0".to_owned(),
+                            _ => format!("a position from 0 to {last}"),
+                        })
                 })
             }
-            (Value::Sequence(list), Segment::Key(key)) => {
-                let last = list.len().saturating_sub(1);
+            (Value::Sequence(_), Segment::Key(key)) => {
                 let example = format!("{}.0.{key}", above());
                 Err(self
                     .error(format!("{} is a list", above()))
                     .found(quote(key))
-                    .expected(format!("a position from 0 to {last}: {example}")))
+                    .expected(format!("a position, as in {example}")))
             }
             (Value::Mapping(_), Segment::Index(index)) => Err(self
                 .error(format!("{} is a map", above()))
@@ -127,7 +129,7 @@ impl Override {
                     "{} is one value in this model, with no keys below it",
                     above()
                 ))
-                .expected(format!("{}={{…}}, which replaces it", above()))),
+                .expected(format!("{}=VALUE, which replaces it", above()))),
         }
     }
 

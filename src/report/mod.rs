@@ -16,6 +16,7 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
+mod advice;
 mod axis;
 mod columns;
 pub mod compare;
@@ -44,6 +45,7 @@ mod shape;
 pub mod study;
 mod summary;
 pub mod svg;
+mod terminal;
 mod text;
 mod timings;
 
@@ -61,4 +63,5 @@ pub use predict::{PredictedMotion, predict};
 pub use run::{FittedModel, Known, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};
+pub use terminal::charts;
 pub use timings::{PartSummary, TimingsSummary};

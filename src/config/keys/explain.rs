@@ -66,8 +66,8 @@ fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
 fn entry(found: &Found, wanted: &str) -> String {
     let key = found.key;
     let mut paths: Vec<&str> = found.paths.iter().map(String::as_str).collect();
-    // The path that was asked for comes first.
-    paths.sort_by_key(|path| *path != wanted);
+    // The path that was asked for comes first, then the shortest.
+    paths.sort_by_key(|path| (*path != wanted, path.matches('.').count()));
     let mut text = format!("{}\n  {}\n", paths[0], key.text);
     let mut row = |name: &str, value: &str| {
         // Writing to a String cannot fail.

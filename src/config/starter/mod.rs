@@ -15,7 +15,7 @@ use std::path::Path;
 /// Damping ratio that the search starts from: that of a lightly damped structure.
 const DAMPING_RATIO: f64 = 0.02;
 /// Periods of the motion per knot of the stiffness: fewer do not show a value of their own.
-const PERIODS_PER_KNOT: f64 = 5.0;
+const PERIODS_PER_KNOT: f64 = 2.0;
 /// Most knots: enough to see that and how the stiffness changes.
 const MOST_KNOTS: f64 = 11.0;
 
@@ -117,6 +117,13 @@ fn text(
         format!("{{{}}}", sigmas.join(", ")),
         "standard deviation of a reading, SI; a number, if it is known",
     );
+    if columns.has(Role::Acceleration) {
+        line(
+            "    sensors: ",
+            "{acceleration: {offset: estimate}}".into(),
+            "accelerometers have one; leave it out if yours has none",
+        );
+    }
     line(
         "    initial: ",
         "estimate".into(),
@@ -128,7 +135,10 @@ fn text(
         "as many steps as the frequencies of the readings ask for",
     );
     text + &functions(columns, motion)
-        + "# truth: {data: …}                              # the true functions, where they are known\n"
+        + &commented(
+            "# truth: {data: truth.csv}",
+            "the true functions, where they are known",
+        )
         + &commented(
             "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
             "",
