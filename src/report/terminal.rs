@@ -199,7 +199,15 @@ mod tests {
         chart.scale(&[&model, &readings]);
         chart.line(&times, &model);
         chart.points(&times, &readings);
-        assert_snapshot!(chart.text(), @"");
+        assert_snapshot!(chart.text(), @"
+         3 │    ⡠⠔⠋⠉⠉⠓⢦⡀            o         ⡠⠖⠊⠉⠉⠒⠦⣀
+           │  ⡴⠊       ⠈⠢⡀                 ⢀⡴⠋       ⠈⠣⡀
+           │⡠⠊           ⠈⠢⡀              ⣠⠎           ⠈⢦⡀
+           │⠁              ⠙⢆           ⢀⠜⠁              ⠙⢄
+           │                ⠈⠳⣄       ⢀⠔⠁                  ⠑
+        -3 │                   ⠑⠦⣄⣀⣀⡤⠖⠉
+           0                                          9.95 s
+        ");
     }
 
     #[test]
@@ -207,7 +215,14 @@ mod tests {
         let mut chart = Chart::new(40, 5, &[0.0, 25.0]);
         chart.scale(&[&[2.0, 2.0]]);
         chart.line(&[0.0, 25.0], &[2.0, 2.0]);
-        assert_snapshot!(chart.text(), @"");
+        assert_snapshot!(chart.text(), @"
+        2 │
+          │
+          │⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒
+          │
+        2 │
+          0                        25 s
+        ");
         let mut empty = Chart::new(40, 5, &[]);
         empty.scale(&[&[f64::NAN]]);
         empty.line(&[f64::NAN], &[f64::NAN]);

@@ -19,7 +19,7 @@ fn keys_are_explained() {
       Shape of the function over time, and so what its free values are.
       kind     one of the words below
       example  basis: piecewise-linear
-      also     experiments.functions.mass.basis, experiments.functions.damping.basis, experiments.functions.stiffness.basis, experiments.functions.cubic_stiffness.basis and 9 more
+      also     functions.damping.basis, functions.stiffness.basis, functions.cubic_stiffness.basis, functions.quadratic_damping.basis and 9 more
 
       nodal               A free value at every node of the grid.
       constant            One value for all times.
@@ -287,14 +287,14 @@ fn mistakes_in_what_is_set() {
 
     error: --set experiments.sigma=1: experiments is a list
       found: `sigma`
-      expected: a position from 0 to 0: experiments.0.sigma
+      expected: a position, as in experiments.0.sigma
 
     error: --set experiments.3.sigma.displacement=1: the list experiments has no such element
       found: position 3
-      expected: 0 to 0
+      expected: the position 0
 
     error: --set title.en=a: title is one value in this model, with no keys below it
-      expected: title={…}, which replaces it
+      expected: title=VALUE, which replaces it
 
     error: --set fit.0=a: fit is a map
       found: position 0
