@@ -3,7 +3,7 @@
 use super::{Failure, OK, print, schema, unwritable};
 use crate::config::{ModelFile, starter};
 use crate::error::{InputError, Place};
-use crate::report::write_whole;
+use crate::report::{shell_quoted, write_whole};
 use std::path::{Component, Path, PathBuf};
 
 /// The schema that the comment in the first line of a model names.
@@ -57,8 +57,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         text += &format!("  {sentence}\n");
     }
     let place = out.display();
+    let argument = shell_quoted(&place.to_string());
     print(&format!(
-        "{text}the model is {place}; look at it, then\n  kmcfit check {place} --no-gradient\n  kmcfit fit {place}\n"
+        "{text}the model is {place}; look at it, then\n  kmcfit check {argument} --no-gradient\n  \
+         kmcfit fit {argument}\n"
     ));
     Ok(OK)
 }

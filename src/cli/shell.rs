@@ -56,18 +56,22 @@ fn page() -> io::Result<Vec<u8>> {
 fn section(command: &Command, page: &mut Vec<u8>) -> io::Result<()> {
     let man = Man::new(command.clone());
     page.extend(format!(".SS {}\n", command.get_name()).as_bytes());
+    let mut usage = Vec::new();
+    man.render_synopsis_section(&mut usage)?;
+    without_headings(&usage, page);
+    page.extend(b".PP\n");
     let mut body = Vec::new();
-    man.render_synopsis_section(&mut body)?;
     man.render_description_section(&mut body)?;
     man.render_options_section(&mut body)?;
-    // Its sections are paragraphs here.
-    let lines = body.split(|byte| *byte == b'\n');
+    without_headings(&body, page);
+    Ok(())
+}
+
+/// The lines of some sections, which are parts of one here.
+fn without_headings(sections: &[u8], page: &mut Vec<u8>) {
+    let lines = sections.split(|byte| *byte == b'\n');
     for line in lines.filter(|line| !line.starts_with(b".SH") && !line.is_empty()) {
         page.extend(line);
         page.push(b'\n');
-        if line.starts_with(b"\\fB") {
-            page.extend(b".PP\n");
-        }
     }
-    Ok(())
 }

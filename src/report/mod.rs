@@ -59,6 +59,7 @@ pub use finished::Run;
 pub use fit_journal::{CHECKPOINT, FIT_JOURNAL, FitHeading, FitJournal, Source};
 pub use journal::{Heading, JOURNAL, Journal};
 pub use mark::{Colour, Dash, Mark, Style};
+pub(crate) use page::shell_quoted;
 pub use predict::{PredictedMotion, predict};
 pub use run::{FittedModel, Known, json};
 pub use summary::{prediction_table, summary};

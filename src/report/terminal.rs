@@ -177,7 +177,7 @@ fn range(values: &[f64]) -> [f64; 2] {
 fn number(x: f64) -> String {
     let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
     let plain = format!("{rounded}");
-    match plain.len() <= MARGIN - 1 {
+    match plain.len() < MARGIN {
         true => plain,
         false => format!("{rounded:e}"),
     }

@@ -121,8 +121,8 @@ fn a_starter_says_what_was_found() {
       column `Weg_mm`: displacement, mm
       dominant frequency 159.6 Hz: 3 periods in the record
     the model is run 1/my data.yaml; look at it, then
-      kmcfit check run 1/my data.yaml --no-gradient
-      kmcfit fit run 1/my data.yaml
+      kmcfit check 'run 1/my data.yaml' --no-gradient
+      kmcfit fit 'run 1/my data.yaml'
     ");
     assert_snapshot!(bench.read("run 1/my data.yaml"), @r#"
     # yaml-language-server: $schema=kmcfit.schema.json

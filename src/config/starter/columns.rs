@@ -284,13 +284,13 @@ fn role_of(name: &str) -> Option<Role> {
         .split(['_', ' ', '[', '(', '/'])
         .next()
         .unwrap_or_default();
-    let means = |begin: &&str| match begin.len() {
-        1 => bare.starts_with(*begin) && bare.len() <= LONGEST_LETTER,
-        _ => bare.starts_with(*begin),
+    let means = |begin: &str| match begin.len() {
+        1 => bare.starts_with(begin) && bare.len() <= LONGEST_LETTER,
+        _ => bare.starts_with(begin),
     };
     let named = NAMES
         .iter()
-        .find(|(_, begins)| begins.iter().any(|b| means(&b)));
+        .find(|(_, begins)| begins.iter().any(|b| means(b)));
     named.map(|(role, _)| *role)
 }
 

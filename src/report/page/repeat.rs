@@ -69,8 +69,8 @@ fn block(text: &str) -> String {
     format!("<pre tabindex=\"0\"><code>{}</code></pre>\n", escape(text))
 }
 
-/// A path as a shell takes it.
-fn quoted(path: &str) -> String {
+/// A path or an argument as a shell takes it.
+pub fn quoted(path: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@=".contains(c) || !c.is_ascii();
     match !path.is_empty() && path.chars().all(plain) && !path.starts_with('-') {
         true => path.to_owned(),
