@@ -130,6 +130,7 @@ pub mod constraints;
 pub mod diagnostics;
 pub mod dynamics;
 pub mod error;
+mod excerpt;
 pub mod functions;
 pub mod identifiability;
 mod input;

@@ -55,10 +55,10 @@ fn readings() -> String {
         .forward(&device, start, Some(&excitation))
         .unwrap();
     let mut csv = String::from("t_s,f_N,displacement,velocity,acceleration\n");
-    for i in 0..NODES {
+    for (i, f) in force.iter().enumerate() {
         let (y, v) = (motion.displacement[i], motion.velocity[i]);
-        let a = (force[i] - 0.2 * v - 2.0 * y) / 1.2;
-        writeln!(csv, "{},{},{y},{v},{a}", grid.time(i), force[i]).unwrap();
+        let a = (f - 0.2 * v - 2.0 * y) / 1.2;
+        writeln!(csv, "{},{f},{y},{v},{a}", grid.time(i)).unwrap();
     }
     csv
 }

@@ -1,7 +1,7 @@
 //! `kmcfit check`
 
-use super::{Failure, NOT_CONVERGED, OK, print, say, unwritable};
-use crate::config::{Model, ModelFile, Purpose, build};
+use super::{Failure, NOT_CONVERGED, OK, Overrides, print, say, unwritable};
+use crate::config::{Model, Purpose, build};
 use crate::dynamics::Breakdown;
 use crate::objective::GradientKind;
 use crate::report::figures::{self, GradientCurve};
@@ -16,6 +16,8 @@ pub struct Arguments {
     /// Numbers of nodes to check at, separated by commas [default: the model's].
     #[arg(long, value_delimiter = ',', value_name = "N,N,...")]
     nodes: Vec<usize>,
+    #[command(flatten)]
+    set: Overrides,
     /// Only read and validate.
     #[arg(long)]
     no_gradient: bool,
@@ -78,7 +80,7 @@ impl Curve {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let file = ModelFile::read(&arguments.model)?;
+    let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
     for remark in &model.remarks {
         say("note", remark);

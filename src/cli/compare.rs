@@ -26,6 +26,17 @@ pub struct Arguments {
     json: bool,
 }
 
+impl Arguments {
+    /// A comparison of models in a folder.
+    pub(super) fn of(runs: Vec<PathBuf>, out: PathBuf) -> Self {
+        Self {
+            runs,
+            out,
+            json: false,
+        }
+    }
+}
+
 /// One argument, read and found usable.
 pub(super) enum Entry {
     /// To be fitted into a folder.
@@ -150,7 +161,7 @@ impl Compared {
             say("warning", format!("{name}: {warning}"));
         }
         model.settings.interrupt = Some(Arc::clone(flag));
-        let progress = Progress::new(model.settings.stopping.iterations).named(name);
+        let progress = Progress::new(&model.settings.stopping).named(name);
         match fit_into(folder, &model, &progress, true, journal) {
             Ok((_, status)) => {
                 self.interrupted |= status == Status::Interrupted;

@@ -1,19 +1,20 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, exit_code, interrupt, print, say, stem, unwritable};
-use crate::config::{Model, ModelFile, Purpose, WeightSearch, build};
+use super::{Failure, Overrides, exit_code, interrupt, print, say, stem, unwritable};
+use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, json, predict,
-    summary,
+    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, charts, json,
+    predict, summary,
 };
 use crate::solvers::{
     Fit, Keeper, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
     without_motion,
 };
+use console::Term;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -27,6 +28,8 @@ pub struct Arguments {
     /// Folder for the results [default: runs/NAME].
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    set: Overrides,
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
@@ -36,16 +39,23 @@ pub struct Arguments {
     /// Print where the time went.
     #[arg(long)]
     timings: bool,
+    /// Draw readings, fit and functions in the terminal.
+    #[arg(long, conflicts_with = "json")]
+    plot: bool,
     /// Least time between two checkpoints, from which `resume` goes on after the fit was killed [default:
     /// 1 s, and more where they take more than 2 % of the time].
     #[arg(long, value_name = "SECONDS")]
     checkpoint: Option<f64>,
 }
 
+/// Columns of a chart where there is no terminal.
+const PIPED: usize = 80;
+
 /// What is printed at the end.
 pub(super) struct Printed {
     pub json: bool,
     pub timings: bool,
+    pub plot: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
@@ -58,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .expected("a number of seconds, 0 (after every iteration) or greater")
         .into());
     }
-    let file = ModelFile::read(&arguments.model)?;
+    let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
     let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint);
     let flag = interrupt::flag();
@@ -69,6 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let printed = Printed {
         json: arguments.json,
         timings: arguments.timings,
+        plot: arguments.plot,
     };
     let journal = begun(&folder, &heading)?;
     run_in(&folder, model, flag, (heading.figures, journal), &printed)
@@ -82,7 +93,7 @@ pub(super) fn begun(folder: &OutputFolder, heading: &FitHeading) -> Result<FitJo
 
 /// Goes on with a fit that did not come to its end.
 pub(super) fn go_on(place: &Path, heading: &FitHeading, printed: &Printed) -> Result<u8, Failure> {
-    let file = ModelFile::read(&heading.model)?;
+    let file = ModelFile::read_with(&heading.model, &Override::parse_all(&heading.overrides)?)?;
     let model = build(&file, Purpose::Fit)?;
     let now = FitHeading::new(&file, heading.figures, heading.checkpoint);
     let flag = interrupt::flag();
@@ -105,7 +116,7 @@ fn run_in(
     for warning in &model.warnings {
         say("warning", warning);
     }
-    let progress = Progress::new(model.settings.stopping.iterations);
+    let progress = Progress::new(&model.settings.stopping);
     let (document, status) = fit_into(folder, &model, &progress, with_figures, journal)?;
     tell(&document, folder.path(), printed);
     if status == Status::Interrupted {
@@ -121,6 +132,15 @@ pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) 
         return print(&json(document));
     }
     print(&summary(document));
+    if printed.plot {
+        let width = Term::stdout()
+            .size_checked()
+            .map_or(PIPED, |(_, columns)| columns.into());
+        match charts(folder, document, width) {
+            Ok(text) => print(&text),
+            Err(error) => eprintln!("warning: nothing could be drawn: {error}"),
+        }
+    }
     if printed.timings {
         print(&format!("\n{}\n", document.timings.text()));
     }

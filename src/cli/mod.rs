@@ -2,18 +2,27 @@
 
 mod check;
 mod compare;
+mod demo;
+mod explain;
 mod fit;
+mod init;
 mod interrupt;
+mod overrides;
 mod predict;
 mod progress;
 mod resume;
+mod schema;
+mod shell;
 mod simulate;
 mod study;
 
 use crate::error::{InputError, Place};
+use crate::excerpt::Excerpt;
 use crate::input::harmless;
 use crate::solvers::Status;
 use clap::{Parser, Subcommand};
+use console::style;
+use overrides::Overrides;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -36,6 +45,12 @@ enum Command {
     Compare(compare::Arguments),
     Study(study::Arguments),
     Resume(resume::Arguments),
+    Init(init::Arguments),
+    Explain(explain::Arguments),
+    Schema(schema::Arguments),
+    Demo(demo::Arguments),
+    Completions(shell::Completions),
+    Man(shell::Manual),
 }
 
 /// Everything is as asked for.
@@ -73,18 +88,43 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Resume(arguments) => resume::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments),
+        Command::Schema(arguments) => schema::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::manual(&arguments),
     };
     ExitCode::from(match result {
         Ok(code) => code,
         Err(Failure::Input(error)) => {
-            say("error", error);
+            complain(&error);
             BAD_INPUT
         }
         Err(Failure::Numerical(reason)) => {
-            say("failed", reason);
+            let failed = style("failed:").for_stderr().red().bold();
+            eprintln!("{failed} {}", harmless(&reason));
             NOT_CONVERGED
         }
     })
+}
+
+/// Says what is wrong with the input: the message, and below its first line the line of the file that
+/// it is about. Coloured on a terminal only, and not where `NO_COLOR` is set.
+fn complain(error: &InputError) {
+    let red = |text: &str| style(text.to_owned()).for_stderr().red().bold();
+    let message = error.to_string();
+    let message = harmless(&message);
+    let (headline, rest) = message.split_once('\n').unwrap_or((&message, ""));
+    eprintln!("{} {headline}", red("error:"));
+    if let Some(excerpt) = Excerpt::of(error) {
+        let [blank, line, mark] = excerpt.lines();
+        let (edge, mark) = mark.split_at(blank.len());
+        eprintln!("{blank}\n{line}\n{edge}{}", red(mark));
+    }
+    if !rest.is_empty() {
+        eprintln!("{rest}");
+    }
 }
 
 fn exit_code(status: Status) -> u8 {

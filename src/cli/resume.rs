@@ -15,6 +15,9 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
+    /// Draw readings, fit and functions of a fit in the terminal.
+    #[arg(long, conflicts_with = "json")]
+    plot: bool,
     /// Threads of a study; the results do not depend on them [default: one per core].
     #[arg(long)]
     threads: Option<usize>,
@@ -33,6 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let printed = Printed {
         json: arguments.json,
         timings: false,
+        plot: arguments.plot,
     };
     if let Some(heading) = FitJournal::heading(folder)? {
         return fit::go_on(folder, &heading, &printed);

@@ -1,6 +1,6 @@
 //! `kmcfit simulate`
 
-use super::{Failure, OK, print, unwritable};
+use super::{Failure, OK, Overrides, print, unwritable};
 use crate::config::{ModelFile, Purpose, build};
 use crate::error::{InputError, Place};
 use crate::input::{one_of, quote};
@@ -22,6 +22,8 @@ pub struct Arguments {
     /// output].
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    set: Overrides,
     /// Number of nodes instead of the model's.
     #[arg(long)]
     nodes: Option<usize>,
@@ -37,7 +39,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let file = ModelFile::read(&arguments.model)?;
+    let file = arguments.set.read(&arguments.model)?;
     let purpose = Purpose::Simulate {
         nodes: arguments.nodes,
     };
@@ -72,6 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         made_by: "kmcfit simulate",
         version: env!("CARGO_PKG_VERSION"),
         model: arguments.model.display().to_string(),
+        overrides: file.override_texts(),
         experiment: &experiment.name,
         nodes: problem.oscillator.grid.nodes(),
         duration: problem.oscillator.grid.duration(),
@@ -123,6 +126,9 @@ struct Record<'a> {
     version: &'static str,
     /// The model file as it was given.
     model: String,
+    /// What was given beside it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    overrides: Vec<String>,
     experiment: &'a str,
     nodes: usize,
     /// s.

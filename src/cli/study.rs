@@ -3,8 +3,10 @@
 use super::compare::{entries, side_by_side, verdict};
 use super::fit::search;
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, say, stem, unwritable};
-use crate::config::{Model, ModelFile, Purpose, Story, build};
+use super::{
+    Failure, INTERRUPTED, NOT_CONVERGED, OK, Overrides, interrupt, print, say, stem, unwritable,
+};
+use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
 use crate::identifiability::count;
 use crate::objective::Evaluation;
@@ -25,6 +27,8 @@ pub struct Arguments {
     /// Folder for the results [default: runs/NAME-study].
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    set: Overrides,
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
@@ -42,22 +46,37 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if arguments.model.is_dir() {
         // A run of another format, or one that failed, is refused here.
         let run = Run::open(&arguments.model)?;
-        let model = PathBuf::from(&run.document.model.file);
-        return study(&model, &out, arguments.json, threads, false);
+        let mut overrides = Override::parse_all(&run.document.model.overrides)?;
+        overrides.extend(arguments.set.parse()?);
+        let file = ModelFile::read_with(&run.document.model.file, &overrides)?;
+        return study(&file, &out, arguments.json, threads, false);
     }
     match Story::read(&arguments.model)? {
-        Some(story) => tell(&arguments.model, &story, &out, arguments.json, false),
-        None => study(&arguments.model, &out, arguments.json, threads, false),
+        Some(story) => {
+            arguments
+                .set
+                .refuse("a story, whose models say themselves what they are")?;
+            tell(&arguments.model, &story, &out, arguments.json, false)
+        }
+        None => {
+            let file = arguments.set.read(&arguments.model)?;
+            study(&file, &out, arguments.json, threads, false)
+        }
     }
 }
 
 /// Goes on with a study or a story that did not come to its end.
 pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
     let threads = threads(asked)?;
-    let model = Journal::heading(folder)?.model;
+    let Heading {
+        model, overrides, ..
+    } = Journal::heading(folder)?;
     match Story::read(&model)? {
         Some(story) => tell(&model, &story, folder, as_json, true),
-        None => study(&model, folder, as_json, threads, true),
+        None => {
+            let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
+            study(&file, folder, as_json, threads, true)
+        }
     }
 }
 
@@ -123,15 +142,14 @@ fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> R
 }
 
 fn study(
-    path: &Path,
+    file: &ModelFile,
     out: &Path,
     as_json: bool,
     threads: usize,
     go_on: bool,
 ) -> Result<u8, Failure> {
-    let file = ModelFile::read(path)?;
-    let mut model = build(&file, Purpose::Fit)?;
-    can_be_studied(&file, &model)?;
+    let mut model = build(file, Purpose::Fit)?;
+    can_be_studied(file, &model)?;
     for remark in &model.remarks {
         say("note", remark);
     }
@@ -142,9 +160,12 @@ fn study(
     model.settings.interrupt = Some(Arc::clone(&flag));
     let start = model.problem.start();
     let cost = model.problem.evaluate(&start).map_or(f64::NAN, |e| e.cost);
-    let fit = FitHeading::new(&file, false, None);
-    let text = file.text.clone() + &fit.data_hashes();
-    let heading = Heading::new(path, &text, cost);
+    let fit = FitHeading::new(file, false, None);
+    let text = file.effective_text().to_owned() + &fit.data_hashes();
+    let heading = Heading {
+        overrides: file.override_texts(),
+        ..Heading::new(&file.path, &text, cost)
+    };
     let folder = OutputFolder::prepare(out)?;
     let journal = match go_on {
         true => Journal::go_on(folder.path(), &heading)?,
@@ -358,7 +379,7 @@ impl Work<'_> {
     /// The fit, from the journal if it is there; `None` if it was interrupted.
     fn fit(&mut self) -> Result<Option<(Problem, Vec<f64>, Evaluation)>, Trouble> {
         let model = self.model;
-        let progress = Progress::new(model.settings.stopping.iterations);
+        let progress = Progress::new(&model.settings.stopping);
         let (folder, heading, go_on) = (self.folder, &self.heading, self.go_on);
         let flag = Arc::clone(&self.flag);
         let mut interrupted = None;

@@ -9,11 +9,14 @@ mod build;
 mod complaint;
 mod failure;
 mod guard;
+pub mod keys;
 pub mod locate;
 mod model_file;
+mod overrides;
 pub mod scalar;
 mod source;
 pub mod spec;
+mod starter;
 mod story;
 mod syntax;
 
@@ -22,6 +25,8 @@ pub use build::{
     StudyTarget, WeightSearch, build,
 };
 pub use model_file::ModelFile;
+pub use overrides::Override;
 pub use scalar::{Number, NumberOrColumn, Text};
 pub use source::{DataFile, Source};
+pub use starter::{Starter, starter};
 pub use story::Story;

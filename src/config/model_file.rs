@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::failure;
 use super::guard::{self, LONGEST_MODEL};
 use super::locate::{Position, key_path, locate};
+use super::overrides::Override;
 use super::spec::ModelSpec;
 use crate::error::{InputError, Place};
 use crate::input::read_text;
@@ -23,8 +24,12 @@ pub struct ModelFile {
     pub path: PathBuf,
     /// Its text, without a byte order mark.
     pub text: String,
-    /// What it says.
+    /// What it says, with the overrides.
     pub spec: ModelSpec,
+    /// What was given beside it, in the place of its own values.
+    pub overrides: Vec<Override>,
+    /// The model with the overrides as text, where there are any.
+    edited: Option<String>,
 }
 
 impl ModelFile {
@@ -37,6 +42,55 @@ impl ModelFile {
         let path = path.as_ref();
         let text = read_text(path, MODEL_FILE, LONGEST_MODEL)?;
         Self::parse(path, text)
+    }
+
+    /// Reads a model file and puts other values in the place of some of its own.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) and [`with`](Self::with).
+    pub fn read_with(path: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, InputError> {
+        Self::read(path)?.with(overrides)
+    }
+
+    /// The model with other values, put in one after the other.
+    ///
+    /// # Errors
+    ///
+    /// When a key is not one of a model file, or its value is of the wrong kind: the place is the
+    /// override.
+    pub fn with(mut self, overrides: &[Override]) -> Result<Self, InputError> {
+        for change in overrides {
+            let unreadable = |error: serde_yaml::Error| {
+                InputError::new(
+                    change.place(),
+                    "the model cannot be written with this value",
+                )
+                .found(error)
+            };
+            let mut model = serde_yaml::from_str(self.effective_text()).map_err(unreadable)?;
+            change.apply(&mut model)?;
+            let text = serde_yaml::to_string(&model).map_err(unreadable)?;
+            let moved = |error: InputError| InputError {
+                place: change.place(),
+                ..error
+            };
+            let edited = Self::parse(&self.path, &text).map_err(moved)?;
+            self.spec = edited.spec;
+            self.edited = Some(text);
+            self.overrides.push(change.clone());
+        }
+        Ok(self)
+    }
+
+    /// The text of the model with the overrides in it; without any that of the file.
+    pub fn effective_text(&self) -> &str {
+        self.edited.as_deref().unwrap_or(&self.text)
+    }
+
+    /// The overrides as they were written.
+    pub fn override_texts(&self) -> Vec<String> {
+        self.overrides.iter().map(Override::to_string).collect()
     }
 
     /// Takes the text of a model file apart; `path` is what messages call it and what relative
@@ -77,7 +131,13 @@ impl ModelFile {
         guard::check(&path, &text)?;
         let spec = serde_yaml::from_str(&text)
             .map_err(|error| failure::input_error(&path, &text, &error))?;
-        let model = Self { path, text, spec };
+        let model = Self {
+            path,
+            text,
+            spec,
+            overrides: Vec::new(),
+            edited: None,
+        };
         if model.spec.experiments.is_empty() {
             return Err(model
                 .error_at("experiments", "there is no experiment")
@@ -101,6 +161,9 @@ impl ModelFile {
     /// nearest enclosing key. An aliased value (`*name`) is found where it is written (`&name`).
     pub fn error_at(&self, key: &str, problem: impl Into<String>) -> InputError {
         let path = key_path(key);
+        if let Some(change) = self.overrides.iter().rev().find(|o| o.covers(&path)) {
+            return InputError::new(change.place(), problem).key(key);
+        }
         let found = locate(&self.text, &path);
         let position = match found.key {
             Some(key) if found.depth < path.len() => key,
@@ -112,7 +175,7 @@ impl ModelFile {
     /// The files that the model reads, each once, in the order of the text.
     pub fn data_files(&self) -> Vec<PathBuf> {
         let mut names = Vec::new();
-        if let Ok(value) = serde_yaml::from_str::<serde_yaml::Value>(&self.text) {
+        if let Ok(value) = serde_yaml::from_str::<serde_yaml::Value>(self.effective_text()) {
             collect_data(&value, &mut names);
         }
         let mut files: Vec<PathBuf> = Vec::new();

@@ -10,6 +10,8 @@ use sha2::{Digest, Sha256};
 pub struct Source {
     /// The text of the model file.
     pub text: String,
+    /// What was given beside it, in the place of its own values.
+    pub overrides: Vec<String>,
     /// In the order in which the text names them, each once.
     pub data: Vec<DataFile>,
 }
@@ -28,7 +30,7 @@ impl Source {
     pub fn of(file: &ModelFile) -> Self {
         let mut names = Vec::new();
         // The text has been parsed before.
-        if let Ok(value) = serde_yaml::from_str(&file.text) {
+        if let Ok(value) = serde_yaml::from_str(file.effective_text()) {
             collect(&value, &mut names);
         }
         let data = names.into_iter().map(|name| DataFile {
@@ -38,6 +40,7 @@ impl Source {
         });
         Self {
             text: file.text.clone(),
+            overrides: file.override_texts(),
             data: data.collect(),
         }
     }

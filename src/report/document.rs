@@ -87,6 +87,9 @@ pub struct ModelSummary {
     /// The model file, as it was given.
     #[serde(default)]
     pub file: String,
+    /// What was given beside it, in the place of its own values (`--set`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<String>,
     /// Number of nodes.
     pub nodes: usize,
     /// First time, s.

@@ -25,6 +25,9 @@ pub struct Heading {
     pub format: u32,
     /// The model file, as it was given.
     pub model: PathBuf,
+    /// What was given beside it, in the place of its own values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<String>,
     /// Of the model's text and of what its start costs: a changed model or changed data do not go on.
     pub fingerprint: String,
 }
@@ -35,6 +38,7 @@ impl Heading {
         Self {
             format: FORMAT,
             model: model.to_path_buf(),
+            overrides: Vec::new(),
             fingerprint: format!("{}-{:016x}", hash(text.as_bytes()), cost.to_bits()),
         }
     }

@@ -16,6 +16,7 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
+mod advice;
 mod axis;
 mod columns;
 pub mod compare;
@@ -44,6 +45,7 @@ mod shape;
 pub mod study;
 mod summary;
 pub mod svg;
+mod terminal;
 mod text;
 mod timings;
 
@@ -57,8 +59,10 @@ pub use finished::Run;
 pub use fit_journal::{CHECKPOINT, FIT_JOURNAL, FitHeading, FitJournal, Source};
 pub use journal::{Heading, JOURNAL, Journal};
 pub use mark::{Colour, Dash, Mark, Style};
+pub(crate) use page::shell_quoted;
 pub use predict::{PredictedMotion, predict};
 pub use run::{FittedModel, Known, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};
+pub use terminal::charts;
 pub use timings::{PartSummary, TimingsSummary};

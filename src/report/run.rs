@@ -214,6 +214,7 @@ impl FittedModel<'_> {
         let grid = &problem.oscillator.grid;
         ModelSummary {
             file: self.model.file.display().to_string(),
+            overrides: self.model.source.overrides.clone(),
             nodes: grid.nodes(),
             start: grid.start(),
             duration: grid.duration(),

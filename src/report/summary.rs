@@ -1,8 +1,10 @@
 //! What a person reads in ten seconds.
 
+use super::advice;
 use super::cost::CostKind;
 use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
+use crate::functions::Quantity;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.
@@ -21,6 +23,7 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         "{}: {}",
         document.outcome.status, document.outcome.reason
     )?;
+    write_findings(text, document)?;
     writeln!(
         text,
         "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {}, {} forward and {} adjoint solves, {:.2} s",
@@ -46,13 +49,6 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         }
     }
     write_statistics(text, document)?;
-    for sentence in &document.identifiability.verdicts {
-        writeln!(text, "{sentence}")?;
-    }
-    let functions = &document.identifiability.functions;
-    if !functions.is_empty() {
-        writeln!(text, "{}", functions.join("; "))?;
-    }
     writeln!(text)?;
     write_functions(text, document)?;
     write_scalars(text, document)?;
@@ -62,6 +58,58 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         write!(text, "\n{}", prediction_table(&document.predictions))?;
     }
     Ok(())
+}
+
+/// What was found, how well, how sure, what stays open, what to try next: a line each.
+fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let texts = |sentences: Vec<&str>| sentences.into_iter().map(str::to_owned).collect();
+    let settled: Vec<String> = texts(advice::settled(document));
+    let well = advice::worst_fit(document).map(|worst| {
+        let channels: usize = document.experiments.iter().map(|e| e.channels.len()).sum();
+        let of = match channels {
+            1 => "of the readings",
+            _ => "of the worst channel",
+        };
+        format!("{worst:.2} % {of}; J/J0 {:.1e}", document.cost.ratio)
+    });
+    for (label, sentences) in [
+        ("found", vec![found(document)]),
+        ("how well", well.into_iter().collect()),
+        ("how sure", settled),
+        ("open", texts(advice::open(document))),
+        ("try next", advice::next(document)),
+    ] {
+        for (i, sentence) in sentences.iter().enumerate() {
+            let label = if i == 0 { label } else { "" };
+            writeln!(text, "  {label:<9} {sentence}")?;
+        }
+    }
+    writeln!(text)
+}
+
+/// The functions of the device with their units: `mass 0.6 to 2.3 kg; stiffness 1 N/m`.
+fn found(document: &ResultDocument) -> String {
+    let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
+    let function = |name: &str| {
+        let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
+        let f = document.functions.get(name)?;
+        let values = match (f.min == f.max, f.standard_error) {
+            (true, Some(error)) => format!("{} +- {error:.1e}", short(f.min)),
+            (true, None) => short(f.min),
+            (false, _) => format!("{} to {}", short(f.min), short(f.max)),
+        };
+        Some(format!("{name} {values} {}", quantity.unit()))
+    };
+    names.filter_map(function).collect::<Vec<_>>().join("; ")
+}
+
+/// Four significant digits.
+fn short(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
+        true => format!("{rounded}"),
+        false => format!("{rounded:e}"),
+    }
 }
 
 /// How well one channel is matched.

@@ -50,46 +50,73 @@ fn with_row(row: usize, by: &str) -> String {
 fn keys() {
     assert_snapshot!(changed("title:", "titel:"), @"
     error: model.yaml:2:1: unknown key
+      |
+    2 | titel: Small
+      | ^^^^^
       found: `titel`
       expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
       hint: did you mean `title`?
     ");
     assert_snapshot!(changed("start: 2.0", "strat: 2.0"), @"
     error: model.yaml:10:29: functions.mass: unknown key
+       |
+    10 |   mass:      {basis: nodal, strat: 2.0}
+       |                             ^^^^^
       found: `strat`
       expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
       hint: did you mean `start`?
     ");
     assert_snapshot!(changed("method: midpoint", "method: midpoint, dt: 0.1"), @"
     error: model.yaml:8:37: grid: unknown key
+      |
+    8 | grid: {nodes: 21, method: midpoint, dt: 0.1}
+      |                                     ^^
       found: `dt`
       expected: one of: nodes, method, duration
       hint: the step follows from the others: dt = duration/(nodes - 1)
     ");
     assert_snapshot!(changed("  - name:", "  - colour: red\n    name:"), @"
     error: model.yaml:4:5: experiments[0]: unknown key
+      |
+    4 |   - colour: red
+      |     ^^^^^^
       found: `colour`
       expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, hold_out
     ");
     assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
     error: model.yaml:4:5: experiments[0]: the key `initial` is missing
+      |
+    4 |   - name: free decay
+      |     ^^^^
       expected: for instance `initial: {displacement: 3.3, velocity: 1.0}`
     ");
     assert_snapshot!(changed("  mass:      {basis: nodal, start: 2.0}\n", ""), @"
     error: model.yaml:9:1: functions: the key `mass` is missing
+      |
+    9 | functions:
+      | ^^^^^^^^^
       expected: for instance `mass: {basis: nodal, start: 2.0}`
     ");
     assert_snapshot!(changed("    data: readings.csv\n", ""), @"
     error: model.yaml:4:5: experiments[0]: this experiment has no data
+      |
+    4 |   - name: free decay
+      |     ^^^^
       expected: `data`, a CSV file with the readings
     ");
     assert_snapshot!(changed("fit:\n", "fit:\n  method: lbfgs\n"), @"
     error: model.yaml:15:3: fit: duplicate key `method`
+       |
+    15 |   method: lbfgs
+       |   ^^^^^^
       found: `method` again; it is first given in line 14
       expected: every key once
     ");
     assert_snapshot!(changed("grid:", "title: Again\ngrid:"), @"
     error: model.yaml:8:1: duplicate key `title`
+      |
+    8 | title: Again
+      | ^^^^^
       found: `title` again; it is first given in line 2
       expected: every key once
     ");
@@ -99,59 +126,92 @@ fn keys() {
 fn kinds_of_value() {
     assert_snapshot!(changed("start: 2.0", "start: heavy"), @"
     error: model.yaml:10:36: functions.mass.start: not a number
+       |
+    10 |   mass:      {basis: nodal, start: heavy}
+       |                                    ^^^^^
       found: text `heavy`
       expected: a finite number, a list of numbers, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(changed("start: 2.0", "start: [2.0]"), @"
     error: model.yaml:10:36: functions.mass.start: the list does not fit the basis
+       |
+    10 |   mass:      {basis: nodal, start: [2.0]}
+       |                                    ^^^^^
       found: 1 number for `nodal`
       expected: 21 numbers, one per node
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 2e3"), @"
     error: model.yaml:8:15: grid.nodes: not an integer
+      |
+    8 | grid: {nodes: 2e3, method: midpoint}
+      |               ^^^
       found: the floating-point number 2000
       expected: an integer, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: -21"), @"
     error: model.yaml:8:15: grid.nodes: a count cannot be negative
+      |
+    8 | grid: {nodes: -21, method: midpoint}
+      |               ^^^
       found: the integer -21
       expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("start: 2.0", "start: .nan"), @"
     error: model.yaml:10:36: functions.mass.start: not a finite number
+       |
+    10 |   mass:      {basis: nodal, start: .nan}
+       |                                    ^^^^
       found: .nan, which is not a number
       expected: a finite number, a list of numbers, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(changed("velocity: 0.0", "velocity: .inf"), @"
     error: model.yaml:7:44: experiments[0].initial.velocity: not a finite number
+      |
+    7 |     initial: {displacement: 1.0, velocity: .inf}
+      |                                            ^^^^
       found: an infinite number
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("method: lbfgs", "method: l-bgfs"), @"
     error: model.yaml:14:11: fit.method: unknown choice
+       |
+    14 |   method: l-bgfs
+       |           ^^^^^^
       found: `l-bgfs`
       expected: one of: steepest-descent, lbfgs, projected-gradient, gauss-newton, equation-error
       hint: did you mean `lbfgs`?
     ");
     assert_snapshot!(changed("basis: nodal", "basis: nodes"), @"
     error: model.yaml:10:22: functions.mass.basis: unknown choice
+       |
+    10 |   mass:      {basis: nodes, start: 2.0}
+       |                      ^^^^^
       found: `nodes`
       expected: one of: nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
     ");
     assert_snapshot!(changed("format: 1", "format: 2"), @"
     error: model.yaml:1:9: format: this version of the program cannot read that format
+      |
+    1 | format: 2
+      |         ^
       found: the integer 2
       expected: 1
       hint: a newer version of the program may
     ");
     assert_snapshot!(changed("fit:", "fit: lbfgs\nfitting:"), @"
     error: model.yaml:13:6: fit: this is the wrong kind of value
+       |
+    13 | fit: lbfgs
+       |      ^^^^^
       found: text `lbfgs`
       expected: a map such as {method: gauss-newton, initial: data}
     ");
     assert_snapshot!(changed("columns: {time", "columns: {time: t_s, [time"), @"
     error: model.yaml:6:55: the file is not valid YAML: a `[` is not closed, or a comma is missing
+      |
+    6 |     columns: {time: t_s, [time: t_s, displacement: y_m}
+      |                                                       ^
       found: `}`
       hint: separate the elements of [ … ] by commas and close the bracket
     ");
@@ -161,37 +221,61 @@ fn kinds_of_value() {
 fn meaning() {
     assert_snapshot!(changed("start: 2.0", "start: 0"), @"
     error: model.yaml:10:36: functions.mass.start: the mass must be positive at all times
+       |
+    10 |   mass:      {basis: nodal, start: 0}
+       |                                    ^
       found: 0
       expected: a number greater than 0, in kg
     ");
     assert_snapshot!(changed("{basis: nodal, start: 2.0}", "{fixed: -1.0}"), @"
     error: model.yaml:10:22: functions.mass.fixed: the mass must be positive at all times
+       |
+    10 |   mass:      {fixed: -1.0}
+       |                      ^^^^
       found: -1
       expected: a number greater than 0, in kg
     ");
     assert_snapshot!(changed("start: 2.0", "start: 2.0, fixed: 2.0"), @"
     error: model.yaml:10:36: functions.mass.start: a fixed function has no start
+       |
+    10 |   mass:      {basis: nodal, start: 2.0, fixed: 2.0}
+       |                                    ^^^
       expected: either `fixed` or `start`
     ");
     assert_snapshot!(changed("basis: nodal, start: 2.0", "basis: nodal"), @"
     error: model.yaml:10:14: functions.mass: this function has neither a start nor a fixed value
+       |
+    10 |   mass:      {basis: nodal}
+       |              ^^^^^^^^^^^^^^
       expected: `start` for a function to be fitted, `fixed` for a known one
     ");
     assert_snapshot!(changed("basis: nodal, start: 2.0", "start: 2.0"), @"
     error: model.yaml:10:14: functions.mass: a function to be fitted needs a basis
+       |
+    10 |   mass:      {start: 2.0}
+       |              ^^^^^^^^^^^^
       expected: `basis`, one of nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
     ");
     assert_snapshot!(changed("method: lbfgs", "method: steepest-descent\n  memory: 10"), @"
     error: model.yaml:15:11: fit.memory: the method `steepest-descent` has no memory
+       |
+    15 |   memory: 10
+       |           ^^
       expected: no `memory`, or `method: lbfgs`
     ");
     assert_snapshot!(changed("method: lbfgs", "method: lbfgs\n  memory: 0"), @"
     error: model.yaml:15:11: fit.memory: L-BFGS needs a memory
+       |
+    15 |   memory: 0
+       |           ^
       found: 0
       expected: 1 or more pairs
     ");
     assert_snapshot!(changed("{iterations: 5}", "{iterations: 5, seconds: -1}"), @"
     error: model.yaml:16:34: fit.stop.seconds: this limit must be positive
+       |
+    16 |   stop: {iterations: 5, seconds: -1}
+       |                                  ^^
       found: -1
       expected: a number greater than 0
     ");
@@ -202,11 +286,17 @@ fn sigma() {
     let sigma = |value: &str| format!("    sigma: {{displacement: {value}}}\n    initial");
     assert_snapshot!(changed("    initial", &sigma("0")), @"
     error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
+      |
+    7 |     sigma: {displacement: 0}
+      |                           ^
       found: 0
       expected: a number greater than 0, in SI units
     ");
     assert_snapshot!(changed("    initial", &sigma("-0.1")), @"
     error: model.yaml:7:27: experiments[0].sigma.displacement: a standard deviation must be positive
+      |
+    7 |     sigma: {displacement: -0.1}
+      |                           ^^^^
       found: -0.1
       expected: a number greater than 0, in SI units
     ");
@@ -215,6 +305,9 @@ fn sigma() {
     bench.write("model.yaml", &model.replace("discrete", "continuous"));
     assert_snapshot!(message(&bench), @"
     error: model.yaml:16:13: fit.gradient: the continuous adjoint is that of the integral cost with a reading at every node
+       |
+    16 |   gradient: continuous
+       |             ^^^^^^^^^^
       found: `continuous` with a sigma or with fewer readings than nodes
       expected: `discrete`, which has no such limits
     ");
@@ -224,16 +317,25 @@ fn sigma() {
 fn grid() {
     assert_snapshot!(changed("nodes: 21", "nodes: 21, duration: -2.0"), @"
     error: model.yaml:8:29: grid.duration: the duration is not positive
+      |
+    8 | grid: {nodes: 21, duration: -2.0, method: midpoint}
+      |                             ^^^^
       found: -2
       expected: a length of time in s, greater than 0
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 21, duration: 3.0"), @"
     error: model.yaml:8:29: grid.duration: the duration is not that of the readings
+      |
+    8 | grid: {nodes: 21, duration: 3.0, method: midpoint}
+      |                             ^^^
       found: 3
       expected: 2 (or leave it out)
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 2"), @"
     error: model.yaml:8:15: grid.nodes: this number of nodes cannot be used
+      |
+    8 | grid: {nodes: 2, method: midpoint}
+      |               ^
       found: 2
       expected: 3 or more
     ");
@@ -256,12 +358,18 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     };
     assert_snapshot!(with_nodes("fit", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+      |
+    8 | grid: {nodes: 100000000000, method: midpoint}
+      |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     // The largest number that a computer counts to is no more of a trouble.
     assert_snapshot!(with_nodes("fit", "9223372036854775807"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+      |
+    8 | grid: {nodes: 9223372036854775807, method: midpoint}
+      |               ^^^^^^^^^^^^^^^^^^^
       found: 9223372036854775807 nodes, which may need 14203993 PB: 1540 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
@@ -280,11 +388,17 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     ");
     assert_snapshot!(with_nodes("study", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+      |
+    8 | grid: {nodes: 100000000000, method: midpoint}
+      |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     assert_snapshot!(with_nodes("compare", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+      |
+    8 | grid: {nodes: 100000000000, method: midpoint}
+      |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
@@ -294,45 +408,72 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
 fn readings_files() {
     assert_snapshot!(changed("data: readings.csv", "data: reading.csv"), @"
     error: model.yaml:5:11: experiments[0].data: reading.csv: there is no such file
+      |
+    5 |     data: reading.csv
+      |           ^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
       hint: did you mean `readings.csv`?
     ");
     assert_snapshot!(changed("data: readings.csv", "data: data/readings.csv"), @"
     error: model.yaml:5:11: experiments[0].data: data/readings.csv: there is no such file
+      |
+    5 |     data: data/readings.csv
+      |           ^^^^^^^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
       hint: the folder data does not exist
     ");
     assert_snapshot!(changed("data: readings.csv", "data: ."), @"
     error: model.yaml:5:11: experiments[0].data: .: this is a folder, not a file
+      |
+    5 |     data: .
+      |           ^
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(with_readings(""), @"
     error: model.yaml:5:11: experiments[0].data: readings.csv: the file is empty
+      |
+    5 |     data: readings.csv
+      |           ^^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(with_readings("t_s,y_m\n"), @"
     error: model.yaml:5:11: experiments[0].data: readings.csv: the file has no data
+      |
+    5 |     data: readings.csv
+      |           ^^^^^^^^^^^^
       found: a row of column names only
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(with_readings(&readings(2)), @"
     error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+      |
+    6 |     columns: {time: t_s, displacement: y_m}
+      |                                        ^^^
       found: 2 readings
       expected: at least 3
     ");
     assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
     error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+      |
+    6 |     columns: {time: t_s, displacement: y_m}
+      |                                        ^^^
       found: 1 reading
       expected: at least 3
     ");
     assert_snapshot!(changed("displacement: y_m", "displacement: y_mm"), @"
     error: model.yaml:6:40: experiments[0].columns.displacement: readings.csv: there is no such column
+      |
+    6 |     columns: {time: t_s, displacement: y_mm}
+      |                                        ^^^^
       found: `y_mm`
       expected: one of: t_s, y_m
       hint: did you mean `y_m`?
     ");
     assert_snapshot!(changed("time: t_s", "time: seconds"), @"
     error: model.yaml:6:21: experiments[0].columns.time: readings.csv: there is no such column
+      |
+    6 |     columns: {time: seconds, displacement: y_m}
+      |                     ^^^^^^^
       found: `seconds`
       expected: one of: t_s, y_m
     ");
@@ -342,21 +483,33 @@ fn readings_files() {
 fn rows() {
     assert_snapshot!(with_row(17, "1.6,off"), @"
     error: readings.csv:18: row 17, column `y_m`: not a number
+       |
+    18 | 1.6,off
+       |     ^^^
       found: `off`
       expected: a finite number, or an empty field where a reading is missing
     ");
     assert_snapshot!(with_row(17, "1.6"), @"
     error: readings.csv:18: row 17: the row does not fit the column names
+       |
+    18 | 1.6
+       | ^^^
       found: 1 field
       expected: 2 fields, one per column
     ");
     assert_snapshot!(with_row(17, "1.4,0.1"), @"
     error: readings.csv:18: row 17, column `t_s`: the times do not increase
+       |
+    18 | 1.4,0.1
+       | ^^^^^^^
       found: 1.4 after 1.5 in line 17
       expected: a time greater than 1.5
     ");
     assert_snapshot!(with_row(17, "1.5,0.1"), @"
     error: readings.csv:18: row 17, column `t_s`: two rows with the same time
+       |
+    18 | 1.5,0.1
+       | ^^^^^^^
       found: 1.5 after 1.5 in line 17
       expected: a time greater than 1.5
     ");
@@ -370,23 +523,35 @@ fn files_of_functions() {
     bench.write("model.yaml", &model);
     assert_snapshot!(message(&bench), @"
     error: model.yaml:10:43: functions.mass.start.data: device.csv: there is no such file
+       |
+    10 |   mass:      {basis: nodal, start: {data: device.csv, column: mass_kg}}
+       |                                           ^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
     ");
     bench.write("device.csv", "t_s,mass_kg\n0,1\n1,1\n");
     assert_snapshot!(message(&bench), @"
     error: model.yaml:10:43: functions.mass.start.data: device.csv: the times do not cover the record
+       |
+    10 |   mass:      {basis: nodal, start: {data: device.csv, column: mass_kg}}
+       |                                           ^^^^^^^^^^
       found: 0 s to 1 s
       expected: at least 0 s to 2 s
     ");
     bench.write("device.csv", "t_s,m\n0,1\n2,1\n");
     assert_snapshot!(message(&bench), @"
     error: model.yaml:10:63: functions.mass.start.column: device.csv: there is no such column
+       |
+    10 |   mass:      {basis: nodal, start: {data: device.csv, column: mass_kg}}
+       |                                                               ^^^^^^^
       found: `mass_kg`
       expected: one of: t_s, m
     ");
     bench.write("device.csv", "t_s,mass_kg\n0,1\n1,0\n2,1\n");
     assert_snapshot!(message(&bench), @"
     error: model.yaml:10:36: functions.mass.start: the mass must be positive at all times
+       |
+    10 |   mass:      {basis: nodal, start: {data: device.csv, column: mass_kg}}
+       |                                    ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
       found: 0 at node 10
       expected: a number greater than 0, in kg
     ");
@@ -402,6 +567,9 @@ fn model_files() {
     ");
     assert_snapshot!(refused(&bench, &["simulate", "readings.csv"]), @"
     error: readings.csv:1:1: this is the wrong kind of value
+      |
+    1 | t_s,y_m
+      | ^^^^^^^
       found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
       expected: a map with the keys format, experiments, functions, fit, …
     ");
@@ -430,10 +598,10 @@ fn output_folders() {
     assert_snapshot!(
         refused(&bench, &["simulate", "model.yaml", "--out", "model.yaml/motion.csv"]),
         @"
-        error: --out: the results cannot be written
-          found: model.yaml/motion.csv: model.yaml is a file, not a folder
-          expected: a place that can be written to
-        "
+    error: --out: the results cannot be written
+      found: model.yaml/motion.csv: model.yaml is a file, not a folder
+      expected: a place that can be written to
+    "
     );
     assert_snapshot!(refused(&bench, &["simulate", "model.yaml", "--out", "."]), @"
     error: --out: the results cannot be written
@@ -485,6 +653,9 @@ fn simulate_arguments() {
     bench.write("model.yaml", &MODEL.replace("    data: readings.csv\n", ""));
     assert_snapshot!(with(&[]), @"
     error: model.yaml:7:7: grid: the length of the motion is missing
+      |
+    7 | grid: {nodes: 21, method: midpoint}
+      |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
       expected: `duration` in s, since there are no readings to take it from
     ");
 }

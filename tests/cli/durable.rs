@@ -222,6 +222,43 @@ fn interrupted_and_gone_on_with() {
     );
 }
 
+/// What was set beside the model is set again by `resume`, of fits and of studies, and is part of what
+/// may not have changed.
+#[test]
+#[cfg(unix)]
+fn what_was_set_is_set_again() {
+    let bench = paper(1000);
+    let set = [
+        "--set",
+        "fit.stop.iterations=2000",
+        "--set",
+        "functions.stiffness.start=1.5",
+    ];
+    for (command, journal) in [("fit", "fit.journal"), ("study", "fit.journal")] {
+        let arguments = |out| {
+            [
+                &[command, "models/paper.yaml", "--out", out],
+                set.as_slice(),
+            ]
+            .concat()
+        };
+        let mut child = started(&bench, &arguments("run"));
+        wait_for_line(&bench, &format!("run/{journal}"), 20);
+        child.kill().expect("a child");
+        child.wait().expect("it ends");
+        if command == "study" {
+            let heading = bench.read("run/study.journal");
+            assert!(heading.contains("fit.stop.iterations=2000"), "{heading}");
+            continue;
+        }
+        let stdout = bench.run_to(0, &["resume", "run"]);
+        assert!(stdout.contains("the 2000 iterations"), "{stdout}");
+        bench.run_to(0, &arguments("whole"));
+        assert!(bits(&bench, "run") == bits(&bench, "whole"));
+        std::fs::remove_dir_all(bench.path("run")).expect("a folder");
+    }
+}
+
 /// The second Ctrl-C ends the program at once, in the middle of an iteration.
 #[test]
 #[cfg(unix)]

@@ -6,6 +6,7 @@ mod compare;
 mod data_files;
 mod durable;
 mod ending;
+mod front;
 mod measured_input;
 mod models;
 mod predict;

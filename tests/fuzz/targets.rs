@@ -105,6 +105,7 @@ fn small(folder: &Path, method: &str) -> (FitHeading, Model) {
     };
     let file = ModelFile::parse(folder.join("models/m.yaml"), text).expect("a model");
     let heading = FitHeading {
+        overrides: Vec::new(),
         format: 1,
         version: String::new(),
         model: "m.yaml".into(),
@@ -163,6 +164,7 @@ pub fn made(target: &str) -> Vec<Vec<u8>> {
             .map(|(method, (heading, model))| {
                 let folder = workshop.path("fit");
                 let heading = FitHeading {
+                    overrides: Vec::new(),
                     checkpoint: Some(0.0),
                     ..heading.clone()
                 };
@@ -349,6 +351,7 @@ fn beginning(heading: &FitHeading) -> Vec<u8> {
 pub fn study_journal(bytes: &[u8]) {
     let folder = workshop().path("study");
     let heading = Heading {
+        overrides: Vec::new(),
         format: 1,
         model: "m.yaml".into(),
         fingerprint: "0".into(),

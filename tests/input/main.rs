@@ -4,6 +4,7 @@
 mod arbitrary;
 mod instruments;
 mod instruments_errors;
+mod keys;
 mod model;
 mod model_errors;
 mod table;

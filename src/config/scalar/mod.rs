@@ -124,15 +124,19 @@ macro_rules! deserialize_scalar {
 macro_rules! choice {
     (
         $(#[$doc:meta])*
-        pub enum $name:ident { $( $(#[$variant_doc:meta])* $variant:ident = $word:literal, )+ }
+        pub enum $name:ident { $( $(#[doc = $variant_doc:literal])+ $variant:ident = $word:literal, )+ }
     ) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum $name { $( $(#[$variant_doc])* $variant, )+ }
+        pub enum $name { $( $(#[doc = $variant_doc])+ $variant, )+ }
 
         impl $name {
             /// Every choice with its name in the YAML.
             pub const ALL: &'static [(&'static str, Self)] = &[$(($word, Self::$variant),)+];
+
+            /// Every name in the YAML with what it means.
+            pub const NAMES: &'static [(&'static str, &'static str)] =
+                &[$(($word, concat!($($variant_doc),+).trim_ascii_start()),)+];
 
             /// The name in the YAML.
             pub fn name(self) -> &'static str {

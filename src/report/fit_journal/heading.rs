@@ -18,6 +18,9 @@ pub struct FitHeading {
     pub version: String,
     /// The model file, as it was given.
     pub model: PathBuf,
+    /// What was given beside it, in the place of its own values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<String>,
     /// Whether figures are drawn.
     pub figures: bool,
     /// Least time between two checkpoints, s, where it was given.
@@ -53,6 +56,7 @@ impl FitHeading {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
             model: file.path.clone(),
+            overrides: file.override_texts(),
             figures,
             checkpoint,
             sources,
@@ -74,6 +78,14 @@ impl FitHeading {
             )
             .found(format!("version {}", before.version))
             .expected(format!("version {}, or a new fit", self.version)));
+        }
+        if before.overrides != self.overrides {
+            return Err(InputError::file(
+                journal,
+                "this fit was begun with other values set beside the model",
+            )
+            .found(before.overrides.join(", "))
+            .expected("the same ones, or a new fit"));
         }
         let changed = |source: &&Source| !before.sources.contains(source);
         match self.sources.iter().find(changed) {

@@ -14,6 +14,7 @@ mod shrink;
 mod table;
 
 pub(super) use fit::page as fit_page;
+pub(crate) use repeat::quoted as shell_quoted;
 
 use super::figure::Figure;
 use super::render;

@@ -1,6 +1,7 @@
 //! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
 
 use super::table::{list, number, table};
+use crate::report::advice;
 use crate::report::document::{FunctionSummary, ResultDocument};
 use crate::report::measured::ChannelSummary;
 use crate::report::summary::{count, iterations};
@@ -18,6 +19,11 @@ pub(super) fn opening(document: &ResultDocument) -> String {
     if !known.verdicts.is_empty() {
         text += "<h3>What can be seen, and what stays open</h3>\n";
         text += &list(&known.verdicts);
+    }
+    let next = advice::next(document);
+    if !next.is_empty() {
+        text += "<h3>What to try next</h3>\n";
+        text += &list(&next);
     }
     let notes: Vec<String> = (document.warnings.iter().map(|w| format!("warning: {w}")))
         .chain(document.remarks.iter().map(|r| format!("note: {r}")))
@@ -46,10 +52,7 @@ fn facts(document: &ResultDocument) -> String {
     let readings: usize = document.experiments.iter().map(|e| e.readings).sum();
     let mut facts = vec![("misfit left, J/J0", number(document.cost.ratio))];
     let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    let worst = channels()
-        .map(|c| c.fit_percent)
-        .fold(f64::INFINITY, f64::min);
-    if worst.is_finite() {
+    if let Some(worst) = advice::worst_fit(document) {
         let name = match channels().count() {
             1 => "fit of the readings",
             _ => "fit of the worst channel",

@@ -32,7 +32,11 @@ pub(super) fn repeat(run: &FittedModel, document: &ResultDocument) -> String {
 
 /// A command of the program on the model of the run.
 pub(super) fn command(name: &str, document: &ResultDocument) -> String {
-    block(&format!("kmcfit {name} {}", quoted(&document.model.file)))
+    let mut line = format!("kmcfit {name} {}", quoted(&document.model.file));
+    for change in &document.model.overrides {
+        line += &format!(" --set {}", quoted(change));
+    }
+    block(&line)
 }
 
 fn data(source: &Source) -> String {
@@ -65,9 +69,9 @@ fn block(text: &str) -> String {
     format!("<pre tabindex=\"0\"><code>{}</code></pre>\n", escape(text))
 }
 
-/// A path as a shell takes it.
-fn quoted(path: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@".contains(c) || !c.is_ascii();
+/// A path or an argument as a shell takes it.
+pub fn quoted(path: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@=".contains(c) || !c.is_ascii();
     match !path.is_empty() && path.chars().all(plain) && !path.starts_with('-') {
         true => path.to_owned(),
         false => format!("'{}'", path.replace('\'', "'\\''")),

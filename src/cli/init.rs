@@ -1,0 +1,89 @@
+//! `kmcfit init`
+
+use super::{Failure, OK, print, schema, unwritable};
+use crate::config::{ModelFile, starter};
+use crate::error::{InputError, Place};
+use crate::report::{shell_quoted, write_whole};
+use std::path::{Component, Path, PathBuf};
+
+/// The schema that the comment in the first line of a model names.
+const SCHEMA: &str = "kmcfit.schema.json";
+
+/// Write a commented starter model for a table of readings: columns, units, grid, bases and start are
+/// found in the file.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The readings (CSV, or as an instrument wrote them).
+    data: PathBuf,
+    /// The model file [default: beside the readings, with their name].
+    #[arg(long, value_name = "MODEL")]
+    out: Option<PathBuf>,
+    /// Readings per second, Hz, where the file has no column of times.
+    #[arg(long, value_name = "HZ")]
+    sample_rate: Option<f64>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let rate = arguments.sample_rate;
+    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        return Err(InputError::new(
+            Place::Argument("--sample-rate".into()),
+            "no rate can be this",
+        )
+        .found(rate)
+        .expected("a number of readings per second, greater than 0")
+        .into());
+    }
+    let out = match &arguments.out {
+        Some(out) => out.clone(),
+        None => arguments.data.with_extension("yaml"),
+    };
+    if out.exists() {
+        return Err(InputError::file(&out, "there is such a file already")
+            .expected("another name: --out MODEL")
+            .into());
+    }
+    let folder = out.parent().unwrap_or(Path::new(""));
+    let starter = starter(&arguments.data, &named_from(folder, &arguments.data), rate)?;
+    // What was written must be what can be read.
+    ModelFile::parse(&out, starter.text.as_str())?;
+    write_whole(&out, &starter.text).map_err(|error| unwritable(&out, &error))?;
+    let schema = folder.join(SCHEMA);
+    if !schema.exists() {
+        write_whole(&schema, &schema::text()).map_err(|error| unwritable(&schema, &error))?;
+    }
+    let mut text = format!("{}\n", arguments.data.display());
+    for sentence in &starter.found {
+        text += &format!("  {sentence}\n");
+    }
+    let place = out.display();
+    let argument = shell_quoted(&place.to_string());
+    print(&format!(
+        "{text}the model is {place}; look at it, then\n  kmcfit check {argument} --no-gradient\n  \
+         kmcfit fit {argument}\n"
+    ));
+    Ok(OK)
+}
+
+/// The path of a file from a folder; as it is given where there is no such path.
+fn named_from(folder: &Path, file: &Path) -> String {
+    let folder = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    };
+    let (Ok(folder), Ok(target)) = (folder.canonicalize(), file.canonicalize()) else {
+        return file.display().to_string();
+    };
+    let shared = (folder.components().zip(target.components()))
+        .take_while(|(a, b)| a == b)
+        .count();
+    let is_prefix = |c: &Component| matches!(c, Component::Prefix(_) | Component::RootDir);
+    let up = folder.components().skip(shared);
+    if shared == 0 || target.components().skip(shared).any(|c| is_prefix(&c)) {
+        return target.display().to_string();
+    }
+    let path: PathBuf = (up.map(|_| Component::ParentDir))
+        .chain(target.components().skip(shared))
+        .collect();
+    path.to_string_lossy().replace('\\', "/")
+}

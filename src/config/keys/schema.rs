@@ -1,0 +1,100 @@
+//! The JSON schema (draft 07) of a model file, for editors that complete and check YAML by one.
+
+use super::{Group, Key, Kind, MODEL, STORY};
+use serde_json::{Map, Value, json};
+
+/// The schema of a model file or a story.
+///
+/// It knows keys, kinds and words; what they mean together is checked by the program alone.
+pub fn schema() -> Value {
+    let mut definitions = Map::new();
+    define(&MODEL, &mut definitions);
+    define(&STORY, &mut definitions);
+    json!({
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "kmcfit model file",
+        "description": "A model of an oscillator and its records, or a story of several models.",
+        "if": {"type": "object", "required": ["story"]},
+        "then": reference(&STORY),
+        "else": reference(&MODEL),
+        "definitions": definitions,
+    })
+}
+
+fn reference(group: &Group) -> Value {
+    json!({"$ref": format!("#/definitions/{}", group.name)})
+}
+
+fn define(group: &'static Group, definitions: &mut Map<String, Value>) {
+    if definitions.contains_key(group.name) {
+        return;
+    }
+    let required: Vec<&str> = (group.keys.iter())
+        .filter(|key| key.required)
+        .map(|key| key.name)
+        .collect();
+    let properties: Map<String, Value> = (group.keys.iter())
+        .map(|key| (key.name.to_owned(), property(key)))
+        .collect();
+    let mut map = json!({
+        "type": "object",
+        "description": group.text,
+        "additionalProperties": false,
+        "properties": properties,
+    });
+    if !required.is_empty() {
+        map["required"] = json!(required);
+    }
+    definitions.insert(group.name.to_owned(), map);
+    for inner in group.keys.iter().flat_map(|key| key.kind.groups()) {
+        define(inner, definitions);
+    }
+}
+
+/// A key: what editors show when it is pointed at, and what may stand behind it.
+fn property(key: &Key) -> Value {
+    // Beside `$ref` draft 07 ignores everything, so the kind stands apart.
+    json!({"description": description(key), "allOf": [kind(key.kind)]})
+}
+
+/// The key in words, with its unit and default.
+fn description(key: &Key) -> String {
+    let mut text = key.text.to_owned();
+    for (name, value) in [("Unit", key.unit), ("Default", key.default)] {
+        if let Some(value) = value {
+            text += &format!(" {name}: {value}.");
+        }
+    }
+    if let Kind::Choice(words) = key.kind {
+        for (word, meaning) in words {
+            text += &format!("\n- {word}: {meaning}");
+        }
+    }
+    text
+}
+
+fn kind(kind: Kind) -> Value {
+    match kind {
+        Kind::Format => json!({"const": 1}),
+        Kind::Number => json!({"type": "number"}),
+        Kind::Count => json!({"type": "integer", "minimum": 0}),
+        // A name such as 12 keeps its spelling without quotes.
+        Kind::Text => json!({"type": ["string", "number"], "minLength": 1}),
+        Kind::Bool => json!({"type": "boolean"}),
+        Kind::Column => json!({"anyOf": [
+            {"type": "string", "minLength": 1},
+            {"type": "integer", "minimum": 1},
+        ]}),
+        Kind::Word(word) => json!({"const": word}),
+        Kind::Choice(words) => {
+            let words: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+            json!({"enum": words})
+        }
+        Kind::Map(group) => reference(group),
+        Kind::List(inner) => json!({"type": "array", "items": self::kind(*inner)}),
+        Kind::AnyOf(kinds) => {
+            let kinds: Vec<Value> = kinds.iter().map(|k| self::kind(*k)).collect();
+            json!({"anyOf": kinds})
+        }
+    }
+}

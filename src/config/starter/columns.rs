@@ -1,0 +1,301 @@
+//! Which column of a table is what.
+
+use super::quoted;
+use crate::error::InputError;
+use crate::observations::{Table, increasing_at};
+use crate::units::{Kind, Unit};
+
+/// What a column may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    Time,
+    Displacement,
+    Velocity,
+    Acceleration,
+    Force,
+    BaseAcceleration,
+    BaseDisplacement,
+}
+
+/// Beginnings of names, in small letters, and what they name.
+const NAMES: [(Role, &[&str]); 5] = [
+    (Role::Time, &["time", "zeit", "t"]),
+    (
+        Role::Displacement,
+        &[
+            "disp", "pos", "defl", "angle", "roll", "pitch", "y", "x", "z", "u", "s",
+        ],
+    ),
+    (Role::Velocity, &["vel", "v"]),
+    (Role::Acceleration, &["acc", "a"]),
+    (Role::Force, &["force", "load", "torque", "f"]),
+];
+/// Words in a name that speak of the base.
+const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
+/// Longest name that is taken for a single letter with a number or unit: `y1`, `acc 1`.
+const LONGEST_LETTER: usize = 2;
+
+impl Role {
+    /// Its key in the model file.
+    pub fn key(self) -> &'static str {
+        match self {
+            Role::Time => "time",
+            Role::Displacement => "displacement",
+            Role::Velocity => "velocity",
+            Role::Acceleration => "acceleration",
+            Role::Force => "force",
+            Role::BaseAcceleration => "base_acceleration",
+            Role::BaseDisplacement => "base_displacement",
+        }
+    }
+
+    fn kind(self) -> Kind {
+        match self {
+            Role::Time => Kind::Time,
+            Role::Displacement | Role::BaseDisplacement => Kind::Displacement,
+            Role::Velocity => Kind::Velocity,
+            Role::Acceleration | Role::BaseAcceleration => Kind::Acceleration,
+            Role::Force => Kind::Force,
+        }
+    }
+
+    fn of_base(self) -> Option<Self> {
+        match self {
+            Role::Displacement => Some(Role::BaseDisplacement),
+            Role::Acceleration => Some(Role::BaseAcceleration),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a motion that can be fitted.
+    pub fn is_channel(self) -> bool {
+        matches!(
+            self,
+            Role::Displacement | Role::Velocity | Role::Acceleration
+        )
+    }
+}
+
+/// A column that is used.
+#[derive(Debug, Clone, Copy)]
+pub struct Column {
+    pub index: usize,
+    pub role: Role,
+    /// The unit.
+    pub unit: Unit,
+    /// Whether the model must say the unit, since the file does so in no way that is read.
+    tell_unit: bool,
+    /// Whether nothing but its place says what it is.
+    guessed: bool,
+}
+
+/// The columns that are used, and those that are not.
+#[derive(Debug)]
+pub struct Columns {
+    pub used: Vec<Column>,
+    unused: Vec<usize>,
+}
+
+impl Columns {
+    pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
+        let numeric: Vec<usize> = (0..table.width())
+            .filter(|i| {
+                table
+                    .readings(*i)
+                    .is_ok_and(|r| r.iter().any(|x| x.is_finite()))
+            })
+            .collect();
+        let mut columns = Self {
+            used: Vec::new(),
+            unused: Vec::new(),
+        };
+        if sample_rate.is_none() {
+            columns.used.push(time(table, &numeric)?);
+        }
+        for index in numeric {
+            if columns.used.iter().any(|c| c.index == index) {
+                continue;
+            }
+            match known(table, index) {
+                Some(column) if column.role != Role::Time && !columns.has(column.role) => {
+                    columns.used.push(column);
+                }
+                _ => columns.unused.push(index),
+            }
+        }
+        if columns.channels().next().is_none() {
+            columns.guess(table)?;
+        }
+        Ok(columns)
+    }
+
+    /// The first column that nothing is known of is a displacement.
+    fn guess(&mut self, table: &Table) -> Result<(), InputError> {
+        if self.unused.is_empty() {
+            let names = (0..table.width()).map(|i| table.label(i));
+            return Err(InputError::file(
+                table.path(),
+                "no column is a displacement, velocity or acceleration",
+            )
+            .found(format!(
+                "the columns {}",
+                names.collect::<Vec<_>>().join(", ")
+            ))
+            .expected("a column of readings beside the times"));
+        }
+        self.used.push(Column {
+            index: self.unused.remove(0),
+            role: Role::Displacement,
+            unit: Unit::si(Kind::Displacement),
+            tell_unit: false,
+            guessed: true,
+        });
+        Ok(())
+    }
+
+    pub fn has(&self, role: Role) -> bool {
+        self.find(role).is_some()
+    }
+
+    pub fn find(&self, role: Role) -> Option<&Column> {
+        self.used.iter().find(|c| c.role == role)
+    }
+
+    /// The kinds of motion that were measured.
+    pub fn channels(&self) -> impl Iterator<Item = Role> {
+        self.used.iter().map(|c| c.role).filter(|r| r.is_channel())
+    }
+
+    /// `{time: t_s, displacement: y_m}`
+    pub fn named(&self, table: &Table) -> String {
+        let name = |c: &Column| match table.headers().get(c.index) {
+            Some(name) if !name.is_empty() => quoted(name),
+            _ => (c.index + 1).to_string(),
+        };
+        let pairs = self
+            .used
+            .iter()
+            .map(|c| format!("{}: {}", c.role.key(), name(c)));
+        format!("{{{}}}", pairs.collect::<Vec<_>>().join(", "))
+    }
+
+    /// The units that the file does not say by itself.
+    pub fn units(&self) -> Option<String> {
+        let told = self.used.iter().filter(|c| c.tell_unit);
+        let pairs: Vec<String> = told
+            .map(|c| format!("{}: {}", c.role.key(), quoted(c.unit.symbol())))
+            .collect();
+        (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
+    }
+
+    /// What each column was taken for.
+    pub fn in_words(&self, table: &Table) -> Vec<String> {
+        let said = |c: &Column| {
+            let guess = if c.guessed {
+                ": a guess, please look"
+            } else {
+                ""
+            };
+            let role = c.role.key().replace('_', " of the ");
+            let role = match c.role {
+                Role::BaseAcceleration => "acceleration of the base".to_owned(),
+                Role::BaseDisplacement => "displacement of the base".to_owned(),
+                _ => role,
+            };
+            format!(
+                "column `{}`: {role}, {}{guess}",
+                table.label(c.index),
+                c.unit.symbol()
+            )
+        };
+        let mut words: Vec<String> = self.used.iter().map(said).collect();
+        let unused: Vec<String> = (self.unused.iter())
+            .map(|i| format!("`{}`", table.label(*i)))
+            .collect();
+        if !unused.is_empty() {
+            words.push(format!("not used: {}", unused.join(", ")));
+        }
+        words
+    }
+}
+
+/// The column of times: by unit, by name, or the first that increases.
+fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
+    let increases = |i: &&usize| increasing_at(table, **i).is_ok();
+    let is_time = |i: &&usize| known(table, **i).is_some_and(|c| c.role == Role::Time);
+    let named = numeric.iter().filter(increases).find(is_time);
+    match named.or_else(|| numeric.iter().find(increases)) {
+        Some(index) => Ok(known(table, *index)
+            .filter(|c| c.role == Role::Time)
+            .unwrap_or(Column {
+                index: *index,
+                role: Role::Time,
+                unit: Unit::si(Kind::Time),
+                tell_unit: false,
+                guessed: true,
+            })),
+        None => Err(
+            InputError::file(table.path(), "there is no column of times")
+                .found("no column whose numbers increase from row to row")
+                .expected("a column of times, or `--sample-rate HZ`"),
+        ),
+    }
+}
+
+/// What unit and name say of a column.
+fn known(table: &Table, index: usize) -> Option<Column> {
+    let label = table.headers().get(index).map_or("", String::as_str);
+    let name = label.to_lowercase();
+    let by_name = role_of(&name);
+    let in_file = table.unit(index);
+    let in_name = suffix(label);
+    let roles = [
+        Role::Time,
+        Role::Acceleration,
+        Role::Velocity,
+        Role::Displacement,
+        Role::Force,
+    ];
+    let unit_of = |role: Role| {
+        let unit = |text: &str| Unit::recognise(role.kind(), text);
+        (in_file.and_then(unit).map(|u| (u, false)))
+            .or_else(|| in_name.as_deref().and_then(unit).map(|u| (u, true)))
+    };
+    let by_unit = roles.into_iter().find(|role| unit_of(*role).is_some());
+    // A name that the unit agrees with comes first: volts and letters may be of several kinds.
+    let role = by_name
+        .filter(|r| unit_of(*r).is_some())
+        .or(by_unit)
+        .or(by_name)?;
+    let (unit, in_name) = unit_of(role).unwrap_or((Unit::si(role.kind()), false));
+    let is_base = BASE.iter().any(|word| name.contains(word));
+    Some(Column {
+        index,
+        role: role.of_base().filter(|_| is_base).unwrap_or(role),
+        unit,
+        tell_unit: in_name && unit.factor() != 1.0,
+        guessed: false,
+    })
+}
+
+/// What a name in small letters says.
+fn role_of(name: &str) -> Option<Role> {
+    let bare = name
+        .split(['_', ' ', '[', '(', '/'])
+        .next()
+        .unwrap_or_default();
+    let means = |begin: &str| match begin.len() {
+        1 => bare.starts_with(begin) && bare.len() <= LONGEST_LETTER,
+        _ => bare.starts_with(begin),
+    };
+    let named = NAMES
+        .iter()
+        .find(|(_, begins)| begins.iter().any(|b| means(b)));
+    named.map(|(role, _)| *role)
+}
+
+/// The unit at the end of a name such as `a_m_per_s2` or `y_mm`.
+fn suffix(name: &str) -> Option<String> {
+    let (_, unit) = name.split_once('_')?;
+    Some(unit.replace("_per_", "/").replace('_', " "))
+}

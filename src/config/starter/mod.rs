@@ -1,0 +1,221 @@
+//! A commented starter model for a table of readings: what `kmcfit init` writes.
+//!
+//! Columns are told apart by their units, then by their names; the motion by its spectrum. What cannot
+//! be known from the file (the mass of a free motion) gets a number and a comment that says so.
+
+mod columns;
+mod motion;
+
+use crate::error::InputError;
+use crate::observations::Table;
+use columns::{Columns, Role};
+use motion::Motion;
+use std::path::Path;
+
+/// Damping ratio that the search starts from: that of a lightly damped structure.
+const DAMPING_RATIO: f64 = 0.02;
+/// Periods of the motion per knot of the stiffness: fewer do not show a value of their own.
+const PERIODS_PER_KNOT: f64 = 2.0;
+/// Most knots: enough to see that and how the stiffness changes.
+const MOST_KNOTS: f64 = 11.0;
+
+/// A starter model and what it was made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Starter {
+    /// The text of the model file.
+    pub text: String,
+    /// What was found in the table, in sentences.
+    pub found: Vec<String>,
+}
+
+/// A starter model for the table `csv`, which the model will call `data`. Readings per second are
+/// `sample_rate`, where there is no column of times.
+///
+/// # Errors
+/// When the table cannot be read, has no column of times or of a motion, or a column is no readings.
+pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Starter, InputError> {
+    let table = Table::read(csv)?;
+    let columns = Columns::of(&table, sample_rate)?;
+    let motion = Motion::of(&table, &columns, sample_rate)?;
+    let mut found = vec![format!(
+        "{} readings over {} s, {}",
+        motion.readings,
+        short(motion.duration),
+        motion.spacing_in_words()
+    )];
+    found.extend(columns.in_words(&table));
+    found.push(match motion.frequency {
+        Some(frequency) => format!(
+            "dominant frequency {} Hz: {:.0} periods in the record",
+            short(frequency),
+            motion.periods()
+        ),
+        None => "no dominant frequency was found".into(),
+    });
+    Ok(Starter {
+        text: text(&table, data, &columns, &motion, sample_rate),
+        found,
+    })
+}
+
+fn text(
+    table: &Table,
+    data: &str,
+    columns: &Columns,
+    motion: &Motion,
+    sample_rate: Option<f64>,
+) -> String {
+    let name = Path::new(data)
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let mut text = format!(
+        "# yaml-language-server: $schema=kmcfit.schema.json\n\
+         # A starter model, made from the readings. `kmcfit check` reads it, `kmcfit fit` fits it,\n\
+         # `kmcfit explain KEY` says what a key does.\n\
+         format: 1\n\
+         title: {}\n\
+         experiments:\n  \
+           - name: record 1\n    \
+             data: {}\n",
+        quoted(&name),
+        quoted(data)
+    );
+    let mut line = |key: &str, value: String, comment: &str| {
+        text += &commented(&format!("{key}{value}"), comment);
+    };
+    line(
+        "    columns: ",
+        columns.named(table),
+        "by name or by number from 1",
+    );
+    if let Some(rate) = sample_rate {
+        line("    sample_rate: ", rate.to_string(), "Hz");
+    }
+    if let Some(units) = columns.units() {
+        line("    units: ", units, "converted to SI");
+    }
+    if columns.has(Role::Force) {
+        line(
+            "    force: ",
+            "{interpolation: linear}".into(),
+            "between samples: or hold, cubic",
+        );
+    }
+    if columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement) {
+        line(
+            "    base: ",
+            "{interpolation: linear}".into(),
+            "between samples: or hold, cubic",
+        );
+    }
+    let sigmas: Vec<String> = (columns.channels())
+        .map(|role| format!("{}: estimate", role.key()))
+        .collect();
+    line(
+        "    sigma: ",
+        format!("{{{}}}", sigmas.join(", ")),
+        "standard deviation of a reading, SI; a number, if it is known",
+    );
+    if columns.has(Role::Acceleration) {
+        line(
+            "    sensors: ",
+            "{acceleration: {offset: estimate}}".into(),
+            "accelerometers have one; leave it out if yours has none",
+        );
+    }
+    line(
+        "    initial: ",
+        "estimate".into(),
+        "or {displacement: …, velocity: …} in m and m/s",
+    );
+    line(
+        "grid: ",
+        "{nodes: auto}".into(),
+        "as many steps as the frequencies of the readings ask for",
+    );
+    text + &functions(columns, motion)
+        + &commented(
+            "# truth: {data: truth.csv}",
+            "the true functions, where they are known",
+        )
+        + &commented(
+            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
+            "",
+        )
+}
+
+/// The functions: a start that has the dominant frequency.
+fn functions(columns: &Columns, motion: &Motion) -> String {
+    let omega = std::f64::consts::TAU * motion.frequency.unwrap_or(1.0);
+    let driven = columns.has(Role::Force);
+    let mass = match driven {
+        true => motion.mass(omega).unwrap_or(1.0),
+        false => 1.0,
+    };
+    let mut text = String::from("functions:\n");
+    text += &match driven {
+        true => commented(
+            &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
+            "kg; the force shows it",
+        ),
+        false => commented(
+            "  mass:      {fixed: 1.0}",
+            "kg; WRITE YOURS: without a force only k/m and c/m show",
+        ),
+    };
+    let damping = 2.0 * DAMPING_RATIO * mass * omega;
+    text += &commented(
+        &format!(
+            "  damping:   {{basis: constant, start: {}}}",
+            short(damping)
+        ),
+        "N s/m; starts at 2 % of critical",
+    );
+    let stiffness = short(mass * omega * omega);
+    let knots = (motion.periods() / PERIODS_PER_KNOT)
+        .floor()
+        .min(MOST_KNOTS);
+    text += &match knots >= 2.0 {
+        true => commented(
+            &format!(
+                "  stiffness: {{basis: piecewise-linear, knots: {knots}, start: {stiffness}}}"
+            ),
+            "N/m; free to change; basis: constant if it does not",
+        ),
+        false => commented(
+            &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),
+            "N/m; the record is short for one that changes",
+        ),
+    };
+    text
+}
+
+/// A line with a comment in a column of its own, where there is room.
+fn commented(line: &str, comment: &str) -> String {
+    match comment {
+        "" => format!("{line}\n"),
+        _ => format!("{line:<48}  # {comment}\n"),
+    }
+}
+
+/// Four significant digits.
+fn short(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    format!("{rounded:?}").trim_end_matches(".0").to_owned()
+}
+
+/// A text as YAML takes it, in a list or map too.
+fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "_/.- ".contains(c);
+    let begins = text.starts_with(char::is_alphabetic) || text.starts_with("../");
+    let word = matches!(
+        text.to_ascii_lowercase().as_str(),
+        "true" | "false" | "null" | "yes" | "no" | "on" | "off" | "estimate"
+    );
+    let plain = begins && !word && text.chars().all(is_plain) && !text.ends_with(' ');
+    match plain {
+        true => text.to_owned(),
+        false => serde_json::Value::from(text).to_string(),
+    }
+}

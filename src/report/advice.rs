@@ -1,0 +1,109 @@
+//! What a run came to, in a few lines: what is sure, what stays open, what to try next. The summary in
+//! the terminal and the page say the same.
+
+use super::document::ResultDocument;
+use crate::solvers::{Solver, Status};
+
+/// Below this share of the readings the fit does not explain the record, per cent.
+const POOR: f64 = 90.0;
+/// Residuals with a lower probability under white noise have a pattern.
+const PATTERN: f64 = 0.05;
+/// Half the step may change the model's readings by this share of the largest one.
+const COARSE: f64 = 1e-3;
+/// So many things to try next are enough.
+const MOST: usize = 3;
+
+/// What the readings settle, in sentences.
+pub fn settled(document: &ResultDocument) -> Vec<&str> {
+    sentences(document, true)
+}
+
+/// What they leave open, in sentences.
+pub fn open(document: &ResultDocument) -> Vec<&str> {
+    sentences(document, false)
+}
+
+fn sentences(document: &ResultDocument, is_settled: bool) -> Vec<&str> {
+    let known = &document.identifiability;
+    let all = known.verdicts.iter().chain(&known.functions);
+    let all = all.map(String::as_str);
+    all.filter(|s| !s.ends_with(" is given"))
+        .filter(|s| says_settled(s) == is_settled)
+        .collect()
+}
+
+/// Whether a sentence of the counting or of a verdict says that something can be known.
+fn says_settled(sentence: &str) -> bool {
+    let open = [" is free", " not identified", " only on ", " is not seen"];
+    !open.iter().any(|words| sentence.contains(words))
+}
+
+/// The worst fit of a channel, per cent.
+pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
+    let channels = document.experiments.iter().flat_map(|e| &e.channels);
+    channels
+        .map(|c| c.fit_percent)
+        .filter(|x| x.is_finite())
+        .reduce(f64::min)
+}
+
+/// What to try next, the most urgent first; at most three.
+pub fn next(document: &ResultDocument) -> Vec<String> {
+    let mut steps = Vec::new();
+    steps.extend(about_ending(document));
+    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    let pattern =
+        channels().any(|c| c.sigma.is_some() && c.whiteness_p_value.is_some_and(|p| p < PATTERN));
+    if let Some(worst) = worst_fit(document).filter(|worst| *worst < POOR) {
+        steps.push(format!(
+            "the readings are matched to {worst:.0} % only: start from the readings (fit.initial=data), or let a \
+             function change more (basis: piecewise-linear, more knots)"
+        ));
+    } else if pattern {
+        steps.push(
+            "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, \
+             quadratic_damping, coulomb_friction)"
+                .into(),
+        );
+    }
+    if (document.half_step.as_ref()).is_some_and(|half| half.change_per_reading > COARSE) {
+        steps.push("the steps are coarse: grid.nodes=auto".into());
+    }
+    let known = &document.identifiability;
+    let is_simulated = document.model.method != Solver::EquationError.name();
+    if is_simulated && document.model.parameters > 0 {
+        steps.push(match known.seen < known.of {
+            true => format!(
+                "{} free values, {} of them visible at most: fewer (knots), or add `smooth`; `kmcfit study` tells \
+                 which are seen",
+                known.of, known.seen
+            ),
+            false => "`kmcfit study` tells how sure each function is, and which experiment would show most"
+                .into(),
+        });
+    }
+    steps.truncate(MOST);
+    steps
+}
+
+fn about_ending(document: &ResultDocument) -> Option<String> {
+    let status = document.outcome.status.as_str();
+    let is = |s: Status| s.name() == status;
+    let newton = Solver::GaussNewton.name();
+    Some(match () {
+        () if is(Status::MaxIterations) => format!(
+            "the iterations ran out: fit.stop.iterations={}",
+            10 * document.counts.iterations.max(1)
+        ),
+        () if is(Status::TimeLimit) => "the time ran out: a larger fit.stop.seconds".into(),
+        () if is(Status::Interrupted) => "`kmcfit resume` goes on with this fit".into(),
+        () if is(Status::Stalled) && document.model.method != newton => {
+            format!("the search is stuck: fit.method={newton}")
+        }
+        () if is(Status::Stalled) || is(Status::Infeasible) || is(Status::Failed) => {
+            "start elsewhere: fit.initial=data, or other start values; soften constraints (soft)"
+                .into()
+        }
+        () => return None,
+    })
+}

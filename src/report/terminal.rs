@@ -1,0 +1,231 @@
+//! Charts of letters: readings against fit, and the functions, for a look in the terminal.
+
+use super::columns::Columns;
+use super::document::ResultDocument;
+use crate::error::InputError;
+use crate::functions::Quantity;
+use std::path::Path;
+
+/// Columns for the numbers beside a chart.
+const MARGIN: usize = 10;
+/// Rows of a chart of readings, and of a function.
+const TALL: usize = 10;
+const LOW: usize = 5;
+/// Narrowest and widest chart, in columns.
+const WIDTHS: [usize; 2] = [40, 160];
+
+/// The charts of a finished run in a folder, `width` columns wide.
+///
+/// # Errors
+/// When a table of the run cannot be read.
+pub fn charts(
+    folder: &Path,
+    document: &ResultDocument,
+    width: usize,
+) -> Result<String, InputError> {
+    let width = width.clamp(WIDTHS[0], WIDTHS[1]);
+    let mut text = String::new();
+    for (e, experiment) in document.experiments.iter().enumerate() {
+        for channel in &experiment.channels {
+            let name = format!("readings/{}-{}.csv", e + 1, channel.kind);
+            let table = Columns::read(&folder.join(name))?;
+            let title = format!(
+                "{}: {} in {} (line: fit, o: readings off it)",
+                experiment.name, channel.kind, channel.unit
+            );
+            let times = table.required("t_s")?;
+            let mut chart = Chart::new(width, TALL, &times);
+            chart.scale(&[&table.required("reading")?, &table.required("model")?]);
+            chart.line(&times, &table.required("model")?);
+            chart.points(&times, &table.required("reading")?);
+            text += &format!("\n{title}\n{}", chart.text());
+        }
+    }
+    let table = Columns::read(&folder.join("functions.csv"))?;
+    let times = table.required("t_s")?;
+    let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
+    for quantity in names.filter_map(|name| Quantity::ALL.into_iter().find(|q| q.name() == name)) {
+        let Some(values) = table.column(quantity.column()) else {
+            continue;
+        };
+        let mut chart = Chart::new(width, LOW, &times);
+        chart.scale(&[&values]);
+        chart.line(&times, &values);
+        text += &format!(
+            "\n{} in {}\n{}",
+            quantity.name(),
+            quantity.unit(),
+            chart.text()
+        );
+    }
+    Ok(text)
+}
+
+/// A chart in Braille: two dots across and four down in each character.
+struct Chart {
+    width: usize,
+    height: usize,
+    dots: Vec<u8>,
+    marks: Vec<bool>,
+    times: [f64; 2],
+    values: [f64; 2],
+}
+
+impl Chart {
+    fn new(width: usize, height: usize, times: &[f64]) -> Self {
+        let width = width - MARGIN - 2;
+        Self {
+            width,
+            height,
+            dots: vec![0; width * height],
+            marks: vec![false; width * height],
+            times: range(times),
+            values: [0.0, 1.0],
+        }
+    }
+
+    fn scale(&mut self, series: &[&[f64]]) {
+        let ranges = series.iter().map(|values| range(values));
+        let both = ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        self.values = both.unwrap_or([0.0, 1.0]);
+    }
+
+    /// The dot of a point, from the upper left.
+    fn dot(&self, t: f64, y: f64) -> Option<[usize; 2]> {
+        let place = |x: f64, [low, high]: [f64; 2], dots: usize| {
+            let share = match high > low {
+                true => (x - low) / (high - low),
+                false => 0.5,
+            };
+            let last = (dots - 1) as f64;
+            (share.is_finite()).then(|| (share * last).round().clamp(0.0, last) as usize)
+        };
+        let across = place(t, self.times, 2 * self.width)?;
+        let up = place(y, self.values, 4 * self.height)?;
+        Some([across, 4 * self.height - 1 - up])
+    }
+
+    fn line(&mut self, times: &[f64], values: &[f64]) {
+        let mut before: Option<[usize; 2]> = None;
+        for (t, y) in times.iter().zip(values) {
+            let here = self.dot(*t, *y);
+            if let Some(end) = here {
+                let begin = before.unwrap_or(end);
+                let steps = (0..2).map(|i| begin[i].abs_diff(end[i])).max().unwrap_or(0);
+                for step in 0..=steps {
+                    let share = step as f64 / steps.max(1) as f64;
+                    let at = |i: usize| {
+                        let (a, b) = (begin[i] as f64, end[i] as f64);
+                        (a + share * (b - a)).round() as usize
+                    };
+                    self.set([at(0), at(1)]);
+                }
+            }
+            before = here;
+        }
+    }
+
+    fn set(&mut self, [x, y]: [usize; 2]) {
+        // Braille counts its first three rows column by column, the fourth after them.
+        const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+        self.dots[y / 4 * self.width + x / 2] |= BITS[y % 4][x % 2];
+    }
+
+    /// Points, seen where the line is not.
+    fn points(&mut self, times: &[f64], values: &[f64]) {
+        for (t, y) in times.iter().zip(values) {
+            if let Some([x, y]) = self.dot(*t, *y) {
+                self.marks[y / 4 * self.width + x / 2] = true;
+            }
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for row in 0..self.height {
+            let label = match row {
+                0 => number(self.values[1]),
+                _ if row + 1 == self.height => number(self.values[0]),
+                _ => String::new(),
+            };
+            let cells = row * self.width..(row + 1) * self.width;
+            let cell = |i: usize| match (self.dots[i], self.marks[i]) {
+                (0, true) => 'o',
+                (0, false) => ' ',
+                (dots, _) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
+            };
+            let line: String = cells.map(cell).collect();
+            text += &format!("{label:>MARGIN$} │{}\n", line.trim_end());
+        }
+        let [first, last] = self.times.map(number);
+        let end = format!("{last} s");
+        let room = self.width - first.len().min(self.width);
+        text + &format!("{:>MARGIN$} {first} {end:>room$}\n", "")
+    }
+}
+
+/// Smallest and largest finite value.
+fn range(values: &[f64]) -> [f64; 2] {
+    let finite = || values.iter().copied().filter(|x| x.is_finite());
+    match (finite().reduce(f64::min), finite().reduce(f64::max)) {
+        (Some(low), Some(high)) => [low, high],
+        _ => [0.0, 1.0],
+    }
+}
+
+/// Four significant digits, in at most ten characters.
+fn number(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    let plain = format!("{rounded}");
+    match plain.len() < MARGIN {
+        true => plain,
+        false => format!("{rounded:e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use insta::assert_snapshot;
+
+    #[test]
+    fn a_wave_with_readings_off_it() {
+        let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
+        let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
+        let mut readings = model.clone();
+        readings[100] = 2.5;
+        readings[50] = f64::NAN;
+        let mut chart = Chart::new(60, 6, &times);
+        chart.scale(&[&model, &readings]);
+        chart.line(&times, &model);
+        chart.points(&times, &readings);
+        assert_snapshot!(chart.text(), @"
+         3 │    ⡠⠔⠋⠉⠉⠓⢦⡀            o         ⡠⠖⠊⠉⠉⠒⠦⣀
+           │  ⡴⠊       ⠈⠢⡀                 ⢀⡴⠋       ⠈⠣⡀
+           │⡠⠊           ⠈⠢⡀              ⣠⠎           ⠈⢦⡀
+           │⠁              ⠙⢆           ⢀⠜⠁              ⠙⢄
+           │                ⠈⠳⣄       ⢀⠔⠁                  ⠑
+        -3 │                   ⠑⠦⣄⣀⣀⡤⠖⠉
+           0                                          9.95 s
+        ");
+    }
+
+    #[test]
+    fn constants_and_nothing_have_a_chart() {
+        let mut chart = Chart::new(40, 5, &[0.0, 25.0]);
+        chart.scale(&[&[2.0, 2.0]]);
+        chart.line(&[0.0, 25.0], &[2.0, 2.0]);
+        assert_snapshot!(chart.text(), @"
+        2 │
+          │
+          │⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒
+          │
+        2 │
+          0                        25 s
+        ");
+        let mut empty = Chart::new(40, 5, &[]);
+        empty.scale(&[&[f64::NAN]]);
+        empty.line(&[f64::NAN], &[f64::NAN]);
+        assert!(empty.text().lines().count() == 6);
+    }
+}

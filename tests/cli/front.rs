@@ -1,0 +1,390 @@
+//! What one needs before and beside a fit: init, explain, schema, demo, --set, completions, man.
+
+use crate::workbench::{MODEL, Workbench, column, readings, repository};
+use insta::assert_snapshot;
+use serde_json::Value;
+
+#[test]
+fn keys_are_explained() {
+    let bench = Workbench::empty();
+    assert_snapshot!(bench.run_to(0, &["explain", "tolerance"]), @"
+    fit.stop.tolerance
+      Converged when an iteration changes J and the functions by less than this part.
+      kind     a number
+      default  1e-10, if no other rule is given
+      example  tolerance: 1e-10
+    ");
+    assert_snapshot!(bench.run_to(0, &["explain", "functions.mass.basis"]), @"
+    functions.mass.basis
+      Shape of the function over time, and so what its free values are.
+      kind     one of the words below
+      example  basis: piecewise-linear
+      also     functions.damping.basis, functions.stiffness.basis, functions.cubic_stiffness.basis, functions.quadratic_damping.basis and 9 more
+
+      nodal               A free value at every node of the grid.
+      constant            One value for all times.
+      piecewise-constant  One value per cell between knots.
+      piecewise-linear    One value per knot, linear in between.
+      polynomial          A polynomial over the whole record.
+      b-spline            A cubic spline.
+    ");
+    assert_snapshot!(bench.run_to(0, &["explain", "experiments[0].initial"]), @"
+    experiments.initial
+      State at the beginning, or `estimate` for both of its numbers.
+      kind     `estimate`, or a map with the keys below
+      default  none: it must be there
+      example  initial: {displacement: 3.3, velocity: 1.0}
+
+      State at the beginning: each number known, `estimate`, or an estimate with a start or a prior.
+      displacement  Displacement at the beginning.
+      velocity      Velocity at the beginning.
+    ");
+    assert_snapshot!(bench.run_to(0, &["explain"]), @"
+    Keys of a model file; `kmcfit explain KEY` says more of one:
+
+      format       Version of the file format.
+      title        What reports call the run.
+      experiments  Measured (or to be simulated) motions of the same device, over the same time.
+      grid         Time nodes and stepper.
+      functions    Mass, damping, stiffness and further terms over time.
+      constraints  What the functions must satisfy besides their own `min` and `max`; each map demands one thing.
+      fit          How to fit.
+      truth        The true functions, where they are known; for reports only.
+      predict      Other initial states to predict the motion from.
+      study        What `kmcfit study` looks into besides what it always does.
+    ");
+    let (code, stdout, stderr) = bench.run(&["explain", "fit.stop.tolerence"]);
+    assert_eq!((code, stdout.as_str()), (2, ""));
+    assert_snapshot!(stderr, @"
+    error: KEY: there is no such key
+      found: `fit.stop.tolerence`
+      expected: a key of a model file; `kmcfit explain` lists those at the top
+      hint: did you mean `fit.stop.tolerance`?
+    ");
+    let stderr = bench.run(&["explain", "nods"]).2;
+    assert!(stderr.contains("did you mean `nodes`?"), "{stderr}");
+    assert!(bench.contents().is_empty());
+}
+
+#[test]
+fn the_schema_is_printed() {
+    let printed = Workbench::empty().run_to(0, &["schema"]);
+    let shipped = std::fs::read_to_string(repository("docs/kmcfit.schema.json")).expect("a file");
+    assert!(printed == shipped);
+}
+
+/// Each starter model is read without a warning and its fit explains the record, where nothing but
+/// what can be seen in the table is needed for that.
+#[test]
+fn starters_can_be_fitted() {
+    let bench = Workbench::with_shipped_models();
+    for (data, fits) in [
+        ("paper.csv", 80.0),
+        ("accelerometer.txt", 97.0),
+        ("roll.tsv", 90.0),
+        ("hammer_1.csv", 99.0),
+        ("shaker.csv", 99.0),
+        ("table.csv", 99.0),
+        ("camera.csv", 0.0),
+        ("duffing.csv", 0.0),
+        ("moving_support.csv", 0.0),
+    ] {
+        let (data, model) = (format!("data/{data}"), format!("{data}.yaml"));
+        bench.run_to(0, &["init", &data, "--out", &model]);
+        assert!(bench.read(&model).contains(&format!("data: {data}\n")));
+        let (code, _, stderr) = bench.run(&["check", &model, "--no-gradient"]);
+        assert_eq!(code, 0, "{model}: {stderr}");
+        assert!(!stderr.contains("warning"), "{model}: {stderr}");
+        if fits > 0.0 {
+            let fit = bench.run_to(0, &["fit", &model, "--no-report", "--json"]);
+            let result: Value = serde_json::from_str(&fit).expect("JSON");
+            let percent = &result["experiments"][0]["channels"][0]["fit_percent"];
+            assert!(
+                percent.as_f64().expect("a number") > fits,
+                "{model}: {percent}"
+            );
+        }
+    }
+    let schema: Value = serde_json::from_str(&bench.read("kmcfit.schema.json")).expect("JSON");
+    assert_eq!(schema["title"], "kmcfit model file");
+}
+
+#[test]
+fn a_starter_says_what_was_found() {
+    let bench = Workbench::empty();
+    let text = readings(201).replace("t_s,y_m", "Time [ms],Weg_mm");
+    bench.write("run 1/my data.csv", &text);
+    assert_snapshot!(bench.run_to(0, &["init", "run 1/my data.csv"]), @"
+    run 1/my data.csv
+      201 readings over 0.02 s, one every 0.0001 s
+      column `Time [ms]`: time, ms
+      column `Weg_mm`: displacement, mm
+      dominant frequency 159.6 Hz: 3 periods in the record
+    the model is run 1/my data.yaml; look at it, then
+      kmcfit check 'run 1/my data.yaml' --no-gradient
+      kmcfit fit 'run 1/my data.yaml'
+    ");
+    assert_snapshot!(bench.read("run 1/my data.yaml"), @r#"
+    # yaml-language-server: $schema=kmcfit.schema.json
+    # A starter model, made from the readings. `kmcfit check` reads it, `kmcfit fit` fits it,
+    # `kmcfit explain KEY` says what a key does.
+    format: 1
+    title: my data
+    experiments:
+      - name: record 1
+        data: my data.csv
+        columns: {time: "Time [ms]", displacement: Weg_mm}  # by name or by number from 1
+        units: {displacement: mm}                     # converted to SI
+        sigma: {displacement: estimate}               # standard deviation of a reading, SI; a number, if it is known
+        initial: estimate                             # or {displacement: …, velocity: …} in m and m/s
+    grid: {nodes: auto}                               # as many steps as the frequencies of the readings ask for
+    functions:
+      mass:      {fixed: 1.0}                         # kg; WRITE YOURS: without a force only k/m and c/m show
+      damping:   {basis: constant, start: 40.11}      # N s/m; starts at 2 % of critical
+      stiffness: {basis: constant, start: 1006000}    # N/m; the record is short for one that changes
+    # truth: {data: truth.csv}                        # the true functions, where they are known
+    fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}
+    "#);
+    let again = bench.run(&["init", "run 1/my data.csv"]);
+    assert_eq!(again.0, 2);
+    assert_snapshot!(again.2, @"
+    error: run 1/my data.yaml: there is such a file already
+      expected: another name: --out MODEL
+    ");
+    bench.write("only.csv", "acc\n1\n2\n1\n");
+    assert_snapshot!(bench.run(&["init", "only.csv"]).2, @"
+    error: only.csv: there is no column of times
+      found: no column whose numbers increase from row to row
+      expected: a column of times, or `--sample-rate HZ`
+    ");
+    assert_snapshot!(bench.run(&["init", "only.csv", "--sample-rate", "0"]).2, @"
+    error: --sample-rate: no rate can be this
+      found: 0
+      expected: a number of readings per second, greater than 0
+    ");
+    assert_snapshot!(bench.run(&["init", "onli.csv"]).2, @"
+    error: onli.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+      hint: did you mean `only.csv`?
+    ");
+    assert!(!bench.path("only.yaml").exists());
+}
+
+#[test]
+fn values_are_set() {
+    let bench = Workbench::with_small_model();
+    let fit = |set: &[&str], out: &str| -> Value {
+        let mut arguments = vec!["fit", "model.yaml", "--out", out, "--json"];
+        arguments.extend(set.iter().flat_map(|s| ["--set", *s]));
+        serde_json::from_str(&bench.run_to(0, &arguments)).expect("JSON")
+    };
+    let sets = [
+        "fit.stop.iterations=3",
+        "functions.mass={fixed: 2.5}",
+        "experiments.0.sigma.displacement=0.1",
+    ];
+    let result = fit(&sets, "set");
+    assert_eq!(result["counts"]["iterations"], 3);
+    assert_eq!(result["functions"]["mass"]["max"], 2.5);
+    assert_eq!(result["model"]["cost_kind"], "chi-square");
+    assert_eq!(result["model"]["overrides"], serde_json::json!(sets));
+    let page = bench.read("set/report.html");
+    assert!(page.contains("kmcfit fit model.yaml --set fit.stop.iterations=3 --set"));
+    // The same as a model that says so itself.
+    let written = MODEL
+        .replace("iterations: 5", "iterations: 3")
+        .replace("{basis: nodal, start: 2.0}", "{fixed: 2.5}")
+        .replace("    initial", "    sigma: {displacement: 0.1}\n    initial");
+    bench.write("model.yaml", &written);
+    let same = fit(&[], "written");
+    assert_eq!(result["cost"], same["cost"]);
+    assert_eq!(same["model"].get("overrides"), None);
+    assert_eq!(
+        bench.read("set/functions.csv"),
+        bench.read("written/functions.csv")
+    );
+}
+
+#[test]
+fn check_and_simulate_take_values_too() {
+    let bench = Workbench::with_shipped_models();
+    let check = [
+        "check",
+        "models/paper-lbfgs.yaml",
+        "--no-gradient",
+        "--set",
+        "grid.nodes=1000",
+    ];
+    assert!(bench.run_to(0, &check).contains(": 1000 nodes over 25 s"));
+    let set = "functions.stiffness={fixed: 4.0}";
+    let simulate = [
+        "simulate",
+        "models/paper-device.yaml",
+        "--set",
+        set,
+        "--out",
+        "m.csv",
+    ];
+    bench.run_to(0, &simulate);
+    let record: Value = serde_json::from_str(&bench.read("m.csv.json")).expect("JSON");
+    assert_eq!(record["overrides"], serde_json::json!([set]));
+    assert_ne!(
+        column(&bench.read("m.csv"), "y_m"),
+        column(&bench.read("data/paper.csv"), "y_m")
+    );
+}
+
+#[test]
+fn mistakes_in_what_is_set() {
+    let bench = Workbench::with_small_model();
+    let said = |set: &str| {
+        let before = bench.contents();
+        let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--set", set]);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{set}");
+        assert_eq!(bench.contents(), before);
+        stderr
+    };
+    let sets = [
+        "fit.stop.iteration=5",
+        "fitt.stop=5",
+        "fit.stop.iterations=2e3",
+        "functions.mass.basis=nodes",
+        "functions.mass.start=-1",
+        "experiments.sigma=1",
+        "experiments.3.sigma.displacement=1",
+        "title.en=a",
+        "fit.0=a",
+        "fit.stop.iterations",
+        "=5",
+        "fit.stop={iterations: ",
+        "fit.stop.iterations=",
+        "functions.mass.start={data: nothing.csv, column: m}",
+    ];
+    let all: Vec<String> = sets.iter().map(|set| said(set)).collect();
+    assert_snapshot!(all.join("\n"), @"
+    error: --set fit.stop.iteration=5: fit.stop: unknown key
+      found: `iteration`
+      expected: one of: iterations, cost_ratio, gradient_ratio, tolerance, step, seconds
+      hint: did you mean `iterations`?
+
+    error: --set fitt.stop=5: unknown key
+      found: `fitt`
+      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
+      hint: did you mean `fit`?
+
+    error: --set fit.stop.iterations=2e3: fit.stop.iterations: not an integer
+      found: the floating-point number 2000
+      expected: an integer
+      hint: write 2000
+
+    error: --set functions.mass.basis=nodes: functions.mass.basis: unknown choice
+      found: `nodes`
+      expected: one of: nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
+
+    error: --set functions.mass.start=-1: functions.mass.start: the mass must be positive at all times
+      found: -1
+      expected: a number greater than 0, in kg
+
+    error: --set experiments.sigma=1: experiments is a list
+      found: `sigma`
+      expected: a position, as in experiments.0.sigma
+
+    error: --set experiments.3.sigma.displacement=1: the list experiments has no such element
+      found: position 3
+      expected: the position 0
+
+    error: --set title.en=a: title is one value in this model, with no keys below it
+      expected: title=VALUE, which replaces it
+
+    error: --set fit.0=a: fit is a map
+      found: position 0
+      expected: a key
+
+    error: --set: there is no `=`
+      found: `fit.stop.iterations`
+      expected: KEY=VALUE, for instance fit.stop.iterations=50
+
+    error: --set: there is no key before `=`
+      found: `=5`
+      expected: KEY=VALUE, for instance fit.stop.iterations=50
+
+    error: --set: the value cannot be read
+      found: `fit.stop={iterations: `
+      expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
+
+    error: --set: the value cannot be read
+      found: `fit.stop.iterations=`
+      expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
+
+    error: --set functions.mass.start={data: nothing.csv, column: m}: functions.mass.start.data: nothing.csv: there is no such file
+      expected: a CSV file with one row of column names and rows of numbers
+    ");
+}
+
+#[test]
+fn the_demo_needs_nothing() {
+    let bench = Workbench::empty();
+    let stdout = bench.run_to(0, &["demo"]);
+    assert!(stdout.contains("but is another device"), "{stdout}");
+    assert!(
+        stdout.contains("the true device: k/m and c/m to"),
+        "{stdout}"
+    );
+    assert!(bench.path("runs/demo/results/compare.html").exists());
+    for name in ["paper.csv", "paper_truth.csv"] {
+        let shipped = std::fs::read_to_string(repository("data").join(name)).expect("a file");
+        assert!(bench.read(&format!("runs/demo/data/{name}")) == shipped);
+    }
+    let model = "runs/demo/models/physical.yaml";
+    assert!(stdout.contains(&format!("kmcfit fit {model}")), "{stdout}");
+    bench.run_to(0, &["check", model, "--no-gradient"]);
+}
+
+/// Every command, by the program's own help.
+fn commands(bench: &Workbench) -> Vec<String> {
+    let help = bench.run_to(0, &["--help"]);
+    let (_, commands) = help.split_once("Commands:\n").expect("commands");
+    let (commands, _) = commands.split_once("\n\n").expect("options");
+    let is_new = |line: &&str| line.starts_with("  ") && !line.starts_with("   ");
+    let names = commands.lines().filter(is_new);
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    let names: Vec<String> = names.map(str::to_owned).collect();
+    assert!(names.len() > 10, "{help}");
+    names
+}
+
+#[test]
+fn completions_know_all_commands() {
+    let bench = Workbench::empty();
+    let script = bench.run_to(0, &["completions", "bash"]);
+    for command in commands(&bench) {
+        assert!(script.contains(&format!("kmcfit,{command})")), "{command}");
+    }
+    for option in ["--set", "--no-gradient", "--sample-rate"] {
+        assert!(script.contains(option), "{option}");
+    }
+    for shell in ["zsh", "fish", "powershell", "elvish"] {
+        assert!(
+            bench
+                .run_to(0, &["completions", shell])
+                .contains("simulate")
+        );
+    }
+}
+
+#[test]
+fn the_manual_has_all_options() {
+    let bench = Workbench::empty();
+    let page = bench.run_to(0, &["man"]).replace("\\-", "-");
+    assert!(page.contains(".TH kmcfit 1"), "{page}");
+    for command in commands(&bench).iter().filter(|c| *c != "help") {
+        assert!(page.contains(&format!(".SS {command}\n")), "{command}");
+        let help = bench.run_to(0, &[command, "--help"]);
+        let words = help
+            .split_whitespace()
+            .map(|w| w.trim_end_matches([',', ']']));
+        for option in words.filter(|w| w.starts_with("--") && w.len() > 2) {
+            assert!(page.contains(option), "{command} {option}");
+        }
+    }
+}
