@@ -96,7 +96,11 @@ fn models_that_mean_more_than_they_say() {
         record.repeat(2001)
     ));
     assert!(
-        said.contains("too many experiments\n  found: 2001\n  expected: at most 2000"),
+        said.contains("experiments[2000]: there are too many experiments\n"),
+        "{said}"
+    );
+    assert!(
+        said.contains("found: 2001\n  expected: at most 2000"),
         "{said}"
     );
 }
