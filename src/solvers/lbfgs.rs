@@ -1,7 +1,8 @@
 //! Limited-memory BFGS in the L2 inner product.
 //!
 //! The search runs in coordinates `x`: the logarithm of the mass where its parameters can carry
-//! one, the parameters themselves elsewhere. A step in `ln m` cannot take the mass through zero,
+//! one, the parameters themselves elsewhere, or what they are of a [`unit`] where their numbers are
+//! very large or small. A step in `ln m` cannot take the mass through zero,
 //! where plain L-BFGS ends. All inner products are those of functions of time, `x^T G x'`, so the
 //! path hardly depends on the number of nodes. Pairs that have lost curvature are left out; after
 //! a failed line search the memory is dropped once and the search goes on along the gradient.
@@ -12,7 +13,7 @@
 use super::line_search::{Line, weak_wolfe};
 use super::point::Work;
 use super::{Bits, Descend, Memory, Point, Step};
-use crate::functions::{Functions, Quantity};
+use crate::functions::{Functions, Quantity, largest};
 use crate::lanes::sum::dot;
 use crate::lanes::{self, Elementwise};
 use crate::objective::Evaluation;
@@ -23,6 +24,9 @@ use std::collections::VecDeque;
 const LOST_CURVATURE: f64 = 1e-10;
 /// Largest change of `ln m` at the first trial of a step: a factor of e.
 const LONGEST_LOG_STEP: f64 = 1.0;
+
+/// Functions whose start is within these need no other unit.
+const ORDINARY: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// The method and its memory.
 pub struct Lbfgs {
@@ -242,6 +246,7 @@ impl Descend for Lbfgs {
         }
         let at = Coordinates {
             functions: &problem.functions,
+            units: units(&problem.functions),
             logarithmic,
         };
         self.here = Some(Here {
@@ -255,10 +260,31 @@ impl Descend for Lbfgs {
     }
 }
 
-/// Which coordinates are logarithms, and the inner product of all.
+/// Which coordinates are logarithms, the units of the others, and the inner product of all.
 struct Coordinates<'p> {
     functions: &'p Functions,
+    units: Vec<f64>,
     logarithmic: Vec<bool>,
+}
+
+/// The unit of every parameter.
+fn units(functions: &Functions) -> Vec<f64> {
+    let mut units = vec![1.0; functions.parameters()];
+    for (function, range) in functions.iter().zip(functions.ranges()) {
+        units[range.clone()].fill(unit(largest(&function.start)));
+    }
+    units
+}
+
+/// The power of two nearest to a function's start, where a number of that size beside ordinary ones
+/// would leave the first steps without any change of it, or with nothing else; otherwise one.
+fn unit(size: f64) -> f64 {
+    let ordinary = size == 0.0 || ORDINARY.contains(&size) || !size.is_finite();
+    if ordinary {
+        1.0
+    } else {
+        size.log2().round().exp2()
+    }
 }
 
 impl<'p> Coordinates<'p> {
@@ -273,29 +299,38 @@ impl<'p> Coordinates<'p> {
         }
         Self {
             functions,
+            units: units(functions),
             logarithmic,
         }
     }
 
+    /// For each parameter whether it is a logarithm, and its unit.
+    fn kinds(&self) -> impl Iterator<Item = (bool, f64)> {
+        self.logarithmic
+            .iter()
+            .copied()
+            .zip(self.units.iter().copied())
+    }
+
     fn forth(&self, parameters: &[f64]) -> Vec<f64> {
-        let pairs = parameters.iter().zip(&self.logarithmic);
+        let pairs = parameters.iter().zip(self.kinds());
         pairs
-            .map(|(p, log)| if *log { p.ln() } else { *p })
+            .map(|(p, (log, unit))| if log { p.ln() } else { p / unit })
             .collect()
     }
 
     fn back(&self, x: &[f64]) -> Vec<f64> {
-        let pairs = x.iter().zip(&self.logarithmic);
+        let pairs = x.iter().zip(self.kinds());
         pairs
-            .map(|(x, log)| if *log { x.exp() } else { *x })
+            .map(|(x, (log, unit))| if log { x.exp() } else { x * unit })
             .collect()
     }
 
     /// The gradient in these coordinates: L2, and Euclidean as its dual.
     fn gradient(&self, point: &Point) -> Vector {
         let dual: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
-            .zip(&self.logarithmic)
-            .map(|((g, p), log)| if *log { g * p } else { *g })
+            .zip(self.kinds())
+            .map(|((g, p), (log, unit))| if log { g * p } else { g * unit })
             .collect();
         Vector {
             primal: self.functions.gram_solve(&dual),
