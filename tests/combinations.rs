@@ -89,7 +89,7 @@ fit: {{method: {method}{}}}
                         // The paper's gradient and the equation error know no sigma.
                         match method {
                             "equation-error" | "steepest-descent, gradient: continuous" =>
-                                "".into(),
+                                String::new(),
                             _ => format!("sigma: {{{channel}: 0.01}}"),
                         },
                         match method {

@@ -194,10 +194,10 @@ impl Record {
     ) -> Result<Experiment, BuildError> {
         let drive = Drive {
             force: self
-                .signal("force", &self.force, grid)?
+                .signal("force", self.force.as_ref(), grid)?
                 .map(Waveform::Samples),
             base: self
-                .signal("base acceleration", &self.base, grid)?
+                .signal("base acceleration", self.base.as_ref(), grid)?
                 .map(BaseMotion::Acceleration),
         };
         let nodes = grid.nodes();
@@ -218,7 +218,7 @@ impl Record {
     fn signal(
         &self,
         what: &str,
-        samples: &Option<[Vec<f64>; 2]>,
+        samples: Option<&[Vec<f64>; 2]>,
         grid: &Grid,
     ) -> Result<Option<Signal>, BuildError> {
         let Some([times, values]) = samples else {

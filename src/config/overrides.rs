@@ -142,7 +142,7 @@ impl Override {
 fn path(key: &str) -> Vec<Segment> {
     let segment = |segment| match segment {
         Segment::Key(key) => key.parse().map_or(Segment::Key(key), Segment::Index),
-        index => index,
+        index @ Segment::Index(_) => index,
     };
     key_path(key).into_iter().map(segment).collect()
 }

@@ -82,10 +82,10 @@ impl Gauge {
                 .then(|| make(&vec![1.0; nodes], true))
                 .filter(|c| obeying(problem, vec![c.clone()]).len() == 1);
             // Nothing but the constant: said once.
-            if !(constant.is_some() && free.len() == 1) {
-                directions.extend(constant.into_iter().chain(free));
-            } else {
+            if constant.is_some() && free.len() == 1 {
                 directions.extend(constant);
+            } else {
+                directions.extend(constant.into_iter().chain(free));
             }
         }
         Self { directions }
@@ -332,7 +332,7 @@ fn change(
         match &functions.get(f).design {
             Design::Empty => {}
             Design::Identity => part.copy_from_slice(&product),
-            design => {
+            design @ Design::Sparse(_) => {
                 let gram = Gram::new(design, &weights).expect("independent functions");
                 let mut step = vec![0.0; part.len()];
                 // Twice: the second pass removes what the normal equations lose.

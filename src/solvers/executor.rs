@@ -257,7 +257,7 @@ impl Run<'_, '_> {
             Step::Stuck(reason) => self.outcome = Some(Outcome::new(Status::Stalled, reason)),
             Step::Minimum(reason) => self.outcome = Some(Outcome::new(Status::Converged, reason)),
             Step::Infeasible(reason) => {
-                self.outcome = Some(Outcome::new(Status::Infeasible, reason))
+                self.outcome = Some(Outcome::new(Status::Infeasible, reason));
             }
             Step::Moved {
                 point,

@@ -243,12 +243,7 @@ pub(super) fn build(
     };
     for (i, (spec, record)) in file.spec.experiments.iter().zip(records).enumerate() {
         let device = assemblies.of_experiment[i];
-        if !is_held_out(spec) {
-            let scalars = &mut built.scalars;
-            let (experiment, notes) = place(file, purpose, grid, (i, device), record, scalars)?;
-            built.fitted.push(experiment);
-            built.notes.push(notes);
-        } else {
+        if is_held_out(spec) {
             let mut scalars = Vec::new();
             let (experiment, notes) =
                 place(file, purpose, grid, (i, device), record, &mut scalars)?;
@@ -257,6 +252,11 @@ pub(super) fn build(
                 scalars,
                 notes,
             });
+        } else {
+            let scalars = &mut built.scalars;
+            let (experiment, notes) = place(file, purpose, grid, (i, device), record, scalars)?;
+            built.fitted.push(experiment);
+            built.notes.push(notes);
         }
     }
     Ok(built)
