@@ -12,11 +12,11 @@
 //!
 //! The pages are those of `docs/`, their equations turned into MathML, which browsers draw by themselves.
 
-#[doc = include_str!("tutorial.md")]
+#[cfg_attr(doc, doc = include_str!("tutorial.md"))]
 pub mod tutorial {}
 
-#[doc = include_str!("choosing.md")]
+#[cfg_attr(doc, doc = include_str!("choosing.md"))]
 pub mod choosing {}
 
-#[doc = include_str!("theory.md")]
+#[cfg_attr(doc, doc = include_str!("theory.md"))]
 pub mod theory {}
