@@ -1,5 +1,8 @@
 //! Finds the time-varying mass, damping and stiffness of an oscillator from its measured motion.
 //!
+//! New here? [`guide`] is a short course: a tutorial, how to choose and what goes wrong, the theory. [`builder`]
+//! states a problem in a few lines of Rust.
+//!
 //! # Equations
 //!
 //! **Motion.** A device with mass `m(t) > 0` (kg), damping `c(t)` (N s/m), stiffness `k(t)` (N/m) and
@@ -132,6 +135,7 @@ pub mod dynamics;
 pub mod error;
 mod excerpt;
 pub mod functions;
+pub mod guide;
 pub mod identifiability;
 mod input;
 mod lanes;

@@ -12,197 +12,50 @@ mod library {
     }
 }
 
+use common::pages::{Tour, blocks, blocks_in, fresh_clone, output, page};
+use common::repository;
 use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit::dynamics::Method;
 use kmcfit::objective::GradientKind;
 use kmcfit::solvers::{FitSettings, Solver, Status, Stopping, fit};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
-use tempfile::TempDir;
-
-/// A code block: its language and its lines.
-struct Block {
-    language: String,
-    lines: Vec<String>,
-}
-
-impl Block {
-    fn text(&self) -> String {
-        self.lines.iter().map(|line| format!("{line}\n")).collect()
-    }
-}
-
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
 
 fn readme() -> String {
-    fs::read_to_string(repository("README.md")).expect("the README")
-}
-
-fn blocks() -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    let mut open = false;
-    for line in readme().lines() {
-        match line.strip_prefix("```") {
-            Some(language) if !open => {
-                open = true;
-                blocks.push(Block {
-                    language: language.to_owned(),
-                    lines: Vec::new(),
-                });
-            }
-            Some(_) => open = false,
-            None if open => blocks.last_mut().expect("a block").lines.push(line.into()),
-            None => {}
-        }
-    }
-    assert!(!open, "a block is not closed");
-    blocks
-}
-
-fn blocks_in(language: &str) -> Vec<Block> {
-    let blocks = blocks().into_iter();
-    blocks.filter(|block| block.language == language).collect()
-}
-
-/// A folder with the shipped models and data, in which the README's commands are run in order.
-fn fresh_clone() -> TempDir {
-    let clone = tempfile::tempdir().expect("a temporary folder");
-    for folder in ["models", "data"] {
-        fs::create_dir(clone.path().join(folder)).expect("a folder");
-        for entry in fs::read_dir(repository(folder)).expect("a folder can be listed") {
-            let file = entry.expect("an entry");
-            let copy = clone.path().join(folder).join(file.file_name());
-            fs::copy(file.path(), copy).expect("a file can be copied");
-        }
-    }
-    clone
-}
-
-/// What a command of the README prints, `kmcfit` being the program under test.
-fn output(folder: &Path, command: &str) -> String {
-    let program = Path::new(env!("CARGO_BIN_EXE_kmcfit"));
-    let programs = program.parent().expect("the program is in a folder");
-    let path = std::env::var("PATH").unwrap_or_default();
-    let command = command.replace("cargo run --release --", "kmcfit");
-    let output = Command::new("sh")
-        .args(["-c", &command])
-        .current_dir(folder)
-        .env("PATH", format!("{}:{path}", programs.display()))
-        .output()
-        .expect("a shell");
-    let text = [output.stdout, output.stderr].concat();
-    String::from_utf8(text).expect("the program writes UTF-8")
-}
-
-/// A command of the README, the output shown for it, and what it prints.
-struct Step {
-    command: String,
-    shown: String,
-    printed: String,
-}
-
-/// The folder after all commands of the README, and those commands.
-struct Tour {
-    clone: TempDir,
-    steps: Vec<Step>,
+    page("README.md")
 }
 
 fn tour() -> &'static Tour {
     static TOUR: OnceLock<Tour> = OnceLock::new();
-    TOUR.get_or_init(|| {
-        let clone = fresh_clone();
-        let mut steps: Vec<Step> = Vec::new();
-        for block in blocks_in("console") {
-            for line in &block.lines {
-                match line.strip_prefix("$ ") {
-                    Some(command) => steps.push(Step {
-                        command: command.to_owned(),
-                        shown: String::new(),
-                        printed: output(clone.path(), command),
-                    }),
-                    None => {
-                        let step = steps.last_mut().expect("a command before its output");
-                        step.shown.push_str(line);
-                        step.shown.push('\n');
-                    }
-                }
-            }
-        }
-        Tour { clone, steps }
-    })
-}
-
-/// Below this an error is rounding, and differs from machine to machine.
-const ROUNDING: f64 = 1e-7;
-
-/// How far a shown number may be from the printed one, as a part of it: libraries of elementary
-/// functions differ in the last digit, and L-BFGS works in logarithms.
-const SLACK: f64 = 0.01;
-
-/// Whether two texts are the same word by word, and number by number within the slack.
-fn same(shown: &str, printed: &str) -> bool {
-    let words = |text: &str| -> Vec<String> {
-        let lines = text.lines().map(|line| match line.split_once(" solves, ") {
-            // The seconds that a run takes.
-            Some((before, _)) => before.to_owned(),
-            None => line.to_owned(),
-        });
-        let text: Vec<String> = lines.collect();
-        let apart = |c: char| c.is_whitespace() || ",;:()".contains(c);
-        let words = text.iter().flat_map(|line| line.split(apart));
-        words.filter(|w| !w.is_empty()).map(str::to_owned).collect()
-    };
-    let (shown, printed) = (words(shown), words(printed));
-    shown.len() == printed.len() && shown.iter().zip(&printed).all(|(a, b)| same_word(a, b))
-}
-
-fn same_word(shown: &str, printed: &str) -> bool {
-    match (shown.parse::<f64>(), printed.parse::<f64>()) {
-        (Ok(a), Ok(b)) => {
-            let small = a.abs() < ROUNDING && b.abs() < ROUNDING;
-            small || (a - b).abs() <= SLACK * a.abs().max(b.abs())
-        }
-        _ => shown == printed,
-    }
+    TOUR.get_or_init(|| Tour::of(&readme()))
 }
 
 #[test]
 fn the_first_block_is_two_commands() {
-    let blocks = blocks();
+    let blocks = blocks(&readme());
     let first = blocks.first().expect("a block");
     assert_eq!(first.language, "sh");
     assert_eq!(
         first.lines,
         ["cargo run --release -- fit models/paper.yaml", "cargo test"]
     );
-    assert_eq!(blocks_in("sh").len(), 1);
+    assert_eq!(blocks_in(&readme(), "sh").len(), 1);
 }
 
 #[test]
 fn commands_print_what_is_shown() {
-    let Tour { clone, steps } = tour();
-    assert!(steps.len() >= 8, "{}", steps.len());
-    for step in steps {
-        let (shown, printed) = (&step.shown, &step.printed);
-        assert!(
-            same(shown, printed),
-            "$ {}\nshown:\n{shown}\nprinted:\n{printed}",
-            step.command
-        );
-    }
+    let tour = tour();
+    assert!(tour.steps.len() >= 8, "{}", tour.steps.len());
+    tour.holds();
     // The first block's command, which the tour repeats, leaves the results that the text promises.
-    assert!(clone.path().join("runs/paper/result.json").exists());
+    assert!(tour.clone.path().join("runs/paper/result.json").exists());
 }
 
 #[test]
 fn models_are_valid_and_their_gradients_exact() {
     let clone = fresh_clone();
-    let models = blocks_in("yaml");
+    let models = blocks_in(&readme(), "yaml");
     let expected = [
         "2000 nodes over 25 s (midpoint), 2001 parameters, lbfgs",
         "2000 nodes over 25 s (midpoint), 16 parameters, gauss-newton",
@@ -251,7 +104,7 @@ functions:
 
 #[test]
 fn the_program_is_the_example() {
-    let programs = blocks_in("rust");
+    let programs = blocks_in(&readme(), "rust");
     assert_eq!(programs.len(), 1);
     let example = fs::read_to_string(repository("examples/library.rs")).expect("the example");
     assert_eq!(programs[0].text(), example);

@@ -2,6 +2,8 @@
 #![allow(dead_code)]
 
 pub mod closed_form;
+#[cfg(unix)]
+pub mod pages;
 pub mod reference;
 pub mod sensed;
 pub mod synthetic;
@@ -55,6 +57,11 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Functions::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// A file or folder of the repository.
+pub fn repository(path: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 /// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None`, loudly,
