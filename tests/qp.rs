@@ -102,8 +102,10 @@ fn the_multipliers_of_a_projection_balance_it() {
     bounds.push([(2, 1.0)], [f64::NEG_INFINITY, 0.0], [0.0, 0.0]);
     bounds.push([(3, 2.0)], [1.0, f64::INFINITY], [0.0, 0.0]);
     bounds.push([(4, 1.0)], [f64::NEG_INFINITY, 9.0], [0.0, 0.0]);
-    let mut constraints = Constraints::default();
-    constraints.groups = vec![sum, bounds];
+    let constraints = Constraints {
+        groups: vec![sum, bounds],
+        cones: Vec::new(),
+    };
     let metric = [1.0, 1.0, 2.0, 4.0, 1.0];
     let projection = project(&constraints, &[2.0, 1.0, 3.0, 0.25, 5.0], &metric);
     assert!(close(&projection.theta, &[1.0, 0.0, 0.0, 0.5, 5.0], 1e-6));
