@@ -57,6 +57,26 @@ proptest! {
 }
 
 #[test]
+fn several_right_hand_sides_are_solved_as_each_by_itself() {
+    let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
+    let mut sub = chain(12, 3, &numbers, &[0]);
+    sub.stations = (0..13).collect();
+    let targets: Vec<Vec<f64>> = (0..3)
+        .map(|k| {
+            (0..sub.residuals.len())
+                .map(|i| (k as f64 - 1.3 * i as f64).sin())
+                .collect()
+        })
+        .collect();
+    let together = sub.solve_plain_for(&targets).unwrap();
+    for (target, found) in targets.into_iter().zip(together) {
+        let alone = sub.solve_plain_for(&[target]).unwrap();
+        // The same operations on each side: the same bits.
+        assert_eq!(alone, [found]);
+    }
+}
+
+#[test]
 fn what_cannot_be_solved_is_not_solved() {
     let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
     let mut sub = chain(12, 3, &numbers, &[0]);

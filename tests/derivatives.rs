@@ -3,7 +3,8 @@
 mod common;
 
 use common::reference::{Inputs, motion};
-use kmcfit::dynamics::adjoint::discrete;
+use kmcfit::dynamics::adjoint::{continuous, discrete};
+use kmcfit::dynamics::quadrature::trapezoid_weights;
 use kmcfit::dynamics::{
     Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term, Trajectory,
 };
@@ -276,5 +277,48 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
             let order = (pair[0][i] / pair[1][i]).log2();
             assert!((order - expected).abs() < 0.1, "{errors:?}");
         }
+    }
+}
+
+/// Of a device whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
+fn initial_gradients(nodes: usize) -> [State; 2] {
+    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let times = oscillator.grid.times();
+    let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
+    let device = Device {
+        mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
+        coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
+    };
+    let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
+    let observed = of(|t| (0.7 * t).cos());
+    let weights = trapezoid_weights(nodes, oscillator.grid.step());
+    let pairs = motion.displacement.iter().zip(&observed);
+    let source = Trajectory {
+        displacement: (pairs.zip(weights))
+            .map(|((y, o), w)| 2.0 * w * (y - o))
+            .collect(),
+        velocity: vec![0.0; nodes],
+    };
+    [
+        continuous::gradient(&oscillator, &device, None, &motion, &observed).initial,
+        discrete::gradient(&oscillator, &device, None, &motion, &source).initial,
+    ]
+}
+
+/// Of order 2, as the stepper.
+#[test]
+fn the_continuous_gradient_of_the_initial_state_converges_to_the_discrete_one() {
+    let errors = [2000, 4000, 8000].map(|nodes| {
+        let [found, exact] = initial_gradients(nodes);
+        [
+            (found.displacement / exact.displacement - 1.0).abs(),
+            (found.velocity / exact.velocity - 1.0).abs(),
+        ]
+    });
+    for which in [0, 1] {
+        for pair in errors.windows(2) {
+            assert!(pair[1][which] < 0.3 * pair[0][which], "{errors:?}");
+        }
+        assert!(errors[2][which] < 1e-5, "{errors:?}");
     }
 }

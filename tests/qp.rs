@@ -93,6 +93,30 @@ fn absolute_values_are_soft_thresholds() {
     }
 }
 
+/// `w (x' - x) + A' lambda = 0`, group by group and row by row.
+#[test]
+fn the_multipliers_of_a_projection_balance_it() {
+    let mut sum = RowGroup::new("x0 + x1 = 1");
+    sum.push([(0, 1.0), (1, 1.0)], [1.0, 1.0], [0.0, 0.0]);
+    let mut bounds = RowGroup::new("x2 <= 0, 2 x3 >= 1, x4 <= 9");
+    bounds.push([(2, 1.0)], [f64::NEG_INFINITY, 0.0], [0.0, 0.0]);
+    bounds.push([(3, 2.0)], [1.0, f64::INFINITY], [0.0, 0.0]);
+    bounds.push([(4, 1.0)], [f64::NEG_INFINITY, 9.0], [0.0, 0.0]);
+    let constraints = Constraints {
+        groups: vec![sum, bounds],
+        cones: Vec::new(),
+    };
+    let metric = [1.0, 1.0, 2.0, 4.0, 1.0];
+    let projection = project(&constraints, &[2.0, 1.0, 3.0, 0.25, 5.0], &metric);
+    assert!(close(&projection.theta, &[1.0, 0.0, 0.0, 0.5, 5.0], 1e-6));
+    let [sum, bounds] = projection.multipliers.as_slice() else {
+        panic!("{projection:?}");
+    };
+    // The accuracy of the program behind it.
+    assert!(close(sum, &[1.0], 1e-6), "{sum:?}");
+    assert!(close(bounds, &[6.0, -0.5, 0.0], 1e-6), "{bounds:?}");
+}
+
 #[test]
 fn contradictions_are_infeasible() {
     let mut sub = nearest(&[0.0]);

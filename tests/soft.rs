@@ -116,3 +116,26 @@ fn a_high_price_is_a_hard_constraint() {
     );
     assert!(heavy(None).slack(&hard.best.parameters).1 <= TOLERANCE);
 }
+
+#[test]
+fn the_gradient_of_the_price_is_its_derivative() {
+    let mut group = RowGroup::new("bands of two functions");
+    group.push([(0, 0.7), (1, -1.9)], [-0.5, 0.5], [0.0, 0.0]);
+    group.push([(1, 2.5), (2, 0.3)], [1.0, f64::INFINITY], [1.0, 1.0]);
+    group.push([(0, 1.1), (2, 1.3)], [f64::NEG_INFINITY, 9.0], [2.0, 2.0]);
+    group.soft = Some(3.7);
+    // Broken from above, broken from below, held.
+    let theta = [2.3, -0.4, 1.7];
+    let mut gradient = vec![0.25; 3];
+    group.add_price_gradient(&theta, &mut gradient);
+    for (j, found) in gradient.iter().enumerate() {
+        let at = |h: f64| {
+            let mut theta = theta;
+            theta[j] += h;
+            group.price(&theta)
+        };
+        // A central difference of a parabola has no error but rounding: 1e-16 J/h.
+        let slope = (at(1e-3) - at(-1e-3)) / 2e-3;
+        assert!((found - 0.25 - slope).abs() < 1e-10, "{j}: {found} {slope}");
+    }
+}

@@ -117,3 +117,28 @@ impl Excitation {
         parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_steps_meet_the_old_stages_and_are_linear_between() {
+        let whole = Excitation {
+            force: Some(Stepwise::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
+            base: Some(Stepwise::new(vec![[0.5, 0.25, 1.0]])),
+        };
+        let halves = whole.halved();
+        let force = halves.force.unwrap();
+        let expected = [
+            [1.0, 2.5, 4.0],
+            [4.0, 3.5, 3.0],
+            [-2.0, -1.0, 0.0],
+            [0.0, 4.0, 8.0],
+        ];
+        assert_eq!(force.values(), expected);
+        let base = halves.base.unwrap();
+        assert_eq!(base.values(), [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]]);
+        assert_eq!(Excitation::default().halved(), Excitation::default());
+    }
+}

@@ -250,3 +250,92 @@ impl<const R: usize> Kernel for Rows<'_, R> {
         costs
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::quadrature::trapezoid;
+    use crate::dynamics::{Device, Grid, Method, Oscillator, Term};
+
+    const NODES: usize = 41;
+
+    /// Mass, damping and stiffness, and what is taken away from them.
+    fn functions() -> [[Vec<f64>; 3]; 2] {
+        let of =
+            |f: fn(f64) -> f64| -> Vec<f64> { (0..NODES).map(|i| f(0.2 * i as f64)).collect() };
+        [
+            [
+                of(|t| 2.0 + 0.3 * t.sin()),
+                of(|t| 0.4 - 0.05 * t),
+                of(|t| 3.0 + t.cos()),
+            ],
+            [
+                of(|t| 1.0 + 0.1 * t),
+                of(|t| 0.5 - 0.1 * t),
+                of(|t| t.sin() - 0.5),
+            ],
+        ]
+    }
+
+    /// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
+    fn by_itself(ray: &Ray, length: f64) -> Option<(Trajectory, f64)> {
+        let oscillator = Oscillator {
+            grid: Grid::new(0.0, ray.step * (NODES - 1) as f64, NODES).unwrap(),
+            method: Method::Midpoint,
+            terms: vec![Term::Damping, Term::Stiffness],
+        };
+        let [mass, damping, stiffness] = [0, 1, 2].map(|f| {
+            let pairs = ray.functions[f].iter().zip(ray.direction[f]);
+            pairs.map(|(p, g)| p - length * g).collect()
+        });
+        let device = Device {
+            mass,
+            coefficients: vec![damping, stiffness],
+        };
+        let motion = oscillator.forward(&device, ray.initial, None).ok()?;
+        let pairs = motion.displacement.iter().zip(ray.readings);
+        let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
+        let cost = trapezoid(&squares, ray.spacing);
+        Some((motion, cost))
+    }
+
+    #[test]
+    fn every_trial_is_the_forward_solve_by_itself() {
+        let [functions, direction] = functions();
+        let readings: Vec<f64> = (0..NODES).map(|i| (0.3 * i as f64).cos()).collect();
+        let ray = Ray {
+            functions: functions.each_ref().map(Vec::as_slice),
+            direction: direction.each_ref().map(Vec::as_slice),
+            initial: State {
+                displacement: 1.2,
+                velocity: -0.7,
+            },
+            readings: &readings,
+            step: 0.125,
+            spacing: 0.125,
+        };
+        // One lane, part of a row, whole rows, and more rows than one batch has.
+        for count in [1, 7, 8, 19, 32, 50] {
+            // The longest leave no mass.
+            let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
+            let mut trials = Trials::default();
+            let costs = trials.costs(ray, &lengths);
+            assert_eq!(costs.len(), count);
+            for (which, (&length, cost)) in lengths.iter().zip(costs).enumerate() {
+                let Some((motion, expected)) = by_itself(&ray, length) else {
+                    assert_eq!(cost, None, "trial {which} of {count}");
+                    continue;
+                };
+                // The sums are in another order.
+                let cost = cost.expect("a cost");
+                assert!(
+                    (cost / expected - 1.0).abs() < 1e-13,
+                    "trial {which} of {count}: {cost} {expected}"
+                );
+                let mut stored = Trajectory::zeros(NODES);
+                trials.motion_into(which, &mut stored);
+                assert_eq!(stored, motion, "trial {which} of {count}");
+            }
+        }
+    }
+}

@@ -72,3 +72,20 @@ fn secant(a: f64, slope_a: f64, b: f64, slope_b: f64) -> f64 {
     let zero = b - slope_b * (b - a) / (slope_b - slope_a);
     if zero.is_finite() { zero } else { GROWTH * b }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parabola_is_minimised_within_its_limits() {
+        // 3 - 4 x + 1.5 x^2 at x = 4, and steeper ones whose minimum is nearer or farther.
+        let at = |bend: f64| parabola(3.0, -4.0, 4.0, 3.0 - 16.0 + 16.0 * bend);
+        assert!((at(1.5) - 4.0 / 3.0).abs() < 1e-15);
+        assert_eq!(at(100.0), 0.4);
+        assert_eq!(at(0.6), 2.0);
+        // A line has no minimum.
+        assert_eq!(at(0.0), 2.0);
+        assert_eq!(secant(1.0, -3.0, 2.0, -1.0), 2.5);
+    }
+}
