@@ -1,7 +1,7 @@
 //! The journal of a fit: one line per iteration and per finished search, and a checkpoint beside it.
 //!
-//! Lines are appended and never changed, so a fit that is killed loses at most the last one. The
-//! checkpoint holds where the running search stands; it is replaced as a whole every now and then. Both
+//! Lines are appended and never changed; those of iterations wait for each other for some milliseconds, so a
+//! fit that is killed loses at most the last of them. The checkpoint holds where the running search stands; it is replaced as a whole every now and then. Both
 //! go when the results are written. What they hold and how a fit goes on from it is told by
 //! [`Keeper`]; nothing here looks at the system clock.
 
@@ -29,6 +29,10 @@ pub const CHECKPOINT: &str = "fit.checkpoint";
 const EVERY: Duration = Duration::from_secs(1);
 /// Checkpoints take at most one part in so many of the time of a fit.
 const SHARE: u32 = 50;
+
+/// Lines of iterations wait so long for more: a thousand quick iterations would else take as long to write
+/// down as a tenth of what they are.
+const GATHER: Duration = Duration::from_millis(5);
 
 /// A line: the number of the unit that it is about, and what is said of it.
 #[derive(Serialize, Deserialize)]
@@ -63,6 +67,9 @@ pub struct FitJournal {
     folder: PathBuf,
     fingerprint: String,
     file: File,
+    /// Lines that wait to be written, and when others were last.
+    waiting: String,
+    written: Instant,
     /// What an earlier run of the same fit left.
     before: Contents,
     /// The unit that is at work, from 1.
@@ -152,6 +159,8 @@ impl FitJournal {
             folder: folder.to_path_buf(),
             fingerprint: heading.fingerprint(),
             file,
+            waiting: String::new(),
+            written: Instant::now(),
             before,
             unit: 0,
             is_recalled: false,
@@ -183,14 +192,32 @@ impl FitJournal {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        let line = serde_json::to_string(&Line(self.unit, entry)).map_err(io::Error::other);
-        let written = line.and_then(|line| self.file.write_all((line + "\n").as_bytes()));
-        self.trouble = written.err();
+        let may_wait = matches!(entry, Entry::Row(_));
+        match serde_json::to_string(&Line(self.unit, entry)) {
+            Ok(line) => {
+                self.waiting += &line;
+                self.waiting.push('\n');
+            }
+            Err(error) => self.trouble = Some(io::Error::other(error)),
+        }
+        if !may_wait || self.written.elapsed() >= GATHER {
+            self.write();
+        }
+    }
+
+    /// Writes the lines that wait.
+    fn write(&mut self) {
+        if self.trouble.is_none() {
+            self.trouble = self.file.write_all(self.waiting.as_bytes()).err();
+        }
+        self.waiting.clear();
+        self.written = Instant::now();
     }
 
     /// Drops what an earlier run left after the first `length` bytes.
     fn cut(&mut self, length: u64) {
         self.before = Contents::default();
+        self.write();
         if let Err(error) = self.file.set_len(length) {
             self.trouble = Some(error);
         }
@@ -198,6 +225,7 @@ impl FitJournal {
 
     fn checkpoint(&mut self, standing: Standing) -> io::Result<()> {
         // The iterations before it must not be lost when it is not.
+        self.write();
         self.file.sync_data()?;
         let checkpoint = Checkpoint {
             fit: self.fingerprint.clone(),
@@ -206,6 +234,12 @@ impl FitJournal {
         };
         let text = serde_json::to_string(&checkpoint).map_err(io::Error::other)?;
         write_whole(&self.folder.join(CHECKPOINT), &text)
+    }
+}
+
+impl Drop for FitJournal {
+    fn drop(&mut self) {
+        self.write();
     }
 }
 
