@@ -190,6 +190,17 @@ fn what_cannot_be_meant_is_refused() {
             "mass: degree 1999, but at most 313 fits the grid",
         ),
         (
+            mass(Part::sought(
+                Basis::Polynomial { degree: usize::MAX },
+                vec![1.0],
+            )),
+            "mass: degree 18446744073709551615, but at most 313 fits the grid",
+        ),
+        (
+            mass(Part::constant(1.0)).nodes(usize::MAX),
+            "grid: 18446744073709551615 nodes, more than 100000000",
+        ),
+        (
             mass(Part::sought(Basis::Constant, vec![1.0, 2.0])),
             "mass: 2 start values, but 1 parameters",
         ),

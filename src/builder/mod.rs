@@ -39,6 +39,9 @@ use crate::observations::times::even_spacing;
 use crate::problem::Problem;
 use crate::solvers::{Start, states_from_readings};
 
+/// Most nodes: more would be asked for by mistake, and end in a lack of memory.
+const MOST_NODES: usize = 100_000_000;
+
 /// What a problem is made of.
 #[derive(Debug, Clone)]
 pub struct Builder {
@@ -200,6 +203,9 @@ impl Builder {
         };
         if nodes < Grid::FEWEST_NODES {
             return refuse(format!("{nodes} nodes, fewer than {}", Grid::FEWEST_NODES));
+        }
+        if nodes > MOST_NODES {
+            return refuse(format!("{nodes} nodes, more than {MOST_NODES}"));
         }
         match Grid::new(start, end - start, nodes) {
             Some(grid) => Ok(grid),

@@ -6,9 +6,6 @@ use crate::dynamics::Grid;
 use crate::functions::basis::{from_physical_powers, uniform_knots};
 use crate::functions::{Basis, CoefficientFunction, Design, Penalty, Quantity, Variation};
 
-/// Highest degree on N nodes, over sqrt(N): above it equally spaced nodes cannot tell polynomials apart.
-const DEGREE_PER_ROOT_OF_NODES: f64 = 7.0;
-
 /// Where a function comes from.
 #[derive(Debug, Clone, PartialEq)]
 enum Form {
@@ -253,20 +250,13 @@ impl Form {
                 (Basis::BSpline { knots }, *start)
             }
             Form::Polynomial(powers) => {
-                let most =
-                    (nodes - 1).min((DEGREE_PER_ROOT_OF_NODES * (nodes as f64).sqrt()) as usize);
-                let degree = match powers.len() {
-                    0 => return Err("a polynomial needs at least one start value".into()),
-                    n if n - 1 > most => {
-                        return Err(format!(
-                            "degree {}, but at most {most} fits the grid",
-                            n - 1
-                        ));
-                    }
-                    n => n - 1,
+                let Some(degree) = powers.len().checked_sub(1) else {
+                    return Err("a polynomial needs at least one start value".into());
                 };
+                let basis = Basis::Polynomial { degree };
+                checked(&basis, grid)?;
                 let start = from_physical_powers(grid, powers);
-                return Ok((Basis::Polynomial { degree }, start));
+                return Ok((basis, start));
             }
             Form::Sought(basis, start) => {
                 checked(basis, grid)?;
@@ -279,8 +269,15 @@ impl Form {
     }
 }
 
-/// Refuses knots that are not those of the record.
+/// Refuses knots that are not those of the record, and degrees that the grid does not tell apart.
 fn checked(basis: &Basis, grid: &Grid) -> Result<(), String> {
+    if let Basis::Polynomial { degree } = basis {
+        let most = Basis::highest_degree(grid);
+        return match *degree <= most {
+            true => Ok(()),
+            false => Err(format!("degree {degree}, but at most {most} fits the grid")),
+        };
+    }
     let (Basis::PiecewiseConstant { knots }
     | Basis::PiecewiseLinear { knots }
     | Basis::BSpline { knots }) = basis

@@ -47,7 +47,8 @@ impl Record {
         }
     }
 
-    /// From a known state: displacement (m) and velocity (m/s).
+    /// From a known state: displacement (m) and velocity (m/s) at the first time of all records, which count
+    /// time alike.
     #[must_use]
     pub fn from_state(mut self, displacement: f64, velocity: f64) -> Self {
         self.initial = Some(State {

@@ -12,10 +12,6 @@ use crate::functions::{Basis, Design, Gram};
 /// How near the first and last knot must be to the ends of the record, in steps.
 const SAME_TIME: f64 = 1e-6;
 
-/// Highest degree on N nodes, over sqrt(N): above it equally spaced nodes cannot tell polynomials
-/// apart in double precision (measured for N from 50 to 1000), and the trial would be expensive.
-const DEGREE_PER_ROOT_OF_NODES: f64 = 7.0;
-
 /// The key that a kind of basis has besides its name.
 fn own_key(kind: Kind) -> Option<&'static str> {
     match kind {
@@ -93,8 +89,7 @@ pub(super) fn build(
 
 fn degree(file: &ModelFile, grid: &Grid, key: &str, given: Count) -> Result<Basis, InputError> {
     let nodes = grid.nodes();
-    let stable = DEGREE_PER_ROOT_OF_NODES * (nodes as f64).sqrt();
-    let most = (nodes - 1).min(stable as usize);
+    let most = Basis::highest_degree(grid);
     if given.0 > most {
         return Err(file
             .error_at(key, "the degree is too high for the grid")
