@@ -1,9 +1,9 @@
 //! The journal of a fit: one line per iteration and per finished search, and a checkpoint beside it.
 //!
-//! Lines are appended and never changed; those of iterations wait for each other for some milliseconds, so a
-//! fit that is killed loses at most the last of them. The checkpoint holds where the running search stands; it is replaced as a whole every now and then. Both
-//! go when the results are written. What they hold and how a fit goes on from it is told by
-//! [`Keeper`]; nothing here looks at the system clock.
+//! Lines are appended and never changed; those of iterations wait for each other for some milliseconds, so
+//! a fit that is killed loses at most the last of them. The checkpoint holds where the running search
+//! stands; it is replaced as a whole every now and then. Both go when the results are written. What they
+//! hold and how a fit goes on from it is told by [`Keeper`]; nothing here looks at the system clock.
 
 mod heading;
 mod read;
