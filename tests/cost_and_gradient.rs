@@ -36,7 +36,8 @@ fn uneven(problem: &Problem) -> Vec<f64> {
 
 #[test]
 fn of_one_value_a_node() {
-    for nodes in [65, 100, 2000, 2049] {
+    // The last is long enough for several tiles and, where there are two cores, two threads.
+    for nodes in [65, 100, 2000, 4097, 120_000] {
         let problem = paper_problem(nodes, [2.0, 1.0, 1.0]);
         agree(&problem, &uneven(&problem));
     }

@@ -61,7 +61,10 @@ impl Kernel for Adjoint<'_> {
                     back::<A, true>(arithmetic, h, tile, scratch, &mut x)
                 }
             };
-            collect(arithmetic, tile, scratch, &last, &mut gradient);
+            let behind = collect(arithmetic, tile, scratch, &last, &mut gradient);
+            for (g, share) in gradient.iter_mut().zip(behind) {
+                g[tile.node(LANES, 0)] += share;
+            }
         }
         State {
             displacement: x[0],
@@ -85,7 +88,7 @@ fn back<A: Arithmetic, const VELOCITY: bool>(
     scratch.replay_back::<A, VELOCITY>(arithmetic, h, tile.length, &ends)
 }
 
-/// Brings the gradient of a tile back from its lanes.
+/// Brings the gradient of a tile back from its lanes; returns what belongs to the node behind it.
 #[inline(always)]
 pub(super) fn collect<A: Arithmetic>(
     arithmetic: A,
@@ -93,13 +96,14 @@ pub(super) fn collect<A: Arithmetic>(
     scratch: &Scratch,
     last: &[Row; 3],
     gradient: &mut [&mut [f64]; 3],
-) {
+) -> [f64; 3] {
     for ((g, rows), last) in gradient.iter_mut().zip(&scratch.gradient).zip(last) {
         tile.scatter(arithmetic, rows, g);
-        for (b, share) in last.iter().enumerate() {
-            g[tile.node(b, tile.length)] += share;
+        for (b, share) in last[..LANES - 1].iter().enumerate() {
+            g[tile.node(b + 1, 0)] += share;
         }
     }
+    [last[0][LANES - 1], last[1][LANES - 1], last[2][LANES - 1]]
 }
 
 /// The adjoint states at the ends of all blocks, from `x` behind the last back to the first, before

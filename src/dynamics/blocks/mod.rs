@@ -87,16 +87,13 @@ impl<'a> LinearDevice<'a> {
         weights: [f64; 2],
         gradient: [&mut [f64]; 3],
     ) -> (f64, State) {
-        with_scratch(|scratch| {
-            lanes::run(squares::Squares {
-                device: self,
-                initial,
-                readings,
-                weights,
-                gradient,
-                scratch,
-            })
-        })
+        squares::Squares {
+            device: self,
+            initial,
+            readings,
+            weights,
+        }
+        .solve(gradient)
     }
 
     /// Brings the functions into lanes.

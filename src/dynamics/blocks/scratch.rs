@@ -15,6 +15,32 @@ pub(super) type Ends = [[Row; 2]; 2];
 /// columns: what becomes of `(1, 0)` and of `(0, 1)`.
 pub(super) type Maps = [[[Row; 2]; 2]; 2];
 
+/// What becomes of any state at the start of a block: the block's map, and half the derivative of the sum of the
+/// squares of its residuals, `H x - g`, with respect to that state.
+pub(super) struct Chart {
+    pub maps: Maps,
+    /// `H` of both halves: its diagonal, then what stands beside it.
+    curvature: [[Row; 3]; 2],
+    /// `g` of both halves.
+    slope: [[Row; 2]; 2],
+}
+
+impl Chart {
+    /// `factor (H x - g)`: the adjoint state at the start of every block that is zero at its end.
+    pub fn driven(&self, starts: &Ends, factor: f64) -> Ends {
+        let mut driven = [[[0.0; LANES]; 2]; 2];
+        for (half, [dy, dw]) in driven.iter_mut().enumerate() {
+            let ([y, w], [gy, gw]) = (&starts[half], &self.slope[half]);
+            let [yy, ww, yw] = &self.curvature[half];
+            for b in 0..LANES {
+                dy[b] = factor * (yy[b] * y[b] + yw[b] * w[b] - gy[b]);
+                dw[b] = factor * (yw[b] * y[b] + ww[b] * w[b] - gw[b]);
+            }
+        }
+        driven
+    }
+}
+
 /// A tile in lanes.
 pub(super) struct Scratch {
     /// Mass, damping, stiffness.
@@ -139,6 +165,66 @@ impl Scratch {
             ];
         }
         maps
+    }
+
+    /// The charts of all blocks, from the functions and from readings in place of the source. With `KEEP`
+    /// the rates of all steps are kept as well.
+    #[inline(always)]
+    pub fn survey<A: Arithmetic, const KEEP: bool>(
+        &mut self,
+        arithmetic: A,
+        h: f64,
+        length: usize,
+    ) -> Chart {
+        let of = Constants::new(h).in_lanes(arithmetic);
+        let half = length / 2;
+        let mut left = [
+            self.coefficients(arithmetic, 0, of),
+            self.coefficients(arithmetic, half, of),
+        ];
+        let mut map = [[[of.one, of.zero], [of.zero, of.one]]; 2];
+        let mut curvature = [[of.zero; 3]; 2];
+        let mut slope = [[of.zero; 2]; 2];
+        for i in 0..half {
+            for block in 0..2 {
+                let j = block * half + i;
+                let reading = Eight::load(arithmetic, &self.source[0][j]);
+                let [from_y, from_w] = &mut map[block];
+                let [yy, ww, yw] = &mut curvature[block];
+                *yy += from_y[0] * from_y[0];
+                *ww += from_w[0] * from_w[0];
+                *yw += from_y[0] * from_w[0];
+                slope[block][0] += from_y[0] * reading;
+                slope[block][1] += from_w[0] * reading;
+                let right = self.coefficients(arithmetic, j + 1, of);
+                let rates = Rates::new(left[block], right, of);
+                if KEEP {
+                    self.keep_rates(j, &rates);
+                }
+                let increment = rates.increment(of);
+                *from_y = increment.forward(*from_y);
+                *from_w = increment.forward(*from_w);
+                left[block] = right;
+            }
+        }
+        let empty = [0.0; LANES];
+        let mut chart = Chart {
+            maps: [[[empty; 2]; 2]; 2],
+            curvature: [[empty; 3]; 2],
+            slope: [[empty; 2]; 2],
+        };
+        for block in 0..2 {
+            let [from_y, from_w] = map[block];
+            chart.maps[block] = [
+                [from_y[0].row(), from_y[1].row()],
+                [from_w[0].row(), from_w[1].row()],
+            ];
+            let [yy, ww, yw] = curvature[block];
+            chart.curvature[block] = [yy.row(), ww.row(), yw.row()];
+            let [gy, gw] = slope[block];
+            chart.slope[block] = [gy.row(), gw.row()];
+        }
+        chart
     }
 
     /// Rates of all steps from the functions.

@@ -3,7 +3,7 @@
 use crate::lanes::{Arithmetic, LANES, Row};
 
 /// Most steps of one lane: what a tile needs then stays in the second cache.
-pub(super) const LONGEST: usize = 256;
+pub(super) const LONGEST: usize = 512;
 
 /// Eight lanes of `length` steps each, one after the other from node `first`: lane `b` holds the
 /// nodes `first + b length ...`. Both halves of a lane are blocks: two chains that do not wait for each
