@@ -10,6 +10,10 @@
 
 mod common;
 
+/// The allocator of the program.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 use kmcfit::objective::GradientKind;
 use kmcfit::study::multistart::multistart;
 use std::hint::black_box;

@@ -80,6 +80,10 @@ impl From<InputError> for Failure {
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    if let Err(error) = crate::lanes::check_limit() {
+        complain(&error);
+        return ExitCode::from(BAD_INPUT);
+    }
     let result = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),

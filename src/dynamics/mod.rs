@@ -45,8 +45,9 @@ pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
 pub(crate) use trials::{Ray, Trials};
 
-/// What the blocks of linear motions are computed with on this processor: `AVX-512`, `AVX2` or `scalar`.
-/// All give the same bits.
+/// What motions, adjoints and tangents are computed with: `AVX-512`, `AVX2` or `scalar`, the widest that this
+/// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the
+/// same bits.
 pub fn arithmetic() -> &'static str {
     crate::lanes::name()
 }

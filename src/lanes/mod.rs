@@ -15,8 +15,11 @@ mod x86;
 #[cfg(test)]
 mod tests;
 
+use crate::error::{InputError, Place};
+use crate::near::nearest;
 use portable::Portable;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use std::sync::LazyLock;
 
 /// Number of lanes.
 pub(crate) const LANES: usize = 8;
@@ -116,14 +119,96 @@ pub(crate) trait Kernel {
     fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output;
 }
 
+/// The variable of the environment that holds the arithmetic down: `AVX-512`, `AVX2` or `scalar`. What comes
+/// out is the same; it is for tests, and for processors that are slower with wide registers.
+pub(crate) const LIMIT: &str = "KMCFIT_ARITHMETIC";
+
+/// How wide the registers may be.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Width {
+    Scalar,
+    Avx2,
+    Avx512,
+}
+
+impl Width {
+    const ALL: [Width; 3] = [Width::Scalar, Width::Avx2, Width::Avx512];
+
+    fn name(self) -> &'static str {
+        match self {
+            Width::Scalar => "scalar",
+            Width::Avx2 => "AVX2",
+            Width::Avx512 => "AVX-512",
+        }
+    }
+
+    /// What this processor has.
+    fn here() -> Width {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if x86::Avx512::find().is_some() {
+                return Width::Avx512;
+            }
+            if x86::Avx2::find().is_some() {
+                return Width::Avx2;
+            }
+        }
+        Width::Scalar
+    }
+
+    /// What is used: the widest that there is, within the limit if there is a good one.
+    fn used() -> Width {
+        static USED: LazyLock<Width> = LazyLock::new(|| {
+            limit()
+                .ok()
+                .flatten()
+                .unwrap_or(Width::Avx512)
+                .min(Width::here())
+        });
+        *USED
+    }
+}
+
+/// The limit that [`LIMIT`] sets; what it says where that is no arithmetic.
+fn limit() -> Result<Option<Width>, String> {
+    let Some(text) = std::env::var_os(LIMIT) else {
+        return Ok(None);
+    };
+    let named = |width: &Width| text.eq_ignore_ascii_case(width.name());
+    match Width::ALL.into_iter().find(named) {
+        Some(width) => Ok(Some(width)),
+        None => Err(text.to_string_lossy().into_owned()),
+    }
+}
+
+/// Whether [`LIMIT`], if it is set, names an arithmetic.
+pub(crate) fn check_limit() -> Result<(), InputError> {
+    let names = || Width::ALL.map(Width::name);
+    limit().map(|_| ()).map_err(|found| {
+        let place = Place::Argument(LIMIT.into());
+        let error = InputError::new(place, "no arithmetic has this name")
+            .found(format!("`{found}`"))
+            .expected(names().join(", "));
+        match nearest(&found, names()) {
+            Some(near) => error.hint(format!("did you mean `{near}`?")),
+            None => error,
+        }
+    })
+}
+
 /// Runs a kernel with the widest arithmetic that this processor has.
 pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        if let Some(avx512) = x86::Avx512::find() {
+        let width = Width::used();
+        if width == Width::Avx512
+            && let Some(avx512) = x86::Avx512::find()
+        {
             return avx512.run(kernel);
         }
-        if let Some(avx2) = x86::Avx2::find() {
+        if width >= Width::Avx2
+            && let Some(avx2) = x86::Avx2::find()
+        {
             return avx2.run(kernel);
         }
     }
@@ -143,18 +228,9 @@ impl<F: FnOnce()> Kernel for Elementwise<F> {
     }
 }
 
-/// The name of the arithmetic that [`run`] uses on this processor.
+/// The name of the arithmetic that [`run`] uses.
 pub(crate) fn name() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if x86::Avx512::find().is_some() {
-            return "AVX-512";
-        }
-        if x86::Avx2::find().is_some() {
-            return "AVX2";
-        }
-    }
-    "scalar"
+    Width::used().name()
 }
 
 /// What a kernel gives with every arithmetic that this processor has.

@@ -2,7 +2,8 @@
 
 use super::lock::Lock;
 use crate::error::{InputError, Place};
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::{NamedTempFile, TempDir};
 
@@ -274,7 +275,22 @@ impl Batch<'_> {
 /// # Errors
 /// What the file system says.
 pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
-    let file = written(path, contents)?;
+    write_whole_with(path, |file| file.write_all(contents.as_bytes()))
+}
+
+/// The same for what `write` writes, piece by piece.
+///
+/// # Errors
+/// What the file system says, or `write`.
+pub fn write_whole_with(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let file = beside(path)?;
+    let mut buffered = BufWriter::with_capacity(1 << 16, file.as_file());
+    write(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
@@ -285,20 +301,25 @@ pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
 ///
 /// # Errors
 /// What the file system says.
-pub(super) fn begun(path: &Path, contents: &str) -> io::Result<std::fs::File> {
+pub(super) fn begun(path: &Path, contents: &str) -> io::Result<File> {
     written(path, contents)?.persist(path).map_err(|e| e.error)
 }
 
-/// A temporary file with `contents` in the folder of `path`, which is made if need be.
+/// A temporary file with `contents` in the folder of `path`.
 fn written(path: &Path, contents: &str) -> io::Result<NamedTempFile> {
+    let mut file = beside(path)?;
+    file.write_all(contents.as_bytes())?;
+    Ok(file)
+}
+
+/// A temporary file in the folder of `path`, which is made if need be.
+fn beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     make_folder(folder)?;
-    let mut file = whole_file(folder)?;
-    file.write_all(contents.as_bytes())?;
-    Ok(file)
+    whole_file(folder)
 }
 
 /// Makes a folder and those above it; where a file is in the way, the error says which.

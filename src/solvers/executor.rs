@@ -208,7 +208,10 @@ impl Run<'_, '_> {
         let interrupted = |o: &Outcome| o.status == Status::Interrupted;
         let now = match &self.outcome {
             Some(outcome) => interrupted(outcome),
-            None => self.watch.is_due(),
+            None => {
+                let progress = self.progress.as_ref();
+                progress.is_ok_and(|p| self.watch.is_due(p.point.parameters.len()))
+            }
         };
         if now {
             self.stand(counts, None);
@@ -241,7 +244,9 @@ impl Run<'_, '_> {
             elapsed: self.before.elapsed + self.clock.elapsed(),
             outcome,
         };
+        let clock = Instant::now();
         self.watch.stand(standing);
+        self.timings.keeping += clock.elapsed();
     }
 
     fn elapsed(&self) -> Duration {

@@ -90,8 +90,8 @@ pub trait Keeper {
     fn refuse(&mut self);
     /// Keeps an iteration of the search.
     fn row(&mut self, row: &Row);
-    /// Whether it is time to keep where the search stands.
-    fn is_due(&self) -> bool;
+    /// Whether it is time to keep where a search for so many parameters stands.
+    fn is_due(&self, parameters: usize) -> bool;
     /// Keeps where the search stands, in the place of where it stood before, or how it ended.
     fn stand(&mut self, standing: Standing);
     /// Ends the unit with numbers that were computed, or with nothing.
@@ -166,8 +166,9 @@ impl<'a> Watch<'a> {
         }
     }
 
-    pub(super) fn is_due(&self) -> bool {
-        self.keeper.as_ref().is_some_and(|keeper| keeper.is_due())
+    pub(super) fn is_due(&self, parameters: usize) -> bool {
+        let keeper = self.keeper.as_ref();
+        keeper.is_some_and(|keeper| keeper.is_due(parameters))
     }
 
     /// Keeps a standing, which is made only where there is a keeper.

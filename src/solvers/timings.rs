@@ -21,12 +21,21 @@ pub struct Timings {
     pub linear_algebra: Duration,
     /// Starts from the readings, with all that is solved for them.
     pub start: Duration,
+    /// Journal and checkpoints.
+    #[serde(default)]
+    pub keeping: Duration,
 }
 
 impl Timings {
     /// The sum of all.
     pub fn sum(&self) -> Duration {
-        self.forward + self.adjoint + self.tangent + self.qp + self.linear_algebra + self.start
+        self.forward
+            + self.adjoint
+            + self.tangent
+            + self.qp
+            + self.linear_algebra
+            + self.start
+            + self.keeping
     }
 }
 
@@ -41,6 +50,7 @@ impl Add for Timings {
             qp: self.qp + other.qp,
             linear_algebra: self.linear_algebra + other.linear_algebra,
             start: self.start + other.start,
+            keeping: self.keeping + other.keeping,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The program as a program: arguments in; exit code, text and files out.
 
+mod arithmetic;
 mod bad_input;
 mod check;
 mod compare;

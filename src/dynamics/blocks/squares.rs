@@ -14,7 +14,8 @@ use super::scratch::{Chart, Ends, Scratch, with_scratch};
 use super::tile::Tile;
 use crate::dynamics::State;
 use crate::lanes::{self, Arithmetic, Kernel, LANES};
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
+use std::thread::{Builder, ScopedJoinHandle};
 
 /// From so many tiles on, a second thread pays: to start it takes as long as some three tiles do, twice.
 const WORTH_A_THREAD: usize = 24;
@@ -138,15 +139,25 @@ pub(super) struct Joint {
 impl Squares<'_> {
     /// The cost, and its gradient: with respect to the functions it overwrites `gradient`, with respect to the
     /// initial state it is returned.
-    pub fn solve(self, mut gradient: [&mut [f64]; 3]) -> (f64, State) {
-        let (tiles, rest) = Tile::cut(self.steps());
-        let tiles: Vec<Tile> = tiles.collect();
+    pub fn solve(self, gradient: [&mut [f64]; 3]) -> (f64, State) {
+        let tiles: Vec<Tile> = Tile::cut(self.steps()).0.collect();
         let middle = middle(tiles.len());
+        self.solve_in_two(&tiles, middle, gradient)
+    }
+
+    /// The same, with the tiles from number `middle` on, if there are any, in a second thread.
+    pub fn solve_in_two(
+        self,
+        tiles: &[Tile],
+        middle: usize,
+        mut gradient: [&mut [f64]; 3],
+    ) -> (f64, State) {
         let (of, at_once) = (self, middle < tiles.len());
+        let rest = behind(tiles);
         let charts = both(tiles.split_at(middle), at_once, |tiles| {
             with_scratch(|scratch| lanes::run(Survey { of, tiles, scratch }))
         });
-        let joint = self.join(&tiles, &charts, &mut gradient);
+        let joint = self.join(tiles, &charts, &mut gradient);
 
         let (former, latter) = joint.legs.split_at(middle);
         let cut = latter.first().map_or(rest, |leg| leg.tile.first);
@@ -158,7 +169,7 @@ impl Squares<'_> {
                     of,
                     legs,
                     gradient,
-                    at_hand: tiles.len() == 1,
+                    at_hand: tiles.len() == 1 && !at_once,
                     scratch,
                 })
             })
@@ -188,7 +199,7 @@ impl Squares<'_> {
         let mut x = [initial.displacement, h * initial.velocity];
         let starts: Vec<Ends> = charts.iter().map(|c| starts(&c.maps, &mut x)).collect();
 
-        let rest = tiles.last().map_or(0, |tile| tile.node(LANES, 0));
+        let rest = behind(tiles);
         let mut motion = [[0.0; 2]; 2 * LANES];
         let mut squares = 0.0;
         for i in rest..=steps {
@@ -265,7 +276,13 @@ fn middle(tiles: usize) -> usize {
     }
 }
 
-/// Does the same to both parts, `at_once` in two threads; otherwise the second is empty.
+/// The node behind the last tile.
+fn behind(tiles: &[Tile]) -> usize {
+    tiles.last().map_or(0, |tile| tile.node(LANES, 0))
+}
+
+/// Does the same to both parts, `at_once` in two threads, if the system has another to give; otherwise
+/// the second is empty.
 fn both<P: Send, T: Send>(
     (former, latter): (P, P),
     at_once: bool,
@@ -274,12 +291,17 @@ fn both<P: Send, T: Send>(
     if !at_once {
         return act(former);
     }
+    // Here it waits for the other thread, or for this one where there is no other.
+    let latter = Mutex::new(Some(latter));
+    let take = || latter.lock().unwrap_or_else(PoisonError::into_inner).take();
     std::thread::scope(|scope| {
-        let other = scope.spawn(|| act(latter));
+        let other = || take().map(&act);
+        let other = Builder::new().spawn_scoped(scope, other);
         let mut all = act(former);
-        match other.join() {
-            Ok(more) => all.extend(more),
-            Err(panic) => std::panic::resume_unwind(panic),
+        match other.map(ScopedJoinHandle::join) {
+            Ok(Ok(more)) => all.extend(more.into_iter().flatten()),
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => all.extend(take().into_iter().flat_map(&act)),
         }
         all
     })

@@ -295,3 +295,35 @@ fn squares_lose_nothing_near_the_readings() {
         assert!(distance(found, expected) < distance(other, expected));
     }
 }
+
+/// Whoever computes a tile, and whether its rates are still at hand: the same bits.
+#[test]
+fn every_cut_gives_the_same_bits() {
+    for nodes in [2000, 4097, 20_000] {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let linear = LinearDevice::of(&oscillator, &device, None, nodes).unwrap();
+        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let readings = readings(&motion);
+        let of = squares::Squares {
+            device: linear,
+            initial: INITIAL,
+            readings: &readings,
+            weights: [0.7, 0.2],
+        };
+        let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
+        let bits = |middle: usize| {
+            let mut slopes = device.clone();
+            let [c, k] = slopes.coefficients.as_mut_slice() else {
+                unreachable!("two terms")
+            };
+            let (cost, initial) = of.solve_in_two(&tiles, middle, [&mut slopes.mass, c, k]);
+            let others = [cost, initial.displacement, initial.velocity];
+            let all = slopes.functions().flatten().chain(&others);
+            all.map(|x| x.to_bits()).collect::<Vec<u64>>()
+        };
+        let whole = bits(tiles.len());
+        for middle in 0..tiles.len() {
+            assert!(bits(middle) == whole, "{nodes} nodes, cut at {middle}");
+        }
+    }
+}

@@ -11,7 +11,7 @@ mod read;
 pub(super) use heading::hash;
 pub use heading::{FitHeading, Source};
 
-use super::files::{begun, write_whole};
+use super::files::{begun, write_whole_with};
 use crate::error::InputError;
 use crate::solvers::{Bits, Keeper, Kept, Row, Standing};
 use read::{Contents, Reader, journal_file};
@@ -29,6 +29,8 @@ pub const CHECKPOINT: &str = "fit.checkpoint";
 const EVERY: Duration = Duration::from_secs(1);
 /// Checkpoints take at most one part in so many of the time of a fit.
 const SHARE: u32 = 50;
+/// What the first takes for each parameter, about: L-BFGS remembers dozens of numbers of each.
+const A_PARAMETER: Duration = Duration::from_micros(4);
 
 /// Lines of iterations wait so long for more: a thousand quick iterations would else take as long to write
 /// down as a tenth of what they are.
@@ -101,10 +103,14 @@ impl Pace {
         }
     }
 
-    fn is_due(&self) -> bool {
+    fn is_due(&self, parameters: usize) -> bool {
+        let took = match u32::try_from(parameters) {
+            Ok(parameters) if self.took.is_zero() => A_PARAMETER * parameters,
+            _ => self.took,
+        };
         let rest = match self.is_given {
             true => self.every,
-            false => self.every.max(SHARE * self.took),
+            false => self.every.max(SHARE * took),
         };
         self.last.elapsed() >= rest
     }
@@ -232,8 +238,10 @@ impl FitJournal {
             unit: self.unit,
             standing,
         };
-        let text = serde_json::to_string(&checkpoint).map_err(io::Error::other)?;
-        write_whole(&self.folder.join(CHECKPOINT), &text)
+        // As text it would take a multiple of the memory of the fit.
+        write_whole_with(&self.folder.join(CHECKPOINT), |file| {
+            Ok(serde_json::to_writer(file, &checkpoint)?)
+        })
     }
 }
 
@@ -280,8 +288,8 @@ impl Keeper for FitJournal {
         self.append(Entry::Row(row.clone()));
     }
 
-    fn is_due(&self) -> bool {
-        self.trouble.is_none() && self.pace.is_due()
+    fn is_due(&self, parameters: usize) -> bool {
+        self.trouble.is_none() && self.pace.is_due(parameters)
     }
 
     fn stand(&mut self, standing: Standing) {
