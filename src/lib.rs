@@ -148,6 +148,7 @@ pub mod report;
 pub mod signal;
 pub mod solvers;
 pub mod study;
+mod threads;
 pub mod units;
 
 pub use report::Run;

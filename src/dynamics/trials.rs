@@ -5,6 +5,7 @@
 
 use super::{State, Trajectory};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::threads::{self, Companion};
 
 /// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
 #[derive(Clone, Copy)]
@@ -33,6 +34,52 @@ pub(crate) struct Trials {
     /// Trials before the first that has mass everywhere.
     without_mass: usize,
     batches: Vec<Batch>,
+    /// Who does the last batch, once there was one that was worth it.
+    companion: Option<Companion<Owned>>,
+    /// Whether the last batch is with the companion.
+    is_shared: bool,
+}
+
+/// Steps of a batch from which on another thread is asked for it: a thread that waits awake takes it within a
+/// microsecond, in which some twenty are made.
+const WORTH_SHARING: usize = 200;
+
+/// A batch and its ray, in the hands of another thread.
+#[derive(Default)]
+struct Owned {
+    functions: [Vec<f64>; 3],
+    direction: [Vec<f64>; 3],
+    readings: Vec<f64>,
+    initial: State,
+    step: f64,
+    spacing: f64,
+    batch: Batch,
+}
+
+impl Owned {
+    fn set(&mut self, ray: Ray, lengths: &[Row]) {
+        let copies = self.functions.iter_mut().zip(ray.functions);
+        for (to, from) in copies.chain(self.direction.iter_mut().zip(ray.direction)) {
+            to.clear();
+            to.extend_from_slice(from);
+        }
+        self.readings.clear();
+        self.readings.extend_from_slice(ray.readings);
+        (self.initial, self.step, self.spacing) = (ray.initial, ray.step, ray.spacing);
+        self.batch.lengths.clear();
+        self.batch.lengths.extend_from_slice(lengths);
+    }
+
+    fn run(&mut self) {
+        self.batch.run(Ray {
+            functions: self.functions.each_ref().map(Vec::as_slice),
+            direction: self.direction.each_ref().map(Vec::as_slice),
+            initial: self.initial,
+            readings: &self.readings,
+            step: self.step,
+            spacing: self.spacing,
+        });
+    }
 }
 
 /// Some rows of trials.
@@ -55,48 +102,70 @@ impl Trials {
             .map(|part| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0])))
             .collect();
         let count = rows.len().div_ceil(ROWS);
-        self.batches.resize_with(count, Batch::default);
+        let share = |b: usize| &rows[b * rows.len() / count..(b + 1) * rows.len() / count];
+        self.is_shared = count > 1 && ray.readings.len() > WORTH_SHARING && self.has_companion();
+        let here = count - usize::from(self.is_shared);
+        self.batches.resize_with(here, Batch::default);
         for (b, batch) in self.batches.iter_mut().enumerate() {
-            let share = b * rows.len() / count..(b + 1) * rows.len() / count;
             batch.lengths.clear();
-            batch.lengths.extend_from_slice(&rows[share]);
+            batch.lengths.extend_from_slice(share(b));
         }
-        self.batches.iter_mut().for_each(|batch| batch.run(ray));
-        let lanes = self.batches.iter().flat_map(|b| b.costs.as_flattened());
+        let batches = &mut self.batches;
+        let mut run = || -> Vec<Row> {
+            batches.iter_mut().for_each(|batch| batch.run(ray));
+            batches.iter().flat_map(|b| &b.costs).copied().collect()
+        };
+        let costs = match self.companion.as_mut().filter(|_| self.is_shared) {
+            Some(companion) => companion.with(
+                |job| job.set(ray, share(count - 1)),
+                &mut run,
+                |mut costs, job| {
+                    costs.extend_from_slice(&job.batch.costs);
+                    costs
+                },
+            ),
+            None => run(),
+        };
+        let lanes = costs.as_flattened().iter().take(lengths.len());
         let finite = |cost: &f64| cost.is_finite().then_some(*cost);
         std::iter::repeat_n(None, self.without_mass)
-            .chain(lanes.take(lengths.len()).map(finite))
+            .chain(lanes.map(finite))
             .collect()
+    }
+
+    fn has_companion(&mut self) -> bool {
+        if self.companion.is_none() && threads::spare() {
+            self.companion = Companion::new(Owned::default(), Owned::run);
+        }
+        self.companion.is_some()
     }
 
     /// The motion of trial `which` of the last call.
     pub fn motion_into(&self, which: usize, trajectory: &mut Trajectory) {
-        let (mut row, lane) = {
-            let lane = which - self.without_mass;
-            (lane / LANES, lane % LANES)
-        };
+        let lane = which - self.without_mass;
+        let (mut row, lane) = (lane / LANES, lane % LANES);
         for batch in &self.batches {
-            let rows = batch.lengths.len();
-            if row < rows {
-                let [y, v] = &batch.motion;
-                let of_lane = |rows: &[Row], i: usize| rows[i][lane];
-                for (i, (to_y, to_v)) in (trajectory
-                    .displacement
-                    .iter_mut()
-                    .zip(&mut trajectory.velocity))
-                .enumerate()
-                {
-                    *to_y = of_lane(y, i * rows + row);
-                    *to_v = of_lane(v, i * rows + row);
-                }
-                return;
+            if row < batch.lengths.len() {
+                return batch.motion_into(row, lane, trajectory);
             }
-            row -= rows;
+            row -= batch.lengths.len();
+        }
+        if let Some(companion) = self.companion.as_ref().filter(|_| self.is_shared) {
+            companion.look(|job| job.batch.motion_into(row, lane, trajectory));
         }
     }
 }
 
 impl Batch {
+    fn motion_into(&self, row: usize, lane: usize, trajectory: &mut Trajectory) {
+        let (rows, [y, v]) = (self.lengths.len(), &self.motion);
+        let to = (trajectory.displacement.iter_mut()).zip(&mut trajectory.velocity);
+        for (i, (to_y, to_v)) in to.enumerate() {
+            *to_y = y[i * rows + row][lane];
+            *to_v = v[i * rows + row][lane];
+        }
+    }
+
     fn run(&mut self, ray: Ray) {
         match self.lengths.len() {
             1 => self.of_rows::<1>(ray),
@@ -257,12 +326,16 @@ mod tests {
     use crate::dynamics::quadrature::trapezoid;
     use crate::dynamics::{Device, Grid, Method, Oscillator, Term};
 
-    const NODES: usize = 41;
+    /// A batch that is not worth sharing, and one that is.
+    const NODES: [usize; 2] = [41, 241];
 
     /// Mass, damping and stiffness, and what is taken away from them.
-    fn functions() -> [[Vec<f64>; 3]; 2] {
-        let of =
-            |f: fn(f64) -> f64| -> Vec<f64> { (0..NODES).map(|i| f(0.2 * i as f64)).collect() };
+    fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
+        let of = |f: fn(f64) -> f64| -> Vec<f64> {
+            (0..nodes)
+                .map(|i| f(8.0 * i as f64 / nodes as f64))
+                .collect()
+        };
         [
             [
                 of(|t| 2.0 + 0.3 * t.sin()),
@@ -279,8 +352,9 @@ mod tests {
 
     /// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
     fn by_itself(ray: &Ray, length: f64) -> Option<(Trajectory, f64)> {
+        let nodes = ray.readings.len();
         let oscillator = Oscillator {
-            grid: Grid::new(0.0, ray.step * (NODES - 1) as f64, NODES).unwrap(),
+            grid: Grid::new(0.0, ray.step * (nodes - 1) as f64, nodes).unwrap(),
             method: Method::Midpoint,
             terms: vec![Term::Damping, Term::Stiffness],
         };
@@ -301,8 +375,12 @@ mod tests {
 
     #[test]
     fn every_trial_is_the_forward_solve_by_itself() {
-        let [functions, direction] = functions();
-        let readings: Vec<f64> = (0..NODES).map(|i| (0.3 * i as f64).cos()).collect();
+        NODES.into_iter().for_each(every_trial);
+    }
+
+    fn every_trial(nodes: usize) {
+        let [functions, direction] = functions(nodes);
+        let readings: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
         let ray = Ray {
             functions: functions.each_ref().map(Vec::as_slice),
             direction: direction.each_ref().map(Vec::as_slice),
@@ -332,7 +410,7 @@ mod tests {
                     (cost / expected - 1.0).abs() < 1e-13,
                     "trial {which} of {count}: {cost} {expected}"
                 );
-                let mut stored = Trajectory::zeros(NODES);
+                let mut stored = Trajectory::zeros(nodes);
                 trials.motion_into(which, &mut stored);
                 assert_eq!(stored, motion, "trial {which} of {count}");
             }

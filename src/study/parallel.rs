@@ -1,5 +1,6 @@
 //! Independent jobs on several threads.
 
+use crate::threads::share;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// `work(0), work(1), ...` in this order, computed on up to `threads` threads. Every job depends on its
@@ -19,9 +20,15 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
             done.push((index, work(index)));
         }
     };
+    let workers = threads.clamp(1, count.max(1));
     let mut results = std::thread::scope(|scope| {
-        let workers = threads.clamp(1, count.max(1));
-        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(turn)).collect();
+        let work = || {
+            if workers > 1 {
+                share();
+            }
+            turn()
+        };
+        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
         let joined = handles.into_iter().flat_map(|handle| match handle.join() {
             Ok(done) => done,
             Err(panic) => std::panic::resume_unwind(panic),

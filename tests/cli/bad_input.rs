@@ -361,7 +361,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
-      found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
+      found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     // The largest number that a computer counts to is no more of a trouble.
@@ -370,7 +370,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       |
     8 | grid: {nodes: 9223372036854775807, method: midpoint}
       |               ^^^^^^^^^^^^^^^^^^^
-      found: 9223372036854775807 nodes, which may need 14203993 PB: 1540 bytes each
+      found: 9223372036854775807 nodes, which may need 34864346 PB: 3780 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     // A simulation needs less for each node.
@@ -383,7 +383,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     ");
     assert_snapshot!(with("check"), @"
     error: --nodes: a grid of so many nodes does not fit into memory
-      found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
+      found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     assert_snapshot!(with_nodes("study", "100000000000"), @"
@@ -391,7 +391,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
-      found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
+      found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
     assert_snapshot!(with_nodes("compare", "100000000000"), @"
@@ -399,7 +399,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
-      found: 100000000000 nodes, which may need 154 TB: 1540 bytes each
+      found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes: [bytes] are available
     ");
 }

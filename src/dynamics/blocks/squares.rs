@@ -14,7 +14,8 @@ use super::scratch::{Chart, Ends, Scratch, with_scratch};
 use super::tile::Tile;
 use crate::dynamics::State;
 use crate::lanes::{self, Arithmetic, Kernel, LANES};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use crate::threads;
+use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, ScopedJoinHandle};
 
 /// From so many tiles on, a second thread pays: to start it takes as long as some three tiles do, twice.
@@ -268,9 +269,7 @@ impl Squares<'_> {
 
 /// Where to cut so many tiles in two.
 fn middle(tiles: usize) -> usize {
-    static THREADS: LazyLock<usize> =
-        LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
-    match tiles >= WORTH_A_THREAD && *THREADS > 1 {
+    match tiles >= WORTH_A_THREAD && threads::spare() {
         true => tiles / 2,
         false => tiles,
     }
