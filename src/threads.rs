@@ -134,7 +134,7 @@ impl<J: Send + 'static> Drop for Companion<J> {
 
 fn accompany<J>(shared: &Shared<J>, act: fn(&mut J)) {
     let mut idle_since = Instant::now();
-    loop {
+    for spins in 0_u64.. {
         match shared.state.load(Ordering::Acquire) {
             END => return,
             POSTED if shared.take() => {
@@ -144,7 +144,10 @@ fn accompany<J>(shared: &Shared<J>, act: fn(&mut J)) {
                 let _ = (shared.state).compare_exchange(TAKEN, DONE, success, failure);
                 idle_since = Instant::now();
             }
-            _ if idle_since.elapsed() < AWAKE => std::hint::spin_loop(),
+            // The clock is slower than the look at the state.
+            _ if !spins.is_multiple_of(64) || idle_since.elapsed() < AWAKE => {
+                std::hint::spin_loop();
+            }
             _ => {
                 std::thread::park();
                 idle_since = Instant::now();

@@ -63,8 +63,9 @@ impl Owned {
             to.clear();
             to.extend_from_slice(from);
         }
-        self.readings.clear();
-        self.readings.extend_from_slice(ray.readings);
+        if self.readings != ray.readings {
+            ray.readings.clone_into(&mut self.readings);
+        }
         (self.initial, self.step, self.spacing) = (ray.initial, ray.step, ray.spacing);
         self.batch.lengths.clear();
         self.batch.lengths.extend_from_slice(lengths);
