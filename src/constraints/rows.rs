@@ -87,15 +87,6 @@ impl Rows {
             .collect()
     }
 
-    /// `out += A^T y`.
-    pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
-        for (i, y) in y.iter().enumerate() {
-            for (j, a) in self.row(i) {
-                out[j] += a * y;
-            }
-        }
-    }
-
     /// Multiplies every column by its factor.
     pub fn scale_columns(&mut self, factors: &[f64]) {
         for (column, value) in self.columns.iter().zip(&mut self.values) {
@@ -111,5 +102,38 @@ impl Rows {
     /// Largest size of an entry of row `i`; 0 for an empty row.
     pub fn scale(&self, i: usize) -> f64 {
         self.row(i).fold(0.0, |most, (_, a)| most.max(a.abs()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows over three columns, by hand.
+    fn rows() -> Rows {
+        let mut rows = Rows::new();
+        rows.push([(0, 1.0), (2, -2.0)], 5.0);
+        rows.push([(1, 4.0)], 6.0);
+        rows
+    }
+
+    #[test]
+    fn products_by_hand() {
+        assert_eq!(rows().multiply(&[1.0, 10.0, 100.0]), [-199.0, 40.0]);
+    }
+
+    /// What is scaled in its columns says of `z` what the rows said of `factors * z`.
+    #[test]
+    fn scaled_columns() {
+        let mut scaled = rows();
+        scaled.scale_columns(&[2.0, 0.5, -3.0]);
+        let z = [1.5, -2.0, 0.25];
+        assert_eq!(
+            scaled.multiply(&z),
+            rows().multiply(&[3.0, -1.0, -0.75]),
+            "{z:?}"
+        );
+        assert_eq!(scaled.right(), rows().right());
+        assert_eq!(scaled.scale(0), 6.0);
     }
 }
