@@ -23,8 +23,8 @@ pub(crate) fn share() {
     SHARES.set(true);
 }
 
-/// How long a companion stays awake without work. Longer than an iteration of a quick search; a fit that
-/// leaves it waiting longer loses nothing by waking it.
+/// How long a companion stays awake without work: longer than an iteration of a quick search. Beside a longer
+/// one, the tens of microseconds that it takes to wake are little.
 const AWAKE: Duration = Duration::from_micros(400);
 
 /// States of the work between both threads.
@@ -56,7 +56,7 @@ impl<J> Shared<J> {
 
 /// A thread that does half of a job of tens of microseconds, again and again: too short to be woken for, so it
 /// waits awake. What it has not begun when it is needed, the other thread does itself; the result does
-/// not depend on who does it.
+/// not depend on who does it. While it waits awake it keeps a processor busy, which [`spare`] is asked for first.
 pub(crate) struct Companion<J: Send + 'static> {
     shared: Arc<Shared<J>>,
     act: fn(&mut J),

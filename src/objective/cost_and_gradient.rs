@@ -11,8 +11,9 @@ impl Problem {
     ///
     /// One record of a device with one value a node, in linear free motion by the midpoint rule and
     /// seen at every node, is never written down: forward and adjoint solve run in blocks of the
-    /// record at once, and memory is what `theta` and `gradient` take. Everything else is
-    /// [`Problem::evaluate`] and [`Problem::gradient`].
+    /// record at once, and memory is what `theta` and `gradient` take. A record of some 100,000 nodes or more is
+    /// shared with a second thread, where a processor is to spare; the bits are the same. Everything
+    /// else is [`Problem::evaluate`] and [`Problem::gradient`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`]; what `gradient` holds then means nothing.

@@ -25,7 +25,7 @@ pub struct TimingsSummary {
     pub linear_algebra: PartSummary,
     /// Starts from the readings, with all that is solved for them.
     pub start: PartSummary,
-    /// Reading data, and writing journal, checkpoints and results; `result.json` itself is written after the clock has stopped.
+    /// Reading data, and writing checkpoints and results; `result.json` itself is written after the clock has stopped.
     pub io: PartSummary,
     /// The rest: building the model, bookkeeping, bands and statistics, predictions, figures.
     pub other: PartSummary,

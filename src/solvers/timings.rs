@@ -21,7 +21,7 @@ pub struct Timings {
     pub linear_algebra: Duration,
     /// Starts from the readings, with all that is solved for them.
     pub start: Duration,
-    /// Journal and checkpoints.
+    /// Checkpoints, and where the search stood at its end; not the lines of its iterations.
     #[serde(default)]
     pub keeping: Duration,
 }

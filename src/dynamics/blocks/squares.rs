@@ -182,7 +182,7 @@ impl Squares<'_> {
         self.readings.len() - 1
     }
 
-    /// Of a squared residual between the ends, with respect to half the residual.
+    /// `2 w`: times the residual it is the derivative of `w r^2`, between the ends.
     fn factor(&self) -> f64 {
         2.0 * self.weights[0]
     }

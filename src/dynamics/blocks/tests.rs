@@ -47,6 +47,15 @@ fn source(motion: &Trajectory, velocity: f64) -> Trajectory {
     }
 }
 
+fn squares_of<'a>(device: LinearDevice<'a>, readings: &'a [f64]) -> squares::Squares<'a> {
+    squares::Squares {
+        device,
+        initial: INITIAL,
+        readings,
+        weights: [0.7, 0.2],
+    }
+}
+
 fn largest(f: &[f64]) -> f64 {
     f.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
@@ -172,12 +181,7 @@ impl lanes::Kernel for Whole<'_> {
         let [c, k] = gradient.coefficients.as_mut_slice() else {
             unreachable!("two terms")
         };
-        let of = squares::Squares {
-            device: linear,
-            initial: INITIAL,
-            readings: &readings,
-            weights: [0.7, 0.2],
-        };
+        let of = squares_of(linear, &readings);
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
         let mut slopes = [&mut gradient.mass, c, k].map(Vec::as_mut_slice);
         let (cost, _) = with_scratch(|scratch| {
@@ -304,12 +308,7 @@ fn every_cut_gives_the_same_bits() {
         let linear = LinearDevice::of(&oscillator, &device, None, nodes).unwrap();
         let motion = oscillator.forward(&device, INITIAL, None).unwrap();
         let readings = readings(&motion);
-        let of = squares::Squares {
-            device: linear,
-            initial: INITIAL,
-            readings: &readings,
-            weights: [0.7, 0.2],
-        };
+        let of = squares_of(linear, &readings);
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
         let bits = |middle: usize| {
             let mut slopes = device.clone();
