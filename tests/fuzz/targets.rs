@@ -386,9 +386,25 @@ pub fn study_journal(bytes: &[u8]) {
         document.predictions = predictions;
     }
     document.text();
-    let out = OutputFolder::prepare(&folder).expect("a folder");
-    document.write(&out).expect("room");
+    if PIECES.iter().any(|name| journal.has(name)) {
+        let out = OutputFolder::prepare(&folder).expect("a folder");
+        document.write(&out).expect("room");
+    }
 }
+
+/// Names of the pieces that are looked for.
+const PIECES: [&str; 10] = [
+    "fit",
+    "spectrum",
+    "bands",
+    "candidates",
+    "equivalents",
+    "starts",
+    "profile 0",
+    "varies",
+    "refits",
+    "tubes",
+];
 
 fn kept<T: Serialize + DeserializeOwned>(journal: &mut Journal, name: &str) -> Option<T> {
     let none = || -> Option<T> { None };
