@@ -30,7 +30,11 @@ pub(crate) struct Tangents {
     of_group: Vec<Range<usize>>,
     wanted: [bool; FUNCTIONS],
     changes: Vec<[Row; TILE_NODES]>,
+    /// Whether a slot's function changes in this tile.
+    moves: Vec<bool>,
     states: Vec<[[Row; 2]; TILE_NODES]>,
+    /// Whether a group has been anything but zero.
+    begun: Vec<bool>,
 }
 
 /// A motion to go through.
@@ -58,21 +62,39 @@ impl Tangents {
             of_group: groups.map(range).collect(),
             wanted: std::array::from_fn(|f| slots.iter().any(|s| s.function == f)),
             changes: vec![[[0.0; LANES]; TILE_NODES]; slots.len()],
+            moves: vec![false; slots.len()],
             slots,
+            begun: (initial.iter())
+                .map(|states| states.as_flattened().iter().any(|x| *x != 0.0))
+                .collect(),
             states,
         }
     }
 
-    /// The change of a slot's function at the nodes of the tile, along each direction of its group.
+    /// A slot's function does not change in the tile to come.
+    pub fn rest(&mut self, slot: usize) {
+        if self.moves[slot] {
+            self.changes[slot].fill([0.0; LANES]);
+            self.moves[slot] = false;
+        }
+    }
+
+    /// The change of a slot's function at the nodes of the tile to come, along each direction of its group.
     pub fn changes_mut(&mut self, slot: usize) -> &mut [Row; TILE_NODES] {
+        self.moves[slot] = true;
         &mut self.changes[slot]
     }
 
-    /// As [`Tangents::changes_mut`], to read; with the function of each slot of a group.
+    /// The functions that change along a direction of a group, and their changes at the nodes of the tile.
     pub fn changes(&self, group: usize) -> impl Iterator<Item = (usize, &[Row; TILE_NODES])> {
-        let range = self.of_group[group].clone();
-        let functions = self.slots[range.clone()].iter().map(|s| s.function);
-        functions.zip(&self.changes[range])
+        let slots = self.of_group[group].clone();
+        let moving = slots.filter(|slot| self.moves[*slot]);
+        moving.map(|slot| (self.slots[slot].function, &self.changes[slot]))
+    }
+
+    /// Whether the tangents of a group have been anything but zero.
+    pub fn has_begun(&self, group: usize) -> bool {
+        self.begun[group]
     }
 
     /// Displacement and velocity at the nodes of the tile, along each direction of a group.
@@ -112,8 +134,11 @@ impl Kernel for Advance<'_> {
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let tangents = self.tangents;
-        for states in &mut tangents.states {
+        for (g, states) in tangents.states.iter_mut().enumerate() {
             states[0] = states[TILE];
+            tangents.begun[g] |= tangents.of_group[g]
+                .clone()
+                .any(|slot| tangents.moves[slot]);
         }
         let mut maps = Maps::NOTHING;
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
@@ -131,14 +156,34 @@ impl Kernel for Advance<'_> {
             );
             let to = (from + LANES).min(count);
             for (g, range) in tangents.of_group.iter().enumerate() {
-                let slots = &tangents.slots[range.clone()];
-                let changes = &tangents.changes[range.clone()];
-                let states = &mut tangents.states[g];
-                carry(arithmetic, &maps, slots, changes, states, from..to);
+                if !tangents.begun[g] {
+                    continue;
+                }
+                // A group has at most one slot for each function.
+                let mut moving = [0; FUNCTIONS];
+                let mut count = 0;
+                for slot in range.clone().filter(|slot| tangents.moves[*slot]) {
+                    moving[count] = slot;
+                    count += 1;
+                }
+                let pushes = Pushes {
+                    moving: &moving[..count],
+                    slots: &tangents.slots,
+                    changes: &tangents.changes,
+                };
+                carry(arithmetic, &maps, pushes, &mut tangents.states[g], from..to);
             }
             from = to;
         }
     }
+}
+
+/// The functions that change along the directions of a group.
+#[derive(Clone, Copy)]
+struct Pushes<'a> {
+    moving: &'a [usize],
+    slots: &'a [Slot],
+    changes: &'a [[Row; TILE_NODES]],
 }
 
 /// Carries a group over up to eight steps.
@@ -146,8 +191,7 @@ impl Kernel for Advance<'_> {
 fn carry<A: Arithmetic>(
     arithmetic: A,
     maps: &Maps,
-    slots: &[Slot],
-    changes: &[[Row; TILE_NODES]],
+    pushes: Pushes,
     states: &mut [[Row; 2]; TILE_NODES],
     steps: Range<usize>,
 ) {
@@ -155,10 +199,11 @@ fn carry<A: Arithmetic>(
     let (mut y, mut v) = (Eight::load(arithmetic, y), Eight::load(arithmetic, v));
     for (l, i) in steps.enumerate() {
         let mut push = [Eight::splat(arithmetic, 0.0); 2];
-        for (slot, change) in slots.iter().zip(changes) {
+        for &slot in pushes.moving {
+            let (change, function) = (&pushes.changes[slot], pushes.slots[slot].function);
             let here = Eight::load(arithmetic, &change[i]);
             let next = Eight::load(arithmetic, &change[i + 1]);
-            let (left, right) = (&maps.left[slot.function], &maps.right[slot.function]);
+            let (left, right) = (&maps.left[function], &maps.right[function]);
             for end in 0..2 {
                 push[end] += Eight::splat(arithmetic, left[end][l]) * here
                     + Eight::splat(arithmetic, right[end][l]) * next;

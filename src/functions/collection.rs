@@ -20,6 +20,10 @@ pub struct Functions {
     scalars: Vec<Scalar>,
     nodes: usize,
     step: f64,
+    /// Of each parameter of a function the first node at which it matters.
+    first_nodes: Vec<u32>,
+    /// Whether each function is constant.
+    constant: Vec<bool>,
 }
 
 impl Functions {
@@ -58,7 +62,17 @@ impl Functions {
             first = end;
         }
         (!list.is_empty()).then_some(())?;
+        let mut first_nodes = vec![0; first];
+        for (function, range) in list.iter().zip(&ranges) {
+            let own = &mut first_nodes[range.clone()];
+            for i in (0..nodes).rev() {
+                let row = function.design.row(i);
+                row.for_each(|(j, _)| own[j] = i as u32);
+            }
+        }
         Some(Self {
+            constant: list.iter().map(|f| f.design.is_constant()).collect(),
+            first_nodes,
             list,
             ranges,
             grams: grams?,
@@ -131,15 +145,14 @@ impl Functions {
 
     /// The first node at which each parameter matters; the scalars matter from the beginning.
     pub fn first_nodes(&self) -> Vec<u32> {
-        let mut first = vec![0; self.scalar_range().end];
-        for (function, range) in self.list.iter().zip(&self.ranges) {
-            let own = &mut first[range.clone()];
-            for i in (0..self.nodes).rev() {
-                let row = function.design.row(i);
-                row.for_each(|(j, _)| own[j] = i as u32);
-            }
-        }
+        let mut first = self.first_nodes.clone();
+        first.resize(self.parameters(), 0);
         first
+    }
+
+    /// Whether function `index` of the list has the same value at every node, whatever its parameter is.
+    pub fn is_constant(&self, index: usize) -> bool {
+        self.constant[index]
     }
 
     /// The start of the search.

@@ -41,11 +41,21 @@ impl Design {
                 pairs.for_each(|(value, b)| *value += b * theta[0]);
             }
             Design::Sparse(matrix) => {
-                for (row, value) in matrix.row_iter().zip(values) {
-                    let columns = row.col_indices().iter().zip(row.values());
-                    *value += columns.map(|(&j, b)| b * theta[j]).sum::<f64>();
-                }
+                each_row(matrix, theta, values.len(), |i, product| {
+                    values[i] += product;
+                });
             }
+        }
+    }
+
+    /// Whether it is one column with the same entry at every node.
+    pub fn is_constant(&self) -> bool {
+        match self {
+            Design::Sparse(matrix) => {
+                let values = matrix.values();
+                is_column(matrix) && values.windows(2).all(|pair| pair[0] == pair[1])
+            }
+            _ => false,
         }
     }
 
@@ -58,7 +68,14 @@ impl Design {
             Design::Sparse(matrix) if is_column(matrix) => {
                 (largest(matrix.values()) * theta[0]).abs()
             }
-            Design::Sparse(_) => largest(&self.multiply(theta, nodes)),
+            Design::Sparse(matrix) => {
+                // Some side by side: one maximum would wait for itself.
+                let mut most = [0.0f64; 4];
+                each_row(matrix, theta, nodes, |i, product| {
+                    most[i % 4] = most[i % 4].max(product.abs());
+                });
+                largest(&most)
+            }
         }
     }
 
@@ -79,11 +96,32 @@ impl Design {
                 out[0] = pairs.fold(out[0], |sum, (b, value)| sum + b * value);
             }
             Design::Sparse(matrix) => {
-                for (row, value) in matrix.row_iter().zip(nodal) {
-                    for (&j, b) in row.col_indices().iter().zip(row.values()) {
+                let (offsets, columns, entries) = matrix.csr_data();
+                // The sums of two columns, as on knots, which the next row mostly goes on with.
+                let (mut held, mut sums) = ([0, 0], [0.0; 2]);
+                let put_back = |held: [usize; 2], sums: [f64; 2], out: &mut [f64]| {
+                    if held[0] != held[1] {
+                        (out[held[0]], out[held[1]]) = (sums[0], sums[1]);
+                    }
+                };
+                for (ends, value) in offsets.windows(2).zip(nodal) {
+                    let range = ends[0]..ends[1];
+                    if let (&[j, k], &[b, c]) = (&columns[range.clone()], &entries[range.clone()]) {
+                        if held != [j, k] {
+                            put_back(held, sums, out);
+                            (held, sums) = ([j, k], [out[j], out[k]]);
+                        }
+                        sums[0] += b * value;
+                        sums[1] += c * value;
+                        continue;
+                    }
+                    put_back(held, sums, out);
+                    held = [0, 0];
+                    for (&j, b) in columns[range.clone()].iter().zip(&entries[range]) {
                         out[j] += b * value;
                     }
                 }
+                put_back(held, sums, out);
             }
         }
     }
@@ -93,6 +131,24 @@ impl Design {
         let mut entries = CooMatrix::new(nodes, 1);
         (0..nodes).for_each(|i| entries.push(i, 0, 1.0));
         Design::Sparse(CsrMatrix::from(&entries))
+    }
+}
+
+/// Gives `act` the number of each of the first `count` rows and its product with `theta`.
+#[inline(always)]
+fn each_row(matrix: &CsrMatrix<f64>, theta: &[f64], count: usize, mut act: impl FnMut(usize, f64)) {
+    let (offsets, columns, entries) = matrix.csr_data();
+    for (i, ends) in offsets.windows(2).take(count).enumerate() {
+        let range = ends[0]..ends[1];
+        let product = match (&columns[range.clone()], &entries[range]) {
+            // As on knots: no loop.
+            (&[j, k], &[b, c]) => b * theta[j] + c * theta[k],
+            (columns, entries) => {
+                let pairs = columns.iter().zip(entries);
+                pairs.map(|(&j, b)| b * theta[j]).sum()
+            }
+        };
+        act(i, product);
     }
 }
 

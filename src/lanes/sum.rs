@@ -37,6 +37,33 @@ impl Kernel for Dot<'_> {
     }
 }
 
+/// Whether all numbers are finite.
+pub(crate) fn are_finite(values: &[f64]) -> bool {
+    super::run(Finite(values))
+}
+
+struct Finite<'a>(&'a [f64]);
+
+impl Kernel for Finite<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> bool {
+        let zero = Eight::splat(arithmetic, 0.0);
+        let (values, rest) = self.0.as_chunks::<{ AT_ONCE * LANES }>();
+        // Zero times what is not finite is not a number, and stays so.
+        let mut sums = [zero; AT_ONCE];
+        for values in values {
+            let values = values.as_chunks::<LANES>().0;
+            for q in 0..AT_ONCE {
+                sums[q] += zero * Eight::load(arithmetic, &values[q]);
+            }
+        }
+        let sums = ((sums[0] + sums[1]) + (sums[2] + sums[3])).row();
+        sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|x| x.is_finite())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,6 +76,21 @@ mod tests {
             let product: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             // Multiples of a half below 2^53: no sum is rounded.
             assert_eq!(dot(&a, &b), product, "{count}");
+        }
+    }
+
+    #[test]
+    fn one_number_that_is_not_finite_is_found_anywhere() {
+        for count in 1..100 {
+            let mut values = vec![f64::MAX; count];
+            assert!(are_finite(&values), "{count}");
+            for i in 0..count {
+                for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let kept = std::mem::replace(&mut values[i], odd);
+                    assert!(!are_finite(&values), "{odd} at {i} of {count}");
+                    values[i] = kept;
+                }
+            }
         }
     }
 }

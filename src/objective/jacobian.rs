@@ -24,8 +24,7 @@ impl Problem {
             }
             row += count;
         }
-        let entries = jacobian.as_slice().iter();
-        match entries.fold(true, |all, x| all & x.is_finite()) {
+        match lanes::sum::are_finite(jacobian.as_slice()) {
             true => jacobian,
             false => self.jacobian_by_columns(evaluation),
         }
@@ -60,7 +59,7 @@ fn fill(
 ) {
     let parameters = problem.parameters();
     let moving = Moving::new(&problem.functions, experiment);
-    let mut tangents = moving.tangents(parameters.div_ceil(LANES));
+    let mut tangents = moving.tangents();
     let mut readers = Vec::with_capacity(experiment.channels.len());
     let mut row = first;
     for channel in &experiment.channels {
@@ -80,7 +79,7 @@ fn fill(
         moving.fill(&mut tangents, from);
         tangents.advance(course, from..to);
         for reader in &mut readers {
-            reader.read(&tangents, from..to, jacobian);
+            reader.read(&tangents, &moving.order, from..to, jacobian);
         }
         from = to;
     }
@@ -93,54 +92,71 @@ fn fill(
 struct Moving<'a> {
     parts: Vec<Part<'a>>,
     slots: Vec<Slot>,
+    /// The parameter at each place, [`LANES`] of them a group: in the order in which they begin to matter, so
+    /// that a group costs nothing before.
+    order: Vec<usize>,
+    /// Initial states that are sought: which, and their places.
     seeds: Vec<(usize, usize)>,
 }
 
 struct Part<'a> {
     design: &'a Design,
-    columns: Range<usize>,
-    /// The slots of its groups, in order; the first group.
+    /// The slots of its groups.
     slots: Vec<usize>,
+    /// Slot and lane of each of its parameters.
+    lanes: Vec<(usize, usize)>,
     constant: bool,
 }
 
 impl<'a> Moving<'a> {
     fn new(functions: &'a Functions, experiment: &Experiment) -> Self {
+        let first = functions.first_nodes();
+        let mut order: Vec<usize> = (0..functions.parameters()).collect();
+        order.sort_by_key(|j| first[*j]);
+        let mut places = vec![0; order.len()];
+        for (place, j) in order.iter().enumerate() {
+            places[*j] = place;
+        }
         let scalars = functions.scalar_range().start;
         let sought = experiment.sought.into_iter().enumerate();
-        let seeds = sought.filter_map(|(state, index)| Some((state, scalars + index?)));
-        let assembly = functions.assembly(experiment.device).iter();
-        let columns = assembly.map(|f| functions.ranges()[*f].clone());
-        let moving: Vec<_> = (columns.enumerate())
-            .filter(|(_, c)| !c.is_empty())
+        let seeds = sought.filter_map(|(state, index)| Some((state, places[scalars + index?])));
+        let assembly = functions.assembly(experiment.device);
+        let slot_of = |function: usize, j: usize| Slot {
+            group: places[j] / LANES,
+            function,
+        };
+        let mut slots: Vec<Slot> = (assembly.iter().enumerate())
+            .flat_map(|(function, f)| functions.ranges()[*f].clone().map(move |j| (function, j)))
+            .map(|(function, j)| slot_of(function, j))
             .collect();
-        let groups = |c: &Range<usize>| c.start / LANES..=(c.end - 1) / LANES;
-        let mut slots: Vec<Slot> = (moving.iter())
-            .flat_map(|&(function, ref c)| groups(c).map(move |group| Slot { group, function }))
-            .collect();
-        slots.sort_by_key(|s| (s.group, s.function));
-        let part = |(function, columns): (usize, Range<usize>)| {
-            let index = functions.assembly(experiment.device)[function];
-            let design = &functions.get(index).design;
+        slots.sort_unstable_by_key(|s| (s.group, s.function));
+        slots.dedup();
+        let find = |slot: Slot| {
+            slots.partition_point(|s| (s.group, s.function) < (slot.group, slot.function))
+        };
+        let part = |(function, &f): (usize, &usize)| {
+            let design = &functions.get(f).design;
+            let lane = |j: usize| (find(slot_of(function, j)), places[j] % LANES);
             let own = (0..slots.len()).filter(|s| slots[*s].function == function);
             Part {
                 design,
-                columns,
                 slots: own.collect(),
-                constant: is_constant(design, functions.nodes()),
+                lanes: functions.ranges()[f].clone().map(lane).collect(),
+                constant: functions.is_constant(f),
             }
         };
         Self {
-            parts: moving.into_iter().map(part).collect(),
+            parts: assembly.iter().enumerate().map(part).collect(),
             seeds: seeds.collect(),
             slots,
+            order,
         }
     }
 
-    fn tangents(&self, groups: usize) -> Tangents {
-        let mut initial = vec![[[0.0; LANES]; 2]; groups];
-        for &(state, column) in &self.seeds {
-            initial[column / LANES][state][column % LANES] = 1.0;
+    fn tangents(&self) -> Tangents {
+        let mut initial = vec![[[0.0; LANES]; 2]; self.order.len().div_ceil(LANES)];
+        for &(state, place) in &self.seeds {
+            initial[place / LANES][state][place % LANES] = 1.0;
         }
         Tangents::new(self.slots.clone(), &initial)
     }
@@ -148,53 +164,38 @@ impl<'a> Moving<'a> {
     /// How the functions change at the nodes of the tile from node `first` on.
     fn fill(&self, tangents: &mut Tangents, first: usize) {
         for part in &self.parts {
-            if part.constant && first > 0 {
-                continue;
+            if !part.constant || first == 0 {
+                part.slots.iter().for_each(|slot| tangents.rest(*slot));
+                part.fill(tangents, first);
             }
-            for &slot in &part.slots {
-                tangents.changes_mut(slot).fill([0.0; LANES]);
-            }
-            part.fill(tangents, first);
         }
     }
 }
 
 impl Part<'_> {
     fn fill(&self, tangents: &mut Tangents, first: usize) {
-        let lowest = self.columns.start / LANES;
         let mut set = |node: usize, parameter: usize, value: f64| {
-            let column = self.columns.start + parameter;
-            let slot = self.slots[column / LANES - lowest];
-            tangents.changes_mut(slot)[node][column % LANES] = value;
+            let (slot, lane) = self.lanes[parameter];
+            tangents.changes_mut(slot)[node][lane] = value;
         };
         match self.design {
             Design::Empty => {}
             Design::Identity => {
-                for node in 0..TILE_NODES.min(self.columns.len() - first) {
+                for node in 0..TILE_NODES.min(self.lanes.len() - first) {
                     set(node, first + node, 1.0);
                 }
             }
             Design::Sparse(matrix) => {
-                for node in 0..TILE_NODES.min(matrix.nrows() - first) {
-                    let row = matrix.row(first + node);
-                    for (j, b) in row.col_indices().iter().zip(row.values()) {
+                let (offsets, columns, entries) = matrix.csr_data();
+                let last = (first + TILE_NODES).min(matrix.nrows());
+                for (node, ends) in offsets[first..=last].windows(2).enumerate() {
+                    let range = ends[0]..ends[1];
+                    for (j, b) in columns[range.clone()].iter().zip(&entries[range]) {
                         set(node, *j, *b);
                     }
                 }
             }
         }
-    }
-}
-
-/// Whether a design has the same single entry at every node.
-fn is_constant(design: &Design, nodes: usize) -> bool {
-    match design {
-        Design::Sparse(matrix) => {
-            let values = matrix.values();
-            let same = values.windows(2).all(|pair| pair[0] == pair[1]);
-            matrix.ncols() == 1 && values.len() == nodes && same
-        }
-        _ => false,
     }
 }
 
@@ -265,11 +266,18 @@ impl<'a> Reader<'a> {
     }
 
     /// The readings in the steps `steps`, over which the tangents have just gone.
-    fn read(&mut self, tangents: &Tangents, steps: Range<usize>, jacobian: &mut DMatrix<f64>) {
+    fn read(
+        &mut self,
+        tangents: &Tangents,
+        order: &[usize],
+        steps: Range<usize>,
+        jacobian: &mut DMatrix<f64>,
+    ) {
         let height = jacobian.nrows();
         lanes::run(Read {
             reader: self,
             tangents,
+            order,
             steps,
             columns: jacobian.as_mut_slice(),
             height,
@@ -359,6 +367,8 @@ impl<'a> Reader<'a> {
 struct Read<'a, 'c> {
     reader: &'a mut Reader<'c>,
     tangents: &'a Tangents,
+    /// The parameter at each place.
+    order: &'a [usize],
     steps: Range<usize>,
     /// Columns of `height` numbers each.
     columns: &'a mut [f64],
@@ -378,6 +388,7 @@ impl Kernel for Read<'_, '_> {
             }
             let answer = Answer {
                 tangents: self.tangents,
+                order: self.order,
                 glance: &glance,
                 kind: self.reader.kind,
                 gain: self.reader.gain,
@@ -392,6 +403,7 @@ impl Kernel for Read<'_, '_> {
 /// The answers of up to eight readings to all directions.
 struct Answer<'a> {
     tangents: &'a Tangents,
+    order: &'a [usize],
     glance: &'a Glance,
     kind: Kind,
     gain: f64,
@@ -401,10 +413,12 @@ impl Answer<'_> {
     /// Writes them from `row` on into columns of `height` numbers each.
     #[inline(always)]
     fn write<A: Arithmetic>(&self, arithmetic: A, columns: &mut [f64], height: usize, row: usize) {
-        let groups = (columns.len() / height).div_ceil(LANES);
         let gain = Eight::splat(arithmetic, self.gain);
         let count = self.glance.count;
-        for g in 0..groups {
+        for (g, parameters) in self.order.chunks(LANES).enumerate() {
+            if !self.tangents.has_begun(g) {
+                continue;
+            }
             let mut answers = [[0.0; LANES]; LANES];
             for (l, answer) in answers.iter_mut().enumerate().take(count) {
                 let sum = match self.kind {
@@ -417,9 +431,8 @@ impl Answer<'_> {
                 *answer = (gain * sum).row();
             }
             let answers = arithmetic.transpose(&answers);
-            let columns = columns.chunks_exact_mut(height);
-            for (column, answer) in columns.skip(g * LANES).zip(&answers) {
-                let rows = &mut column[row..row + count];
+            for (j, answer) in parameters.iter().zip(&answers) {
+                let rows = &mut columns[j * height + row..][..count];
                 match rows.first_chunk_mut::<LANES>() {
                     Some(rows) => *rows = *answer,
                     None => rows.copy_from_slice(&answer[..count]),

@@ -1,5 +1,7 @@
 //! Small dense rows on top of each other.
 
+use crate::lanes::{self, Arithmetic, Kernel};
+
 /// Rows of equal length.
 #[derive(Default)]
 pub struct Dense {
@@ -63,30 +65,58 @@ impl Dense {
     /// Reflects the rows `active`, of which the first becomes the only one with an entry in `column`
     /// and of which none has an entry before it.
     pub fn reflect(&mut self, active: &[usize], column: usize, sums: &mut Vec<f64>) {
-        let first = self.row(active[0])[column];
-        let squares = active.iter().map(|i| self.row(*i)[column].powi(2));
+        lanes::run(Reflect {
+            rows: self,
+            active,
+            column,
+            sums,
+        });
+    }
+}
+
+struct Reflect<'a> {
+    rows: &'a mut Dense,
+    active: &'a [usize],
+    column: usize,
+    sums: &'a mut Vec<f64>,
+}
+
+impl Kernel for Reflect<'_> {
+    type Output = ();
+
+    /// Plain loops over the entries of a row, which the compiler puts into lanes: no sum is reordered.
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, _: A) {
+        let Self {
+            rows,
+            active,
+            column,
+            sums,
+        } = self;
+        let first = rows.row(active[0])[column];
+        let squares = active.iter().map(|i| rows.row(*i)[column].powi(2));
         let norm = squares.sum::<f64>().sqrt();
         let diagonal = if first > 0.0 { -norm } else { norm };
         // I - v v' / (norm (norm + |first|)) with v the column less the diagonal in its first row.
         let weight = 1.0 / (norm * (norm + first.abs()));
-        self.row_mut(active[0])[column] = first - diagonal;
+        rows.row_mut(active[0])[column] = first - diagonal;
         sums.clear();
-        sums.resize(self.length - column - 1, 0.0);
+        sums.resize(rows.length - column - 1, 0.0);
         for &i in active {
-            let (head, tail) = self.row(i)[column..].split_at(1);
+            let (head, tail) = rows.row(i)[column..].split_at(1);
             let factor = weight * head[0];
             for (sum, a) in sums.iter_mut().zip(tail) {
                 *sum += factor * a;
             }
         }
         for &i in active {
-            let (head, tail) = self.row_mut(i)[column..].split_at_mut(1);
+            let (head, tail) = rows.row_mut(i)[column..].split_at_mut(1);
             for (a, sum) in tail.iter_mut().zip(&*sums) {
                 *a -= head[0] * sum;
             }
             head[0] = 0.0;
         }
-        self.row_mut(active[0])[column] = diagonal;
+        rows.row_mut(active[0])[column] = diagonal;
     }
 }
 

@@ -51,6 +51,8 @@ impl Linearised {
     pub fn subproblem(self) -> Subproblem {
         let n = self.jacobian.ncols();
         let mut sub = Subproblem::new(n);
+        // All at once.
+        sub.stations = vec![0; n];
         if self.jacobian.nrows() <= n {
             let (jacobian, residuals) = self.weighted();
             for (row, r) in jacobian.row_iter().zip(&residuals) {

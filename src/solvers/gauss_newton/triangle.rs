@@ -34,7 +34,6 @@ impl Triangle {
         let n = matrix.ncols();
         let height = matrix.nrows();
         let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
-        let begin = |c: &[f64]| c.iter().position(|a| *a != 0.0).unwrap_or(height);
         let begins: Vec<usize> = columns.iter().map(|c| begin(c)).collect();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by_key(|j| begins[*j]);
@@ -52,10 +51,17 @@ impl Triangle {
                 .take_while(|j| begins[**j] < to)
                 .count();
             triangle.widen(begun);
-            for (column, j) in piece.iter_mut().zip(&triangle.order[..begun]) {
-                copy(column, &columns[*j][from..to], Some(&roots[from..to]));
-            }
-            copy(&mut piece[begun], &right[from..to], None);
+            let order = std::mem::take(&mut triangle.order);
+            let part = |j: usize| columns[order[j]].get(from..to).unwrap_or_default();
+            lanes::run(Fill {
+                piece: &mut piece[..begun],
+                part,
+                roots: &roots[from..to],
+            });
+            triangle.order = order;
+            let (filled, below) = piece[begun].as_flattened_mut().split_at_mut(to - from);
+            filled.copy_from_slice(&right[from..to]);
+            below.fill(0.0);
             lanes::run(Reflect {
                 triangle: &mut triangle,
                 piece: &mut piece[..=begun],
@@ -90,19 +96,45 @@ impl Triangle {
     }
 }
 
-/// Fills a column of a piece, with zeros below.
-fn copy(column: &mut Column, values: &[f64], roots: Option<&[f64]>) {
-    let flat = column.as_flattened_mut();
-    let (filled, below) = flat.split_at_mut(values.len());
-    match roots {
-        Some(roots) => {
-            for ((to, a), root) in filled.iter_mut().zip(values).zip(roots) {
-                *to = root * a;
+/// The first row of a column that is not zero; its length if there is none.
+fn begin(column: &[f64]) -> usize {
+    let (eights, rest) = column.as_chunks::<LANES>();
+    let is_zero = |eight: &Row| eight.iter().fold(true, |all, a| all & (*a == 0.0));
+    let zeros = eights.iter().take_while(|eight| is_zero(eight)).count() * LANES;
+    let from = zeros.min(column.len() - rest.len());
+    let more = column[from..].iter().take_while(|a| **a == 0.0);
+    from + more.count()
+}
+
+/// Fills the columns of a piece from parts of the matrix times the diagonal `roots`, with zeros below.
+struct Fill<'a, F> {
+    piece: &'a mut [Column],
+    part: F,
+    roots: &'a [f64],
+}
+
+impl<'m, F: Fn(usize) -> &'m [f64]> Kernel for Fill<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let (roots, last) = self.roots.as_chunks::<LANES>();
+        for (j, column) in self.piece.iter_mut().enumerate() {
+            let (values, rest) = (self.part)(j).as_chunks::<LANES>();
+            let mut filled = 0;
+            for ((to, a), root) in column.iter_mut().zip(values).zip(roots) {
+                *to = (Eight::load(arithmetic, root) * Eight::load(arithmetic, a)).row();
+                filled += 1;
+            }
+            if let Some((next, below)) = column[filled..].split_first_mut() {
+                *next = [0.0; LANES];
+                for ((to, a), root) in next.iter_mut().zip(rest).zip(last) {
+                    *to = root * a;
+                }
+                below.fill([0.0; LANES]);
             }
         }
-        None => filled.copy_from_slice(values),
     }
-    below.fill(0.0);
 }
 
 /// Reflects a piece, its right-hand side last, into the triangle.
