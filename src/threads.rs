@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
-use std::thread::{Builder, JoinHandle, Thread};
+use std::thread::{Builder, JoinHandle, Scope, ScopedJoinHandle, Thread};
 use std::time::{Duration, Instant};
 
 thread_local! {
@@ -41,6 +41,13 @@ struct Shared<J> {
 }
 
 impl<J> Shared<J> {
+    fn new(job: J) -> Arc<Self> {
+        Arc::new(Self {
+            state: AtomicU32::new(NONE),
+            job: Mutex::new(job),
+        })
+    }
+
     fn job(&self) -> MutexGuard<'_, J> {
         self.job.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -57,28 +64,76 @@ impl<J> Shared<J> {
 /// A thread that does half of a job of tens of microseconds, again and again: too short to be woken for, so it
 /// waits awake. What it has not begun when it is needed, the other thread does itself; the result does
 /// not depend on who does it. While it waits awake it keeps a processor busy, which [`spare`] is asked for first.
-pub(crate) struct Companion<J: Send + 'static> {
+pub(crate) struct Companion<'s, J: Send> {
     shared: Arc<Shared<J>>,
     act: fn(&mut J),
     thread: Thread,
-    handle: Option<JoinHandle<()>>,
+    handle: Option<Handle<'s>>,
 }
 
-impl<J: Send + 'static> Companion<J> {
+enum Handle<'s> {
+    Free(JoinHandle<()>),
+    Scoped(ScopedJoinHandle<'s, ()>),
+}
+
+impl Handle<'_> {
+    fn is_finished(&self) -> bool {
+        match self {
+            Handle::Free(handle) => handle.is_finished(),
+            Handle::Scoped(handle) => handle.is_finished(),
+        }
+    }
+
+    /// Waits for its end; a panic of it has been one of this thread, too.
+    fn join(self) {
+        let _ = match self {
+            Handle::Free(handle) => handle.join(),
+            Handle::Scoped(handle) => handle.join(),
+        };
+    }
+}
+
+impl<J: Send + 'static> Companion<'static, J> {
     /// A companion that does `act`; `None` if the system has no thread to give.
     pub fn new(job: J, act: fn(&mut J)) -> Option<Self> {
-        let shared = Arc::new(Shared {
-            state: AtomicU32::new(NONE),
-            job: Mutex::new(job),
-        });
+        let shared = Shared::new(job);
         let its = Arc::clone(&shared);
         let handle = Builder::new().spawn(move || accompany(&its, act)).ok()?;
-        Some(Self {
+        let thread = handle.thread().clone();
+        Some(Self::with_handle(shared, act, thread, Handle::Free(handle)))
+    }
+}
+
+impl<'s, J: Send + 's> Companion<'s, J> {
+    /// [`Companion::new`], for a job that borrows what outlives `scope`.
+    pub fn within(scope: &'s Scope<'s, '_>, job: J, act: fn(&mut J)) -> Option<Self> {
+        let shared = Shared::new(job);
+        let its = Arc::clone(&shared);
+        let run = move || accompany(&its, act);
+        let handle = Builder::new().spawn_scoped(scope, run).ok()?;
+        let thread = handle.thread().clone();
+        Some(Self::with_handle(
             shared,
             act,
-            thread: handle.thread().clone(),
+            thread,
+            Handle::Scoped(handle),
+        ))
+    }
+}
+
+impl<'s, J: Send> Companion<'s, J> {
+    fn with_handle(
+        shared: Arc<Shared<J>>,
+        act: fn(&mut J),
+        thread: Thread,
+        handle: Handle<'s>,
+    ) -> Self {
+        Self {
+            shared,
+            act,
+            thread,
             handle: Some(handle),
-        })
+        }
     }
 
     /// Prepares the job, does `own` meanwhile, and looks at the job once it is done.
@@ -107,7 +162,7 @@ impl<J: Send + 'static> Companion<J> {
     }
 
     fn wait(&self) {
-        let is_gone = || self.handle.as_ref().is_none_or(JoinHandle::is_finished);
+        let is_gone = || self.handle.as_ref().is_none_or(Handle::is_finished);
         let mut spins = 0_u32;
         while self.shared.state.load(Ordering::Acquire) != DONE {
             std::hint::spin_loop();
@@ -123,12 +178,13 @@ impl<J: Send + 'static> Companion<J> {
     }
 }
 
-impl<J: Send + 'static> Drop for Companion<J> {
+impl<J: Send> Drop for Companion<'_, J> {
     fn drop(&mut self) {
         self.shared.state.store(END, Ordering::Release);
         self.thread.unpark();
-        // A panic of it has been one of this thread, too.
-        drop(self.handle.take().map(JoinHandle::join));
+        if let Some(handle) = self.handle.take() {
+            handle.join();
+        }
     }
 }
 

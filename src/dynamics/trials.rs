@@ -35,7 +35,7 @@ pub(crate) struct Trials {
     without_mass: usize,
     batches: Vec<Batch>,
     /// Who does the last batch, once there was one that was worth it.
-    companion: Option<Companion<Owned>>,
+    companion: Option<Companion<'static, Owned>>,
     /// Whether the last batch is with the companion.
     is_shared: bool,
 }

@@ -9,6 +9,7 @@
 
 mod portable;
 pub(crate) mod sum;
+pub(crate) mod tall;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

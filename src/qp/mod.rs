@@ -6,6 +6,7 @@
 
 mod chain;
 mod clarabel;
+mod dense;
 mod factor;
 mod projection;
 mod subproblem;

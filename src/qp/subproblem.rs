@@ -1,7 +1,7 @@
 //! The convex subproblem and its plain solution.
 
-use super::chain;
 use super::factor::Symmetric;
+use super::{chain, dense};
 use crate::constraints::{Cone, Rows};
 
 /// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
@@ -88,7 +88,7 @@ impl Subproblem {
     /// The minimiser without the inequalities and cones; `None` if it cannot be found to
     /// [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
     ///
-    /// Variables with [`Subproblem::stations`] are eliminated along them. For others, or where that fails,
+    /// Variables with [`Subproblem::stations`] are eliminated along them, or at once where there is only one. For others, or where that fails,
     /// solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
     /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, so that `F^T F` is never formed.
     pub fn solve_plain(&self) -> Option<Vec<f64>> {
@@ -102,6 +102,11 @@ impl Subproblem {
     /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
     /// factorisation; absolute values are left out.
     pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        if let [target] = targets
+            && let Some(z) = dense::minimise(self, target)
+        {
+            return Some(vec![z]);
+        }
         chain::minimise(self, targets).or_else(|| self.solve_by_factor(targets))
     }
 

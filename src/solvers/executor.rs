@@ -1,5 +1,6 @@
 //! The loop around every solver, run by argmin's executor.
 
+use super::ahead::Ahead;
 use super::gauss_newton::GaussNewton;
 use super::keep::{Bits, Memory, Standing, Watch};
 use super::lbfgs::Lbfgs;
@@ -69,26 +70,29 @@ pub(super) fn search(
         return Ok(equation_error::fit(problem, start, watch.observe()));
     }
     let kept = watch.begin_search();
-    let run = Run {
-        method: method(settings.solver),
-        settings,
-        reference,
-        clock: Instant::now(),
-        timings: Timings::default(),
-        progress: Err(NOT_STARTED),
-        outcome: None,
-        kept,
-        before: Before::default(),
-        watch,
-    };
-    let result = Executor::new(problem, run)
-        .configure(|state: SearchState| state.param(start.to_vec()))
-        .ctrlc(false)
-        .timer(false)
-        .run()
-        .expect("Run reports by outcome and never returns an error to the executor");
-    let counts = Counts::of(&result.problem);
-    result.solver.finish(counts)
+    std::thread::scope(|scope| {
+        let run = Run {
+            method: method(settings.solver),
+            settings,
+            reference,
+            clock: Instant::now(),
+            timings: Timings::default(),
+            progress: Err(NOT_STARTED),
+            outcome: None,
+            kept,
+            before: Before::default(),
+            watch,
+            ahead: Ahead::new(scope, problem, settings),
+        };
+        let result = Executor::new(problem, run)
+            .configure(|state: SearchState| state.param(start.to_vec()))
+            .ctrlc(false)
+            .timer(false)
+            .run()
+            .expect("Run reports by outcome and never returns an error to the executor");
+        let counts = Counts::of(&result.problem);
+        result.solver.finish(counts)
+    })
 }
 
 /// One search from `start` alone, without the ladder of [`fit`](super::fit): for fits whose start is
@@ -115,7 +119,7 @@ fn method(solver: Solver) -> Box<dyn Descend> {
 }
 
 /// One method at work, seen by argmin as a solver.
-struct Run<'a, 'w> {
+struct Run<'a, 'w, 's, 'p> {
     method: Box<dyn Descend>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
@@ -127,6 +131,8 @@ struct Run<'a, 'w> {
     kept: Option<(Vec<Row>, Standing)>,
     before: Before,
     watch: &'a mut Watch<'w>,
+    /// Held by the work while there is some.
+    ahead: Option<Ahead<'s, 'p>>,
 }
 
 /// What a search did before it was ended from outside.
@@ -153,7 +159,7 @@ const NOT_STARTED: Breakdown = Breakdown {
 /// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl Run<'_, '_> {
+impl<'p> Run<'_, '_, '_, 'p> {
     fn start(&self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
         let mut evaluation = work.problem().workspace();
         work.evaluate_into(&parameters, &mut evaluation)?;
@@ -354,7 +360,7 @@ impl Run<'_, '_> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -365,12 +371,16 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         mut state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
-        let mut work = Work::new(problem, self.settings);
+        let mut work = Work::new(problem, self.ahead.take(), self.settings);
         match self.recalled(&work) {
-            Some(progress) => self.progress = Ok(progress),
+            Some(progress) => {
+                self.progress = Ok(progress);
+                self.ahead = work.ahead;
+            }
             None => {
                 self.progress = self.start(&mut work, parameters);
                 self.timings += work.timings;
+                self.ahead = work.ahead;
                 self.outcome = self.nothing_to_do(problem.problem);
             }
         }
@@ -382,9 +392,10 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        let mut work = Work::new(problem, self.settings);
+        let mut work = Work::new(problem, self.ahead.take(), self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
+        self.ahead = work.ahead;
         self.keep(Counts::of(problem));
         Ok((self.view(state), None))
     }

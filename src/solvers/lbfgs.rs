@@ -348,8 +348,8 @@ impl<'p> Coordinates<'p> {
 }
 
 /// Trial points along one direction.
-struct Trials<'a, 'w, 'q, 'p> {
-    work: &'a mut Work<'w, 'q>,
+struct Trials<'a, 'w, 's, 'q, 'p> {
+    work: &'a mut Work<'w, 's, 'q>,
     at: &'a Coordinates<'p>,
     x: Vec<f64>,
     direction: &'a [f64],
@@ -375,7 +375,7 @@ struct Accepted {
     gradient: Vector,
 }
 
-impl Line for Trials<'_, '_, '_, '_> {
+impl Line for Trials<'_, '_, '_, '_, '_> {
     fn cost(&mut self, length: f64) -> Option<f64> {
         let mut x = self.x.clone();
         add_scaled(&mut x, length, self.direction);

@@ -2,6 +2,7 @@
 //! record of what happened are shared.
 
 mod activity;
+mod ahead;
 mod all_at_once;
 mod conflict;
 mod covariance;

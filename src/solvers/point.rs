@@ -1,5 +1,7 @@
 //! A point of the search, and the counted and timed work that makes one.
 
+use super::ahead::Ahead;
+use super::gauss_newton::Reduced;
 use super::timings::{Timings, timed};
 use super::{FitSettings, Solver};
 use crate::dynamics::{Breakdown, Trajectory};
@@ -32,8 +34,10 @@ pub struct Counts {
 }
 
 /// The problem behind argmin's counters: the one door through which solvers evaluate.
-pub(crate) struct Work<'a, 'p> {
+pub(crate) struct Work<'a, 's, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
+    /// What the next step will need.
+    pub ahead: Option<Ahead<'s, 'p>>,
     kind: GradientKind,
     /// Whether every operation has its place: the paper's run depends on every bit.
     in_order: bool,
@@ -48,13 +52,15 @@ const ADJOINT: &str = "adjoint_count";
 const TANGENT: &str = "tangent_count";
 const QP: &str = "qp_count";
 
-impl<'a, 'p> Work<'a, 'p> {
+impl<'a, 's, 'p> Work<'a, 's, 'p> {
     pub fn new(
         problem: &'a mut argmin::core::Problem<&'p Problem>,
+        ahead: Option<Ahead<'s, 'p>>,
         settings: &FitSettings,
     ) -> Self {
         Self {
             problem,
+            ahead,
             kind: settings.gradient,
             in_order: settings.solver == Solver::SteepestDescent
                 || settings.gradient == GradientKind::Continuous,
@@ -137,6 +143,11 @@ impl<'a, 'p> Work<'a, 'p> {
         timed(&mut self.timings.qp, solve)
     }
 
+    /// The readings linearised at the point with these parameters, if that was done ahead.
+    pub fn linearised(&mut self, parameters: &[f64]) -> Option<Reduced> {
+        self.ahead.as_mut()?.linearised(parameters)
+    }
+
     /// Linear algebra between the solves.
     pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
         timed(&mut self.timings.linear_algebra, work)
@@ -144,7 +155,17 @@ impl<'a, 'p> Work<'a, 'p> {
 
     /// The point that an evaluation belongs to, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
-        let gradient = self.gradient(&parameters, &evaluation);
+        let (parameters, evaluation, gradient) = match &mut self.ahead {
+            Some(ahead) => ahead.gradient(parameters, evaluation, &mut self.timings),
+            None => (parameters, evaluation, None),
+        };
+        let gradient = match gradient {
+            Some(gradient) => {
+                *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
+                gradient
+            }
+            None => self.gradient(&parameters, &evaluation),
+        };
         Point {
             parameters,
             evaluation,

@@ -1,26 +1,28 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
-use super::triangle::Triangle;
+use crate::lanes::tall::{Piece, Triangle};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::solvers::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use std::time::Instant;
 
-/// The linearised predictions, and how their residuals are weighed.
-pub struct Linearised {
-    /// `dz/dtheta` (readings x parameters), for the predictions `z` of all channels.
-    jacobian: DMatrix<f64>,
+/// How the residuals of the readings of all channels are weighed.
+#[derive(Clone)]
+pub(crate) struct Residuals {
     /// `sqrt(w)`.
     roots: Vec<f64>,
     /// `sqrt(w) r`.
-    residuals: Vec<f64>,
+    weighted: Vec<f64>,
 }
 
-impl Linearised {
-    /// At an evaluated point: one tangent solve for each parameter.
+impl Residuals {
+    /// At an evaluated point.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let mut roots = Vec::with_capacity(problem.reading_count());
-        let mut residuals = Vec::with_capacity(problem.reading_count());
+        let mut weighted = Vec::with_capacity(problem.reading_count());
         for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
             for (channel, predicted) in experiment.channels.iter().zip(predictions) {
                 let first = roots.len();
@@ -35,51 +37,118 @@ impl Linearised {
                         roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
                     }
                 }
-                let weighted = channel.residuals(predicted).zip(&roots[first..]);
-                residuals.extend(weighted.map(|(r, root)| root * r));
+                let pairs = channel.residuals(predicted).zip(&roots[first..]);
+                weighted.extend(pairs.map(|(r, root)| root * r));
             }
         }
+        Self { roots, weighted }
+    }
+}
+
+/// The readings, linearised and reduced to as many rows as there are parameters:
+/// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
+pub(crate) struct Reduced {
+    triangle: Triangle,
+    /// The parameter of each column.
+    order: Vec<usize>,
+}
+
+impl Reduced {
+    /// Whether a problem's Jacobian can be reduced piece by piece as it comes ([`Problem::each_piece`]), and
+    /// is worth it.
+    pub fn comes_in_pieces(problem: &Problem) -> bool {
+        problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
+    }
+
+    /// Of no rows yet, for the parameters in `order` ([`Problem::places`]).
+    pub fn new(order: Vec<usize>) -> Self {
         Self {
-            jacobian: problem.predictions_jacobian(evaluation),
-            roots,
-            residuals,
+            triangle: Triangle::new(order.len()),
+            order,
         }
     }
 
-    /// The subproblem in `delta theta`: `|R delta - b|^2` with the triangular factor `R` of the weighted
-    /// Jacobian, and the rest of the residuals as a row of its own.
-    pub fn subproblem(self) -> Subproblem {
-        let n = self.jacobian.ncols();
-        let mut sub = Subproblem::new(n);
-        // All at once.
-        sub.stations = vec![0; n];
-        if self.jacobian.nrows() <= n {
-            let (jacobian, residuals) = self.weighted();
-            for (row, r) in jacobian.row_iter().zip(&residuals) {
-                let entries = row.iter().copied().enumerate().filter(|(_, a)| *a != 0.0);
-                sub.residuals.push(entries, -r);
-            }
-            sub.residuals.push([], 0.0);
-            return sub;
-        }
-        let triangle = Triangle::of(&self.jacobian, &self.roots, &self.residuals);
-        for (entries, b) in triangle.rows() {
+    /// Adds the rows of a piece.
+    pub fn add(&mut self, piece: &mut Piece, residuals: &Residuals) {
+        let Range { start, end } = piece.first..piece.first + piece.count;
+        let (roots, right) = (
+            &residuals.roots[start..end],
+            &residuals.weighted[start..end],
+        );
+        self.triangle.add_weighted(piece, roots, right);
+    }
+
+    /// All rows, piece by piece.
+    fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
+        let residuals = Residuals::at(problem, evaluation);
+        let mut reduced = Self::new(problem.places());
+        let order = reduced.order.clone();
+        let (clock, before) = (Instant::now(), timings.linear_algebra);
+        problem.each_piece(evaluation, &order, |mut piece| {
+            timed(&mut timings.linear_algebra, || {
+                reduced.add(&mut piece, &residuals);
+            });
+            piece
+        });
+        timings.tangent += clock
+            .elapsed()
+            .saturating_sub(timings.linear_algebra - before);
+        reduced
+    }
+
+    /// The subproblem in `delta theta`, with what no step can change as a row of its own.
+    fn subproblem(&self) -> Subproblem {
+        let mut sub = empty(self.order.len());
+        for (entries, b) in self.triangle.rows() {
+            let entries = entries.map(|(place, r)| (self.order[place], r));
             sub.residuals.push(entries, -b);
         }
-        // What no step can change, so that the subproblem's value is the whole linearised cost.
-        sub.residuals.push([], triangle.rest());
+        sub.residuals.push([], self.triangle.rest());
         sub
     }
+}
 
-    /// `sqrt(w) dz/dtheta` and `sqrt(w) r`.
-    fn weighted(mut self) -> (DMatrix<f64>, DVector<f64>) {
-        for mut column in self.jacobian.column_iter_mut() {
-            for (a, root) in column.iter_mut().zip(&self.roots) {
-                *a *= root;
-            }
+/// A subproblem whose variables are eliminated all at once.
+fn empty(variables: usize) -> Subproblem {
+    let mut sub = Subproblem::new(variables);
+    sub.stations = vec![0; variables];
+    sub
+}
+
+/// The subproblem in `delta theta` at an evaluated point, from the readings `ahead` if they have been linearised
+/// already: one tangent solve for each parameter.
+pub(super) fn subproblem(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    ahead: Option<Reduced>,
+    timings: &mut Timings,
+) -> Subproblem {
+    if Reduced::comes_in_pieces(problem) {
+        let reduced = ahead.unwrap_or_else(|| Reduced::at(problem, evaluation, timings));
+        // Else in another order of operations.
+        if reduced.triangle.is_finite() {
+            return timed(&mut timings.linear_algebra, || reduced.subproblem());
         }
-        (self.jacobian, DVector::from_vec(self.residuals))
     }
+    let residuals = Residuals::at(problem, evaluation);
+    let jacobian = timed(&mut timings.tangent, || {
+        problem.predictions_jacobian(evaluation)
+    });
+    timed(&mut timings.linear_algebra, || {
+        let Residuals { roots, weighted } = &residuals;
+        if jacobian.nrows() > jacobian.ncols() {
+            let (triangle, order) = Triangle::of(&jacobian, roots, weighted);
+            return Reduced { triangle, order }.subproblem();
+        }
+        let mut sub = empty(jacobian.ncols());
+        for ((row, root), r) in jacobian.row_iter().zip(roots).zip(weighted) {
+            let entries = row.iter().map(|a| root * a).enumerate();
+            sub.residuals.push(entries.filter(|(_, a)| *a != 0.0), -r);
+        }
+        // So that the readings' rows end alike.
+        sub.residuals.push([], 0.0);
+        sub
+    })
 }
 
 /// `sqrt(w) dz/dtheta` (readings x parameters) and `sqrt(w) r`, for the predictions `z` of all
@@ -88,5 +157,12 @@ pub fn weighted_jacobian(
     problem: &Problem,
     evaluation: &Evaluation,
 ) -> (DMatrix<f64>, DVector<f64>) {
-    Linearised::at(problem, evaluation).weighted()
+    let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
+    let mut jacobian = problem.predictions_jacobian(evaluation);
+    for mut column in jacobian.column_iter_mut() {
+        for (a, root) in column.iter_mut().zip(&roots) {
+            *a *= root;
+        }
+    }
+    (jacobian, DVector::from_vec(weighted))
 }

@@ -8,9 +8,8 @@
 
 mod dense;
 mod structured;
-mod triangle;
 
-pub(crate) use dense::weighted_jacobian;
+pub(crate) use dense::{Reduced, Residuals, weighted_jacobian};
 
 use super::infeasible::no_step;
 use super::point::Work;
@@ -291,7 +290,8 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
     let problem = work.problem();
     work.count_tangents(linearisation_tangents(problem));
-    linearise_at(problem, point, &mut work.timings).0
+    let ahead = work.linearised(&point.parameters);
+    linearise_from(problem, point, ahead, &mut work.timings).0
 }
 
 /// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
@@ -306,21 +306,25 @@ pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
 /// variables are the change of the parameters; with many of them the changes of the states follow,
 /// tied to them by equalities.
 pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    timed_readings(problem, evaluation, &mut Timings::default())
+    timed_readings(problem, evaluation, None, &mut Timings::default())
 }
 
 /// [`linear_readings`], and what its tangents and its linear algebra took.
-fn timed_readings(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Subproblem {
-    let (tangent, algebra) = (&mut timings.tangent, &mut timings.linear_algebra);
+fn timed_readings(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    ahead: Option<Reduced>,
+    timings: &mut Timings,
+) -> Subproblem {
     if problem.parameters() <= FEW_PARAMETERS {
-        let linearised = timed(tangent, || dense::Linearised::at(problem, evaluation));
-        timed(algebra, || linearised.subproblem())
-    } else {
-        let steps = timed(tangent, || structured::steps(problem, evaluation));
-        timed(algebra, || {
-            structured::subproblem(problem, evaluation, &steps)
-        })
+        return dense::subproblem(problem, evaluation, ahead, timings);
     }
+    let steps = timed(&mut timings.tangent, || {
+        structured::steps(problem, evaluation)
+    });
+    timed(&mut timings.linear_algebra, || {
+        structured::subproblem(problem, evaluation, &steps)
+    })
 }
 
 /// [`linearise`] without counting, and the number of residual rows that belong to the readings:
@@ -330,7 +334,17 @@ pub(super) fn linearise_at(
     point: &Point,
     timings: &mut Timings,
 ) -> (Subproblem, usize) {
-    let mut sub = timed_readings(problem, &point.evaluation, timings);
+    linearise_from(problem, point, None, timings)
+}
+
+/// [`linearise_at`], from the readings `ahead` if they have been linearised already.
+fn linearise_from(
+    problem: &Problem,
+    point: &Point,
+    ahead: Option<Reduced>,
+    timings: &mut Timings,
+) -> (Subproblem, usize) {
+    let mut sub = timed_readings(problem, &point.evaluation, ahead, timings);
     let readings = sub.residuals.len();
     timed(&mut timings.linear_algebra, || {
         add_the_rest(problem, &point.parameters, &point.evaluation, &mut sub);

@@ -4,71 +4,91 @@
 //! triangle of all rows before it. A parameter that the first readings do not see stays out of the way
 //! until it is seen: the columns are taken in the order in which they begin.
 
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use super::{Column, HIGH, LANES, PIECE, Piece, Row};
+use crate::lanes::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
-/// Rows of a piece, in lanes: with 34 columns they fill the nearest memory.
-const HIGH: usize = 12;
-/// Rows of a piece.
-const PIECE: usize = HIGH * LANES;
 /// Columns that are reflected at once.
 const WIDE: usize = LANES;
 
-type Column = [Row; HIGH];
-
 /// `|D A x - d|^2 = |R x - b|^2 + rest^2` with diagonal `D`.
-pub(super) struct Triangle {
-    /// Column of `A` that each column of `R` is.
-    order: Vec<usize>,
+pub(crate) struct Triangle {
     /// Rows of `R`, each with its `b` behind the columns that have begun.
     rows: Vec<Vec<f64>>,
-    /// Columns that have begun.
+    /// Columns that have begun, or stand before one that has.
     begun: usize,
     /// The square of the rest.
     rest: f64,
 }
 
 impl Triangle {
-    /// From `A`, the diagonal `roots` of `D`, and `d`.
-    pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> Self {
-        let n = matrix.ncols();
+    /// Of no rows yet, with so many columns. Best in the order in which they begin: those behind the last one that
+    /// has cost nothing.
+    pub fn new(columns: usize) -> Self {
+        Self {
+            rows: vec![vec![0.0; columns + 1]; columns],
+            begun: 0,
+            rest: 0.0,
+        }
+    }
+
+    /// From `A`, the diagonal `roots` of `D`, and `d`; with the column of `A` that each column of `R` is.
+    pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
         let height = matrix.nrows();
         let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
         let begins: Vec<usize> = columns.iter().map(|c| begin(c)).collect();
-        let mut order: Vec<usize> = (0..n).collect();
+        let mut order: Vec<usize> = (0..columns.len()).collect();
         order.sort_by_key(|j| begins[*j]);
-        let mut triangle = Self {
-            order,
-            rows: vec![vec![0.0; n + 1]; n],
-            begun: 0,
-            rest: 0.0,
-        };
-        let mut piece: Vec<Column> = vec![[[0.0; LANES]; HIGH]; n + 1];
-        let mut from = 0;
-        while from < height {
-            let to = (from + PIECE).min(height);
-            let begun = (triangle.order.iter())
-                .take_while(|j| begins[**j] < to)
-                .count();
-            triangle.widen(begun);
-            let order = std::mem::take(&mut triangle.order);
-            let part = |j: usize| columns[order[j]].get(from..to).unwrap_or_default();
-            lanes::run(Fill {
-                piece: &mut piece[..begun],
-                part,
-                roots: &roots[from..to],
-            });
-            triangle.order = order;
-            let (filled, below) = piece[begun].as_flattened_mut().split_at_mut(to - from);
-            filled.copy_from_slice(&right[from..to]);
-            below.fill(0.0);
-            lanes::run(Reflect {
-                triangle: &mut triangle,
-                piece: &mut piece[..=begun],
-            });
-            from = to;
+        let mut triangle = Self::new(order.len());
+        let mut piece = Piece::new(order.len());
+        while piece.first < height {
+            let rows = piece.first..(piece.first + PIECE).min(height);
+            piece.count = rows.len();
+            for (place, j) in order.iter().enumerate() {
+                let column = &columns[*j][rows.clone()];
+                piece.column_mut(place)[..rows.len()].copy_from_slice(column);
+            }
+            triangle.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
+            piece.first = rows.end;
         }
-        triangle
+        (triangle, order)
+    }
+
+    /// Adds the rows of a piece, with `D` and `d` for each; what the piece holds then means nothing.
+    pub fn add_weighted(&mut self, piece: &mut Piece, roots: &[f64], right: &[f64]) {
+        let places = self.begin(piece);
+        lanes::run(Weigh {
+            columns: &mut piece.columns[..places],
+            roots,
+        });
+        self.reflect(piece, right);
+    }
+
+    /// As [`Triangle::add_weighted`] with ones for `D`.
+    pub fn add(&mut self, piece: &mut Piece, right: &[f64]) {
+        self.begin(piece);
+        self.reflect(piece, right);
+    }
+
+    /// Takes in the columns that begin in a piece: how many have.
+    fn begin(&mut self, piece: &Piece) -> usize {
+        let has_begun = |place: &usize| piece.column(*place).iter().any(|a| *a != 0.0);
+        let last = (self.begun..piece.places()).rev().find(has_begun);
+        self.widen(last.map_or(self.begun, |last| last + 1));
+        self.begun
+    }
+
+    fn reflect(&mut self, piece: &mut Piece, right: &[f64]) {
+        let columns = &mut piece.columns[..=self.begun];
+        // The right-hand side behind the columns that have begun: the others are zero.
+        columns[self.begun].as_flattened_mut()[..right.len()].copy_from_slice(right);
+        for column in columns.iter_mut() {
+            column.as_flattened_mut()[right.len()..].fill(0.0);
+        }
+        lanes::run(Reflect {
+            triangle: self,
+            piece: columns,
+        });
     }
 
     /// More columns begin: until now there is nothing in them.
@@ -80,19 +100,40 @@ impl Triangle {
         self.begun = begun;
     }
 
-    /// Rows of `R` as columns of `A` with entries, and `b`.
+    /// Rows of `R` with entries, and `b`.
     pub fn rows(&self) -> impl Iterator<Item = (impl Iterator<Item = (usize, f64)>, f64)> {
         let rows = self.rows[..self.begun].iter().enumerate();
         rows.map(|(i, row)| {
-            let entries = self.order[i..self.begun].iter().zip(&row[i..]);
-            let entries = entries.map(|(j, r)| (*j, *r)).filter(|(_, r)| *r != 0.0);
-            (entries, row[self.begun])
+            let entries = row[i..self.begun].iter().enumerate();
+            let entries = entries.map(move |(k, r)| (i + k, *r));
+            (entries.filter(|(_, r)| *r != 0.0), row[self.begun])
         })
+    }
+
+    /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
+    pub fn solve(&self, independent: f64) -> Option<Vec<f64>> {
+        let n = self.rows.len();
+        let mut x = vec![0.0; n];
+        for j in (0..n).rev() {
+            let row = &self.rows[j];
+            let known = row[j + 1..self.begun].iter().zip(&x[j + 1..]);
+            let known: f64 = known.map(|(r, x)| r * x).sum();
+            let above = self.rows[..=j].iter().map(|row| row[j] * row[j]);
+            let length = above.sum::<f64>().sqrt();
+            let is_firm = j < self.begun && row[j].abs() > independent * length;
+            x[j] = is_firm.then(|| (row[self.begun] - known) / row[j])?;
+        }
+        x.iter().all(|x| x.is_finite()).then_some(x)
     }
 
     /// What no `x` can change, as a length.
     pub fn rest(&self) -> f64 {
         self.rest.sqrt()
+    }
+
+    /// Whether all numbers are.
+    pub fn is_finite(&self) -> bool {
+        self.rest.is_finite() && self.rows.iter().flatten().all(|r| r.is_finite())
     }
 }
 
@@ -106,33 +147,24 @@ fn begin(column: &[f64]) -> usize {
     from + more.count()
 }
 
-/// Fills the columns of a piece from parts of the matrix times the diagonal `roots`, with zeros below.
-struct Fill<'a, F> {
-    piece: &'a mut [Column],
-    part: F,
+/// Multiplies the rows of columns by their `roots`.
+struct Weigh<'a> {
+    columns: &'a mut [Column],
     roots: &'a [f64],
 }
 
-impl<'m, F: Fn(usize) -> &'m [f64]> Kernel for Fill<'_, F> {
+impl Kernel for Weigh<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let (roots, last) = self.roots.as_chunks::<LANES>();
-        for (j, column) in self.piece.iter_mut().enumerate() {
-            let (values, rest) = (self.part)(j).as_chunks::<LANES>();
-            let mut filled = 0;
-            for ((to, a), root) in column.iter_mut().zip(values).zip(roots) {
-                *to = (Eight::load(arithmetic, root) * Eight::load(arithmetic, a)).row();
-                filled += 1;
+        for column in self.columns {
+            for (a, root) in column.iter_mut().zip(roots) {
+                *a = (Eight::load(arithmetic, root) * Eight::load(arithmetic, a)).row();
             }
-            if let Some((next, below)) = column[filled..].split_first_mut() {
-                *next = [0.0; LANES];
-                for ((to, a), root) in next.iter_mut().zip(rest).zip(last) {
-                    *to = root * a;
-                }
-                below.fill([0.0; LANES]);
-            }
+            let rest = column.get_mut(roots.len()).into_iter().flatten();
+            rest.zip(last).for_each(|(a, root)| *a *= root);
         }
     }
 }

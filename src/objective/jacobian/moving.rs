@@ -1,0 +1,113 @@
+//! Which functions change along which parameter, tile by tile.
+
+use crate::dynamics::{Slot, TILE_NODES, Tangents};
+use crate::functions::{Design, Functions};
+use crate::lanes::LANES;
+use crate::problem::Experiment;
+
+/// The functions of an experiment's device that have parameters, and where these stand.
+pub(super) struct Moving<'a> {
+    parts: Vec<Part<'a>>,
+    slots: Vec<Slot>,
+    groups: usize,
+    /// Initial states that are sought: which, and their places.
+    seeds: Vec<(usize, usize)>,
+}
+
+struct Part<'a> {
+    design: &'a Design,
+    /// The slots of its groups.
+    slots: Vec<usize>,
+    /// Slot and lane of each of its parameters.
+    lanes: Vec<(usize, usize)>,
+    constant: bool,
+}
+
+impl<'a> Moving<'a> {
+    /// `order` is the parameter at each place, [`LANES`] places a group.
+    pub fn new(functions: &'a Functions, order: &[usize], experiment: &Experiment) -> Self {
+        let mut places = vec![0; order.len()];
+        for (place, j) in order.iter().enumerate() {
+            places[*j] = place;
+        }
+        let scalars = functions.scalar_range().start;
+        let sought = experiment.sought.into_iter().enumerate();
+        let seeds = sought.filter_map(|(state, index)| Some((state, places[scalars + index?])));
+        let assembly = functions.assembly(experiment.device);
+        let slot_of = |function: usize, j: usize| Slot {
+            group: places[j] / LANES,
+            function,
+        };
+        let mut slots: Vec<Slot> = (assembly.iter().enumerate())
+            .flat_map(|(function, f)| functions.ranges()[*f].clone().map(move |j| (function, j)))
+            .map(|(function, j)| slot_of(function, j))
+            .collect();
+        slots.sort_unstable_by_key(|s| (s.group, s.function));
+        slots.dedup();
+        let find = |slot: Slot| {
+            slots.partition_point(|s| (s.group, s.function) < (slot.group, slot.function))
+        };
+        let part = |(function, &f): (usize, &usize)| {
+            let design = &functions.get(f).design;
+            let lane = |j: usize| (find(slot_of(function, j)), places[j] % LANES);
+            let own = (0..slots.len()).filter(|s| slots[*s].function == function);
+            Part {
+                design,
+                slots: own.collect(),
+                lanes: functions.ranges()[f].clone().map(lane).collect(),
+                constant: functions.is_constant(f),
+            }
+        };
+        Self {
+            parts: assembly.iter().enumerate().map(part).collect(),
+            seeds: seeds.collect(),
+            slots,
+            groups: order.len().div_ceil(LANES),
+        }
+    }
+
+    pub fn tangents(&self) -> Tangents {
+        let mut initial = vec![[[0.0; LANES]; 2]; self.groups];
+        for &(state, place) in &self.seeds {
+            initial[place / LANES][state][place % LANES] = 1.0;
+        }
+        Tangents::new(self.slots.clone(), &initial)
+    }
+
+    /// How the functions change at the nodes of the tile from node `first` on.
+    pub fn fill(&self, tangents: &mut Tangents, first: usize) {
+        for part in &self.parts {
+            if !part.constant || first == 0 {
+                part.slots.iter().for_each(|slot| tangents.rest(*slot));
+                part.fill(tangents, first);
+            }
+        }
+    }
+}
+
+impl Part<'_> {
+    fn fill(&self, tangents: &mut Tangents, first: usize) {
+        let mut set = |node: usize, parameter: usize, value: f64| {
+            let (slot, lane) = self.lanes[parameter];
+            tangents.changes_mut(slot)[node][lane] = value;
+        };
+        match self.design {
+            Design::Empty => {}
+            Design::Identity => {
+                for node in 0..TILE_NODES.min(self.lanes.len() - first) {
+                    set(node, first + node, 1.0);
+                }
+            }
+            Design::Sparse(matrix) => {
+                let (offsets, columns, entries) = matrix.csr_data();
+                let last = (first + TILE_NODES).min(matrix.nrows());
+                for (node, ends) in offsets[first..=last].windows(2).enumerate() {
+                    let range = ends[0]..ends[1];
+                    for (j, b) in columns[range.clone()].iter().zip(&entries[range]) {
+                        set(node, *j, *b);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Least squares in few variables, all at once.
+
+use super::Subproblem;
+use crate::lanes::tall::{PIECE, Piece, Triangle};
+
+/// A column that keeps less than this share of its length depends on those before it.
+const INDEPENDENT: f64 = 1e-14;
+
+/// The minimiser of `|F z - f|^2 + sum d z^2` under `E z = e` for one `f`, by reflecting all rows into a triangle; `None`
+/// if the variables stand at several stations, if an equality speaks of more than one variable, or if the
+/// minimum is not unique.
+pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
+    let at_once = sub.stations.len() == sub.variables && sub.stations.iter().all(|s| *s == 0);
+    at_once.then_some(())?;
+    let mut z = vec![f64::NAN; sub.variables];
+    for i in 0..sub.equalities.len() {
+        let mut entries = sub.equalities.row(i).filter(|(_, a)| *a != 0.0);
+        let (Some((j, a)), None) = (entries.next(), entries.next()) else {
+            return None;
+        };
+        let value = sub.equalities.right()[i] / a;
+        if !z[j].is_nan() && z[j] != value {
+            return None;
+        }
+        z[j] = value;
+    }
+    let free: Vec<usize> = (0..sub.variables).filter(|j| z[*j].is_nan()).collect();
+    let mut places = vec![None; sub.variables];
+    for (place, j) in free.iter().enumerate() {
+        places[*j] = Some(place);
+    }
+
+    // The largest rows first: then those that are much smaller keep their digits.
+    let count = sub.residuals.len();
+    let size = |i: &usize| -> f64 {
+        match free.get(i.wrapping_sub(count)) {
+            Some(j) => sub.proximal[*j].sqrt(),
+            None => sub
+                .residuals
+                .row(*i)
+                .fold(0.0, |most, (_, a)| most.max(a.abs())),
+        }
+    };
+    let proximal = (count..)
+        .zip(&free)
+        .filter(|(_, j)| sub.proximal[**j] > 0.0);
+    let rows = (0..count).chain(proximal.map(|(i, _)| i));
+    let mut rows: Vec<(f64, usize)> = rows.map(|i| (size(&i), i)).collect();
+    rows.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+
+    let mut triangle = Triangle::new(free.len());
+    let mut piece = Piece::new(free.len());
+    let mut right = [0.0; PIECE];
+    for part in rows.chunks(PIECE) {
+        piece.clear();
+        piece.count = part.len();
+        for (r, &(size, i)) in part.iter().enumerate() {
+            right[r] = 0.0;
+            if i >= count {
+                piece.column_mut(i - count)[r] = size;
+                continue;
+            }
+            right[r] = target[i];
+            for (j, a) in sub.residuals.row(i) {
+                match places[j] {
+                    Some(place) => piece.column_mut(place)[r] = a,
+                    None => right[r] -= a * z[j],
+                }
+            }
+        }
+        triangle.add(&mut piece, &right[..part.len()]);
+    }
+    for (j, x) in free.iter().zip(triangle.solve(INDEPENDENT)?) {
+        z[*j] = x;
+    }
+    z.iter().all(|z| z.is_finite()).then_some(z)
+}
