@@ -23,6 +23,14 @@ pub(crate) fn share() {
     SHARES.set(true);
 }
 
+/// Does `work` while another thread is busy for the same end.
+pub(crate) fn sharing<T>(work: impl FnOnce() -> T) -> T {
+    let before = SHARES.replace(true);
+    let result = work();
+    SHARES.set(before);
+    result
+}
+
 /// How long a companion stays awake without work: longer than an iteration of a quick search. Beside a longer
 /// one, the tens of microseconds that it takes to wake are little.
 const AWAKE: Duration = Duration::from_micros(400);

@@ -2,11 +2,11 @@
 
 mod common;
 
-use kmcfit::dynamics::{Device, Grid, Method, Oscillator, Term};
+use kmcfit::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit::objective::{Channel, GradientKind, Weighting};
 use kmcfit::problem::{Experiment, Problem};
-use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit, fit_from};
 
 /// Nodes from one reading to the next.
 const STRIDE: usize = 20;
@@ -96,4 +96,93 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
         "{timings:?} {:?}",
         found.elapsed
     );
+}
+
+/// A hardening spring under two sines that set in at node `first`, in a record ten times as long as the beginning
+/// that is looked at, seen every fourth step.
+fn long_record(first: usize) -> (Problem, [f64; 4]) {
+    let nodes = 40_001;
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, 40.0, nodes).unwrap(),
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+    };
+    let truth = [1.0, 1.2, 20.0, 15.0];
+    let device = Device {
+        mass: vec![truth[0]; nodes],
+        coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
+    };
+    let drive = |(i, t): (usize, f64)| match i < first {
+        true => 0.0,
+        false => 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin(),
+    };
+    let force: Vec<f64> = (oscillator.grid.times().into_iter().enumerate())
+        .map(drive)
+        .collect();
+    let excitation = Excitation::force_at_nodes(&force);
+    let rest = State {
+        displacement: 0.0,
+        velocity: 0.0,
+    };
+    let motion = oscillator
+        .forward(&device, rest, Some(&excitation))
+        .unwrap();
+    let observed = motion.displacement.into_iter().step_by(4).collect();
+    let weighting = Weighting::Sigma(1e-4);
+    let channel = Channel::displacement_at_nodes(observed, 4, weighting, &oscillator.grid);
+    let experiment = Experiment::free("two sines", rest, nodes)
+        .with_excitation(excitation)
+        .with_channel(channel);
+    let quantities = [
+        Quantity::Mass,
+        Quantity::Damping,
+        Quantity::Stiffness,
+        Quantity::CubicStiffness,
+    ];
+    let list = quantities.into_iter().zip([1.2, 1.0, 18.0, 12.0]);
+    let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
+    let step = oscillator.grid.step();
+    let functions = Functions::new(list.collect(), nodes, step).unwrap();
+    (Problem::new(oscillator, functions, vec![experiment]), truth)
+}
+
+#[test]
+fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
+    let (problem, truth) = long_record(0);
+    let settings = FitSettings::default();
+    let start = problem.start();
+    let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
+    let alone = fit_from(&problem, &start, &settings).unwrap();
+    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    assert_eq!(names, ["beginning of the record"]);
+    // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
+    assert!(
+        found.history.len() * 2 < alone.history.len(),
+        "{} {}",
+        found.history.len(),
+        alone.history.len()
+    );
+    // Both are compared to the start values.
+    assert_eq!(found.initial_cost, alone.initial_cost);
+    assert_eq!(found.initial_norm_squared, alone.initial_norm_squared);
+    for ((p, q), truth) in (found.best.parameters.iter())
+        .zip(&alone.best.parameters)
+        .zip(truth)
+    {
+        // Rounding of 40,000 steps.
+        assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
+        assert!((q - truth).abs() <= 1e-9 * truth, "{q} {truth}");
+    }
+}
+
+/// Nothing moves while the beginning lasts: it says nothing, and the start values are what there is.
+#[test]
+fn a_silent_beginning_says_nothing() {
+    let (problem, truth) = long_record(5000);
+    let start = problem.start();
+    let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
+    assert_eq!(found.rungs[0].name, "start values");
+    for (p, truth) in found.best.parameters.iter().zip(truth) {
+        assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
+    }
 }

@@ -130,6 +130,16 @@ fn rounds_of_sigmas() {
     again_and_again("accelerometer", &[], 2);
 }
 
+/// Also where each round of sigmas starts from the beginning of the record.
+#[test]
+fn the_beginning_of_a_long_record() {
+    let long = [("functions:\n", "grid: {nodes: 40001}\nfunctions:\n")];
+    let (_, model) = model("duffing", &long);
+    let (_, fit) = run(&model, None, u64::MAX);
+    assert_eq!(fit.rungs[0].name, "beginning of the record");
+    again_and_again("duffing", &long, 1);
+}
+
 #[test]
 fn a_path_of_weights() {
     let shorter = [

@@ -207,17 +207,33 @@ impl Channel {
     /// The first `count` readings, at least one; filtered as if there had been no more.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
-        let mut part = self.clone();
         let count = count.max(1);
-        part.times.truncate(count);
-        part.places.truncate(count);
-        part.observed.truncate(count);
-        part.unfiltered.truncate(count);
+        let short = |list: &[f64]| list[..count.min(list.len())].to_vec();
+        let mut weighting = self.weighting.clone();
+        weighting.truncate(count);
+        let mut part = Self {
+            kind: self.kind,
+            times: short(&self.times),
+            places: self.places[..count.min(self.len())].to_vec(),
+            observed: short(&self.observed),
+            unfiltered: short(&self.unfiltered),
+            weighting,
+            loss: self.loss,
+            sensor: self.sensor,
+            around: self.around[..count.min(self.around.len())].to_vec(),
+            base: short(&self.base),
+            filter: self.filter.clone(),
+            on_every_node: self.on_every_node,
+        };
         part.filter_readings();
-        part.around.truncate(count);
-        part.base.truncate(count);
-        part.weighting.truncate(count);
         part
+    }
+
+    /// The readings within the first `steps` steps, if there are any; what stands on the node behind them
+    /// belongs to the next.
+    pub(crate) fn within(&self, steps: usize) -> Option<Self> {
+        let count = self.places.partition_point(|p| p.step < steps);
+        (count > 0).then(|| self.first(count))
     }
 
     /// The same readings on another grid over the same time; `None` if they are not all on it.

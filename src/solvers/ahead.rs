@@ -11,8 +11,8 @@ use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::threads::{self, Companion};
-use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::{Arc, OnceLock};
 use std::thread::Scope;
 use std::time::{Duration, Instant};
 
@@ -32,7 +32,8 @@ pub(crate) struct Ahead<'s, 'p> {
 struct Input {
     parameters: Vec<f64>,
     evaluation: Evaluation,
-    residuals: Residuals,
+    /// There before the first piece is.
+    residuals: OnceLock<Residuals>,
 }
 
 /// What the second thread does.
@@ -67,7 +68,7 @@ impl Job<'_> {
             match full.try_recv() {
                 Ok(mut piece) => {
                     let clock = Instant::now();
-                    if let Some(reduced) = &mut self.reduced {
+                    if let (Some(reduced), Some(residuals)) = (&mut self.reduced, residuals.get()) {
                         reduced.add(&mut piece, residuals);
                     }
                     self.algebra += clock.elapsed();
@@ -96,6 +97,16 @@ impl<'s, 'p> Ahead<'s, 'p> {
             && problem.reading_count() * parameters >= WORTH_SHARING
             && Reduced::comes_in_pieces(problem)
             && threads::spare();
+        is_wanted.then_some(())?;
+        Self::with(scope, problem, settings)
+    }
+
+    /// [`Ahead::new`], whether it is worth it or not; `None` if the system has no thread to give.
+    fn with(
+        scope: &'s Scope<'s, 'p>,
+        problem: &'p Problem,
+        settings: &FitSettings,
+    ) -> Option<Self> {
         let job = Job {
             problem,
             kind: settings.gradient,
@@ -107,7 +118,6 @@ impl<'s, 'p> Ahead<'s, 'p> {
             adjoint: Duration::ZERO,
             algebra: Duration::ZERO,
         };
-        is_wanted.then_some(())?;
         Some(Self {
             problem,
             companion: Companion::within(scope, job, Job::run)?,
@@ -126,11 +136,10 @@ impl<'s, 'p> Ahead<'s, 'p> {
         self.linearised = None;
         let clock = Instant::now();
         let problem = self.problem;
-        let residuals = Residuals::at(problem, &evaluation);
         let input = Arc::new(Input {
             parameters,
             evaluation,
-            residuals,
+            residuals: OnceLock::new(),
         });
         let (order, its) = (problem.places(), Arc::clone(&input));
         let (full, to_reduce) = mpsc::channel();
@@ -142,6 +151,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
                 job.reduced = Some(Reduced::new(order.clone()));
             },
             || {
+                (input.residuals).get_or_init(|| Residuals::at(problem, &input.evaluation));
                 problem.each_piece(&input.evaluation, &order, |piece| {
                     // It is there until it has been told that there are no more.
                     let _ = full.send(piece);
@@ -175,5 +185,74 @@ impl<'s, 'p> Ahead<'s, 'p> {
     pub fn linearised(&mut self, parameters: &[f64]) -> Option<Reduced> {
         let (at, reduced) = self.linearised.take()?;
         (at == parameters).then_some(reduced)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::{Grid, Method, Oscillator, State, Term};
+    use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+    use crate::objective::{Channel, Weighting};
+    use crate::problem::Experiment;
+    use crate::solvers::{Fit, fit};
+
+    /// A decaying oscillator on knots, with more readings than a piece holds.
+    fn problem() -> Problem {
+        let grid = Grid::new(0.0, 20.0, 601).expect("a grid");
+        let oscillator = Oscillator {
+            grid,
+            method: Method::Midpoint,
+            terms: vec![Term::Damping, Term::Stiffness],
+        };
+        let knots = Basis::PiecewiseLinear {
+            knots: (0..6).map(|i| 4.0 * f64::from(i)).collect(),
+        };
+        let on_knots = |quantity, start: f64| {
+            CoefficientFunction::free(quantity, knots.clone(), &grid, vec![start; 6])
+        };
+        let list = vec![
+            CoefficientFunction::constant(Quantity::Mass, 1.3, grid.nodes()),
+            on_knots(Quantity::Damping, 0.2),
+            on_knots(Quantity::Stiffness, 1.6),
+        ];
+        let functions = Functions::new(list, grid.nodes(), grid.step()).expect("functions");
+        let times = grid.times().into_iter();
+        let readings = times.map(|t| (-0.05 * t).exp() * (1.2 * t).cos());
+        let weighting = Weighting::Sigma(0.01);
+        let channel = Channel::displacement_at_nodes(readings.collect(), 1, weighting, &grid);
+        let initial = State {
+            displacement: 1.0,
+            velocity: 0.0,
+        };
+        let experiment = Experiment::free("decay", initial, grid.nodes()).with_channel(channel);
+        Problem::new(oscillator, functions, vec![experiment])
+    }
+
+    fn fitted(problem: &Problem) -> Fit {
+        let settings = FitSettings::default();
+        fit(problem, &problem.start(), &settings, &mut |_| {}).expect("a motion")
+    }
+
+    /// Two threads and one go the same way, to the last bit.
+    #[test]
+    fn who_does_what_changes_nothing() {
+        let problem = problem();
+        let alone = threads::sharing(|| fitted(&problem));
+        let settings = FitSettings::default();
+        std::thread::scope(|scope| {
+            let mut ahead = Ahead::with(scope, &problem, &settings).expect("a thread");
+            let evaluation = problem.evaluate(&problem.start()).expect("a motion");
+            let gradient = problem.gradient(&problem.start(), &evaluation, settings.gradient);
+            let mut timings = Timings::default();
+            let found = ahead.gradient(problem.start(), evaluation.clone(), &mut timings);
+            assert!(found == (problem.start(), evaluation, Some(gradient)));
+            assert!(ahead.linearised(&[0.0]).is_none());
+        });
+        let together = fitted(&problem);
+        assert!(together.history.len() > 3);
+        assert!(together.history == alone.history);
+        assert_eq!(together.counts, alone.counts);
+        assert!(together.best.parameters == alone.best.parameters);
     }
 }

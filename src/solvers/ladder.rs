@@ -2,11 +2,12 @@
 //! start is tried.
 //!
 //! A motion whose period is off by a few per cent fits worse than no motion at all, so descent from
-//! a wrong start ends in a minimum that means nothing. The rungs: the start as given; the
-//! equation-error start; a horizon that grows from an eighth of the record to all of it; states and
+//! a wrong start ends in a minimum that means nothing. The rungs: for constants and a long record, what its
+//! beginning says; the start as given; the equation-error start; a horizon that grows from an eighth of the record to all of it; states and
 //! functions together, from a motion near the readings.
 
 use super::all_at_once::all_at_once;
+use super::beginning::{begin, beginning, reference};
 use super::executor::search;
 use super::recorder::Reference;
 use super::timings::timed;
@@ -63,8 +64,9 @@ pub struct Rung {
     pub outcome: Outcome,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Attempt {
+    /// From what the beginning of the record says.
+    Beginning(Vec<f64>),
     Functions,
     Data,
     GrowingHorizon,
@@ -72,8 +74,9 @@ enum Attempt {
 }
 
 impl Attempt {
-    fn name(self) -> &'static str {
+    fn name(&self) -> &'static str {
         match self {
+            Attempt::Beginning(_) => "beginning of the record",
             Attempt::Functions => "start values",
             Attempt::Data => "equation error",
             Attempt::GrowingHorizon => "growing horizon",
@@ -119,8 +122,29 @@ pub fn fit_watched(
         .into_iter()
         .chain([Attempt::GrowingHorizon, Attempt::AllAtOnce]);
     let mut before = Before::default();
-    let mut reference = reference(problem, start, settings, &mut before);
+    let clock = Instant::now();
     let climbs = settings.solver == Solver::GaussNewton;
+    let from_functions = settings.initial == Initial::Functions;
+    let can_begin = climbs && from_functions && settings.stopping.has_test();
+    let part = can_begin.then(|| beginning(problem)).flatten();
+    // To cost and gradient at the start values all rungs are compared; if the first one begins there, it finds out
+    // for itself.
+    let (mut reference, begun) = match (part, settings.initial) {
+        (Some(part), _) => {
+            let begun = begin(problem, &part, start, settings, &mut before, watch);
+            (begun.reference, begun.start)
+        }
+        (None, Initial::Functions) => (None, None),
+        (None, Initial::Data) => {
+            let (reference, timings) = reference(problem, start, settings);
+            before.counts.forward += 1;
+            before.counts.adjoint += u64::from(reference.is_some());
+            before.timings += timings;
+            (reference, None)
+        }
+    };
+    let lead = clock.elapsed();
+    let attempts = begun.map(Attempt::Beginning).into_iter().chain(attempts);
     // A rung that gets stuck in a false valley creeps: the others are tried before it goes on.
     let mut probing = settings.clone();
     let capped = climbs && settings.stopping.has_test();
@@ -136,7 +160,7 @@ pub fn fit_watched(
             problem,
             start,
             &probing,
-            attempt,
+            &attempt,
             reference,
             &mut before,
             watch,
@@ -198,6 +222,7 @@ pub fn fit_watched(
                 rungs,
                 counts: before.counts + fit.counts,
                 timings: before.timings + fit.timings,
+                elapsed: lead + fit.elapsed,
                 ..fit
             })
         }
@@ -210,33 +235,9 @@ pub fn fit_watched(
 
 /// The work that was done before and between the searches.
 #[derive(Default)]
-struct Before {
-    counts: Counts,
-    timings: Timings,
-}
-
-/// Cost and gradient at the start values, to which all rungs are compared.
-fn reference(
-    problem: &Problem,
-    start: &[f64],
-    settings: &FitSettings,
-    before: &mut Before,
-) -> Option<Reference> {
-    if settings.initial == Initial::Functions {
-        // The first rung begins there and finds out for itself.
-        return None;
-    }
-    let Before { counts, timings } = before;
-    counts.forward += 1;
-    let evaluation = timed(&mut timings.forward, || problem.evaluate(start)).ok()?;
-    counts.adjoint += 1;
-    let gradient = timed(&mut timings.adjoint, || {
-        problem.gradient(start, &evaluation, settings.gradient)
-    });
-    Some(Reference {
-        cost: evaluation.cost,
-        norm_squared: gradient.norm_squared,
-    })
+pub(super) struct Before {
+    pub counts: Counts,
+    pub timings: Timings,
 }
 
 /// The fit that came furthest, given the iterations that it was not given as one rung of several.
@@ -318,13 +319,14 @@ fn run(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    attempt: Attempt,
+    attempt: &Attempt,
     reference: Option<Reference>,
     before: &mut Before,
     watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     let clock = &mut before.timings.start;
     let parameters = match attempt {
+        Attempt::Beginning(begun) => begun.clone(),
         Attempt::Functions => start.to_vec(),
         Attempt::Data => from_data(problem, start, clock),
         Attempt::GrowingHorizon => over_growing_parts(problem, start, settings, before, watch),

@@ -4,6 +4,7 @@
 mod activity;
 mod ahead;
 mod all_at_once;
+mod beginning;
 mod conflict;
 mod covariance;
 mod equation_error;

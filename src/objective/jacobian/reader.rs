@@ -36,6 +36,8 @@ struct Glance {
     functions: [[[f64; FUNCTIONS]; 2]; LANES],
     /// Whether nothing at the right node is looked at.
     at_left: [bool; LANES],
+    /// What accelerations on left nodes answer to.
+    seen: Accelerations,
 }
 
 impl Glance {
@@ -45,6 +47,7 @@ impl Glance {
         states: [[0.0; 4]; LANES],
         functions: [[[0.0; FUNCTIONS]; 2]; LANES],
         at_left: [false; LANES],
+        seen: Accelerations::NOTHING,
     };
 
     fn set(&mut self, l: usize, sensed: &Sensed) {
@@ -125,17 +128,13 @@ impl<'a> Reader<'a> {
             states: motion,
         };
         let around = |i| self.channel.around_reading(excitation, i);
-        let mut seen = Accelerations::NOTHING;
-        sight.see(arithmetic, self.next, glance.count, around, &mut seen);
-        for l in 0..glance.count.min(LANES) {
-            if !glance.at_left[l] {
-                continue;
-            }
-            glance.states[l] = [seen.states[0][l], seen.states[1][l], 0.0, 0.0];
-            for f in 0..=oscillator.terms.len() {
-                glance.functions[l][0][f] = seen.functions[f][l];
-            }
-        }
+        sight.see(
+            arithmetic,
+            self.next,
+            glance.count,
+            around,
+            &mut glance.seen,
+        );
     }
 }
 
@@ -197,6 +196,9 @@ impl Answer<'_> {
                             let step = self.glance.steps[l];
                             Eight::load(arithmetic, &self.tangents.states(g)[step][0])
                         }
+                        Kind::Accelerations if self.glance.at_left[l] => {
+                            self.at_acceleration(arithmetic, g, l)
+                        }
                         Kind::Accelerations | Kind::Any => self.at_step(arithmetic, g, l),
                     };
                     *answer = (gain * sum).row();
@@ -211,6 +213,21 @@ impl Answer<'_> {
                 }
             }
         }
+    }
+
+    /// The answer of an acceleration on a left node.
+    #[inline(always)]
+    fn at_acceleration<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
+        let (step, seen) = (self.glance.steps[l], &self.glance.seen);
+        let mut answer = Eight::splat(arithmetic, 0.0);
+        for (by, tangent) in seen.states.iter().zip(&self.tangents.states(g)[step]) {
+            answer += Eight::splat(arithmetic, by[l]) * Eight::load(arithmetic, tangent);
+        }
+        for (f, changes) in self.tangents.changes(g) {
+            let slope = Eight::splat(arithmetic, seen.functions[f][l]);
+            answer += slope * Eight::load(arithmetic, &changes[step]);
+        }
+        answer
     }
 
     /// The answer of reading `l` to the directions of a group, before the gain.

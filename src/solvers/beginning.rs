@@ -1,0 +1,167 @@
+//! A start from the beginning of a long record.
+//!
+//! Where every function is a constant, a thousandth of a long record tells its value nearly as well as is needed to
+//! begin with: the many iterations from a rough start are then made on little, and the few that are left on
+//! all of it.
+
+use super::executor::search;
+use super::ladder::Before;
+use super::recorder::Reference;
+use super::timings::timed;
+use super::{FitSettings, Timings, Watch};
+use crate::constraints::Constraints;
+use crate::dynamics::{Excitation, Grid, Stepwise};
+use crate::functions::{Basis, CoefficientFunction, Functions};
+use crate::problem::{Drive, Experiment, Problem};
+use crate::threads;
+use std::time::Instant;
+
+/// Steps of the beginning: a power of two, so that its grid has the same step to the last bit.
+const STEPS: usize = 1 << 12;
+/// How many times as long a record must be.
+const LONG: usize = 8;
+/// How many readings there must be for each parameter.
+const READINGS: usize = 20;
+/// Most iterations on the beginning.
+const ITERATIONS: u64 = 20;
+/// The tolerance there: what is left is less than the rest of the record adds.
+const TOLERANCE: f64 = 1e-6;
+
+/// What is known at the start values, and a better start.
+pub(super) struct Begun {
+    pub reference: Option<Reference>,
+    pub start: Option<Vec<f64>>,
+}
+
+/// The beginning of a problem's records, with the same parameters; `None` unless they are long and all functions
+/// constants.
+pub(super) fn beginning(problem: &Problem) -> Option<Problem> {
+    let grid = problem.oscillator.grid;
+    let plain = problem.penalties.is_empty()
+        && problem.variations.is_empty()
+        && problem.comes_in_pieces()
+        && grid.nodes() > LONG * STEPS;
+    plain.then_some(())?;
+    let grid = Grid::new(grid.start(), grid.step() * STEPS as f64, STEPS + 1)?;
+    let functions = &problem.functions;
+    let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
+    let devices = functions.assemblies().to_vec();
+    let mut part = Problem::new(
+        problem.oscillator.clone(),
+        Functions::with_devices(list?, devices, grid.nodes(), grid.step())?
+            .with_scalars(functions.scalars().to_vec()),
+        problem.experiments.iter().map(first_steps).collect(),
+    );
+    part.oscillator.grid = grid;
+    part.constraints = Constraints::clone(&problem.constraints);
+    part.soft.clone_from(&problem.soft);
+    let moves = part.experiments.iter().any(Experiment::is_read);
+    let enough = part.reading_count() >= READINGS * part.parameters();
+    (moves && enough && part.parameters() > 0).then_some(part)
+}
+
+/// A constant or known function over the first nodes.
+fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFunction> {
+    let offset = function.offset[..nodes].to_vec();
+    let short = match (&function.basis, function.start.as_slice()) {
+        (None, []) => CoefficientFunction::fixed(function.quantity, offset),
+        (Some(Basis::Constant), [start]) => CoefficientFunction {
+            offset,
+            ..CoefficientFunction::constant(function.quantity, *start, nodes)
+        },
+        _ => return None,
+    };
+    Some(CoefficientFunction {
+        owner: function.owner.clone(),
+        positive_parameters: function.positive_parameters,
+        ..short
+    })
+}
+
+fn first_steps(experiment: &Experiment) -> Experiment {
+    let short = |part: &Option<Stepwise>| {
+        let steps = |all: &Stepwise| all.values()[..STEPS.min(all.steps())].to_vec();
+        part.as_ref().map(|all| Stepwise::new(steps(all)))
+    };
+    let excitation = experiment.excitation.as_ref().map(|all| Excitation {
+        force: short(&all.force),
+        base: short(&all.base),
+    });
+    let channels = experiment.channels.iter();
+    Experiment {
+        name: experiment.name.clone(),
+        initial: experiment.initial,
+        sought: experiment.sought,
+        excitation,
+        drive: Drive::default(),
+        nodes: experiment.nodes.min(STEPS + 1),
+        device: experiment.device,
+        channels: channels.filter_map(|c| c.within(STEPS)).collect(),
+    }
+}
+
+/// Fits the beginning `part` from `start`, and finds cost and gradient of the whole problem there: at once, where a
+/// processor is to spare.
+pub(super) fn begin(
+    problem: &Problem,
+    part: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    before: &mut Before,
+    watch: &mut Watch,
+) -> Begun {
+    let mut short = settings.clone();
+    short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
+    short.stopping.tolerance = Some(TOLERANCE);
+    (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
+    let fit_part = |watch: &mut Watch| {
+        let found = watch.unseen(|watch| search(part, start, &short, None, watch));
+        found.ok()
+    };
+    let clock = Instant::now();
+    let (found, (reference, mut timings)) = match threads::spare() {
+        true => std::thread::scope(|scope| {
+            let whole = scope.spawn(|| reference(problem, start, settings));
+            let found = threads::sharing(|| fit_part(watch));
+            let whole = whole.join();
+            (
+                found,
+                whole.unwrap_or_else(|_| reference(problem, start, settings)),
+            )
+        }),
+        false => (fit_part(watch), reference(problem, start, settings)),
+    };
+    before.counts.forward += 1;
+    before.counts.adjoint += u64::from(reference.is_some());
+    if let Some(fit) = &found {
+        before.counts += fit.counts;
+        before.timings += fit.timings;
+        // What was done at once is told once.
+        let rest = clock.elapsed().saturating_sub(fit.elapsed);
+        timings.forward = timings.forward.min(rest);
+        timings.adjoint = timings.adjoint.min(rest - timings.forward);
+    }
+    before.timings += timings;
+    let start = found
+        .map(|fit| fit.best.parameters)
+        .filter(|found| found != start);
+    Begun { reference, start }
+}
+
+/// Cost and gradient at the start values.
+pub(super) fn reference(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+) -> (Option<Reference>, Timings) {
+    let mut timings = Timings::default();
+    let evaluation = timed(&mut timings.forward, || problem.evaluate(start));
+    let reference = evaluation.ok().map(|evaluation| Reference {
+        norm_squared: timed(&mut timings.adjoint, || {
+            problem.gradient(start, &evaluation, settings.gradient)
+        })
+        .norm_squared,
+        cost: evaluation.cost,
+    });
+    (reference, timings)
+}
