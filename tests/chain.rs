@@ -4,6 +4,7 @@
 mod common;
 
 use common::{add_physics, errors, paper_device, paper_problem};
+use kmcfit::constraints::Rows;
 use kmcfit::objective::GradientKind;
 use kmcfit::qp::Subproblem;
 use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
@@ -54,6 +55,58 @@ proptest! {
             }
         }
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    /// Variables of one station, some of them given, and rows a million times as large as others: more than
+    /// a piece of them, and fewer.
+    #[test]
+    fn all_at_once_is_as_good(
+        length in 4usize..60,
+        width in 1usize..5,
+        given in 0usize..3,
+        a in prop::collection::vec(-1.0..1.0f64, 97),
+        exponents in prop::collection::vec(-3..=3i32, 5),
+    ) {
+        let mut plain = chain(length, width, &a, &exponents);
+        plain.equalities = Rows::new();
+        for j in 0..given {
+            plain.equalities.push([(j, 2.0)], a[j]);
+        }
+        plain.stations = (0..length as u32).chain([0]).collect();
+        let mut sub = plain.clone();
+        sub.stations = vec![0; length + 1];
+        let (expected, found) = (plain.solve_plain().unwrap(), sub.solve_plain().unwrap());
+        for j in 0..given {
+            prop_assert_eq!(found[j], a[j] / 2.0);
+        }
+        // At a minimum the value hardly depends on where one stands: what is left is its own rounding.
+        let (found, expected) = (plain.value(&found), plain.value(&expected));
+        prop_assert!((found - expected).abs() <= 1e-12 * (1.0 + expected), "{found} {expected}");
+    }
+}
+
+/// Then another way is taken, which finds one of the many minima.
+#[test]
+fn variables_that_are_not_determined_do_no_harm() {
+    let mut two = Subproblem::new(2);
+    let mut three = Subproblem::new(3);
+    for i in 0..5 {
+        let x = f64::from(i) - 1.7;
+        two.residuals.push([(0, 1.0), (1, x)], x.sin());
+        // The third column is the sum of the others.
+        (three.residuals).push([(0, 1.0), (1, x), (2, 1.0 + x)], x.sin());
+    }
+    two.stations = vec![0; 2];
+    three.stations = vec![0; 3];
+    let least = two.value(&two.solve_plain().expect("one minimum"));
+    let found = three.value(&three.solve_plain().expect("a minimum"));
+    assert!((found - least).abs() <= 1e-12 * least, "{found} {least}");
+    three.residuals.push([(2, 1.0)], 0.5);
+    let z = three.solve_plain().expect("one minimum");
+    assert!((z[2] - 0.5).abs() <= 1e-14, "{z:?}");
 }
 
 #[test]

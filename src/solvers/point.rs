@@ -20,7 +20,8 @@ pub struct Point {
     pub gradient: Gradient,
 }
 
-/// How often the equations were solved; one count is one pass over all experiments.
+/// How often the equations were solved; one count is one pass over all experiments, or over the part of them that a
+/// start is sought in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Forward solves.

@@ -113,15 +113,16 @@ impl Triangle {
     /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
     pub fn solve(&self, independent: f64) -> Option<Vec<f64>> {
         let n = self.rows.len();
+        (self.begun == n).then_some(())?;
         let mut x = vec![0.0; n];
         for j in (0..n).rev() {
             let row = &self.rows[j];
-            let known = row[j + 1..self.begun].iter().zip(&x[j + 1..]);
+            let known = row[j + 1..n].iter().zip(&x[j + 1..]);
             let known: f64 = known.map(|(r, x)| r * x).sum();
             let above = self.rows[..=j].iter().map(|row| row[j] * row[j]);
             let length = above.sum::<f64>().sqrt();
-            let is_firm = j < self.begun && row[j].abs() > independent * length;
-            x[j] = is_firm.then(|| (row[self.begun] - known) / row[j])?;
+            let is_firm = row[j].abs() > independent * length;
+            x[j] = is_firm.then(|| (row[n] - known) / row[j])?;
         }
         x.iter().all(|x| x.is_finite()).then_some(x)
     }
@@ -283,4 +284,91 @@ fn dot<A: Arithmetic>(arithmetic: A, a: &Column, b: &Column) -> f64 {
         sum += lane;
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    const ROWS: usize = 2 * PIECE + 37;
+
+    /// A matrix of which the columns begin one after the other, not in their order; weights; right-hand side.
+    fn problem() -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
+        let begins = [PIECE + 5, 0, 90, 3, PIECE];
+        let entry = |i: usize, j: usize| match i < begins[j] {
+            true => 0.0,
+            false => ((i * (j + 2)) as f64 * 0.7 + j as f64).sin(),
+        };
+        let matrix = DMatrix::from_fn(ROWS, begins.len(), entry);
+        let roots = (0..ROWS).map(|i| 1.0 + (i as f64).cos().abs()).collect();
+        let right = (0..ROWS).map(|i| (0.3 * i as f64).cos()).collect();
+        (matrix, roots, right)
+    }
+
+    #[test]
+    fn it_has_the_minimum_of_the_tall_matrix() {
+        let (matrix, roots, right) = problem();
+        let (triangle, order) = Triangle::of(&matrix, &roots, &right);
+        assert_eq!(order, [1, 3, 2, 4, 0]);
+        let weights = DMatrix::from_diagonal(&DVector::from_vec(roots));
+        let (weighted, right) = (weights * matrix, DVector::from_vec(right));
+        let svd = weighted.clone().svd(true, true);
+        let expected = svd.solve(&right, 0.0).expect("five independent columns");
+        let found = triangle.solve(1e-14).expect("five independent columns");
+        for (place, j) in order.iter().enumerate() {
+            assert!(
+                (found[place] - expected[*j]).abs() <= 1e-13,
+                "{found:?} {expected}"
+            );
+        }
+        let rest = (weighted * expected - right).norm();
+        assert!((triangle.rest() - rest).abs() <= 1e-13 * rest);
+        assert!(triangle.is_finite());
+    }
+
+    /// However the rows are cut into pieces, to rounding.
+    #[test]
+    fn short_pieces_are_as_good() {
+        let (matrix, roots, right) = problem();
+        let (whole, order) = Triangle::of(&matrix, &roots, &right);
+        let mut parts = Triangle::new(order.len());
+        let mut piece = Piece::new(order.len());
+        let mut first = 0;
+        for count in (1..).take_while(|count| *count < 100) {
+            let rows = first..(first + count).min(ROWS);
+            piece.clear();
+            piece.count = rows.len();
+            for (place, j) in order.iter().enumerate() {
+                for (r, i) in rows.clone().enumerate() {
+                    piece.column_mut(place)[r] = matrix[(i, *j)];
+                }
+            }
+            parts.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
+            first = rows.end;
+        }
+        assert_eq!(first, ROWS);
+        let (whole, parts) = (whole.solve(1e-14), parts.solve(1e-14));
+        let pairs = whole
+            .expect("a minimum")
+            .into_iter()
+            .zip(parts.expect("a minimum"));
+        for (whole, part) in pairs {
+            assert!((whole - part).abs() <= 1e-13, "{whole} {part}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_determined_is_not_solved() {
+        let (mut matrix, roots, right) = problem();
+        let sum = matrix.column(1) + matrix.column(3);
+        matrix.set_column(2, &sum);
+        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        matrix.column_mut(2).fill(0.0);
+        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        matrix[(7, 2)] = f64::NAN;
+        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        assert!(!triangle.is_finite());
+        assert_eq!(triangle.solve(1e-14), None);
+    }
 }
