@@ -11,8 +11,8 @@ use crate::report::{
     predict, summary,
 };
 use crate::solvers::{
-    Fit, Keeper, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
-    without_motion,
+    Fit, Keeper, Moment, Row, Status, Watch, WeightPath, choose_weight_watched,
+    fit_with_noise_watched, without_motion,
 };
 use console::Term;
 use std::path::{Path, PathBuf};
@@ -208,8 +208,11 @@ pub(super) fn search(
     keeper: Option<&mut dyn Keeper>,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
     let start = model.problem.functions.start();
-    let mut observe = |row: &Row| progress.show(row);
-    let mut watch = Watch::new(&mut observe);
+    let (mut ignore, mut show) = (|_: &Row| {}, |moment: &Moment| progress.show(moment));
+    let mut watch = Watch::new(&mut ignore);
+    if progress.is_seen() {
+        watch = watch.looking(&mut show);
+    }
     if let Some(keeper) = keeper {
         watch = watch.keeping(keeper);
     }

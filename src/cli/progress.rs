@@ -1,17 +1,17 @@
 //! A progress line on a terminal, nothing elsewhere.
 
-use crate::solvers::{Row, Stopping};
+use crate::solvers::{Moment, Stopping};
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use std::cell::Cell;
 use std::time::Duration;
 
-/// The line: iteration, cost and gradient, rung of the start ladder, time left.
+/// The line: iteration, cost and gradient, violation of the constraints, rung of the start ladder, time left.
 pub struct Progress {
     bar: ProgressBar,
     /// Wall-clock limit.
     limit: Option<Duration>,
     /// Searches that were begun, and the last iteration that was shown.
-    rung: Cell<u32>,
+    searches: Cell<u32>,
     last: Cell<u64>,
 }
 
@@ -26,7 +26,7 @@ impl Progress {
         Self {
             bar,
             limit: stopping.limit,
-            rung: Cell::new(0),
+            searches: Cell::new(0),
             last: Cell::new(u64::MAX),
         }
     }
@@ -37,24 +37,24 @@ impl Progress {
         self
     }
 
+    /// Whether anybody sees it.
+    pub fn is_seen(&self) -> bool {
+        !self.bar.is_hidden()
+    }
+
     /// Shows an iteration.
-    pub fn show(&self, row: &Row) {
+    pub fn show(&self, moment: &Moment) {
+        let row = moment.row;
         // Every search counts its iterations from 1.
         if row.iteration <= self.last.replace(row.iteration) {
-            self.rung.set(self.rung.get() + 1);
+            self.searches.set(self.searches.get() + 1);
             self.bar.reset_eta();
         }
         self.bar.set_position(row.iteration);
-        let rung = match self.rung.get() {
-            0 | 1 => String::new(),
-            rung => format!("  search {rung}"),
-        };
-        self.bar.set_message(format!(
-            "J/J0 {:.3e}  G²/G0² {:.3e}{rung}  {} left at most",
-            row.cost_ratio,
-            row.gradient_norm_squared_ratio,
-            HumanDuration(self.left())
-        ));
+        let message = message(moment, self.searches.get());
+        let left = HumanDuration(self.left());
+        self.bar
+            .set_message(format!("{message}  {left} left at most"));
     }
 
     /// What the iterations or the wall clock leave, whichever ends first.
@@ -67,5 +67,58 @@ impl Progress {
     /// Takes the line away.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// What is said of an iteration of the search `number`; of the first one not where it started.
+fn message(moment: &Moment, number: u32) -> String {
+    let Moment {
+        row,
+        rung,
+        violation,
+    } = *moment;
+    let mut parts = vec![
+        format!("J/J0 {:.3e}", row.cost_ratio),
+        format!("G\u{b2}/G0\u{b2} {:.3e}", row.gradient_norm_squared_ratio),
+    ];
+    parts.extend(violation.map(|violation| format!("violation {violation:.0e}")));
+    if number > 1 {
+        let from = if rung.is_empty() { "" } else { ": " };
+        parts.push(format!("search {number}{from}{rung}"));
+    }
+    parts.join("  ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solvers::Row;
+
+    #[test]
+    fn the_line_says_what_there_is_to_say() {
+        let row = Row {
+            iteration: 3,
+            cost: 2.0,
+            cost_ratio: 0.25,
+            gradient_norm_squared_ratio: 1e-3,
+            step: 1.0,
+            relative_change: 0.1,
+        };
+        let mut moment = Moment {
+            row: &row,
+            rung: "equation error",
+            violation: None,
+        };
+        let line = "J/J0 2.500e-1  G\u{b2}/G0\u{b2} 1.000e-3";
+        assert_eq!(message(&moment, 1), line);
+        moment.violation = Some(2.6e-9);
+        let line = format!("{line}  violation 3e-9");
+        assert_eq!(message(&moment, 1), line);
+        assert_eq!(
+            message(&moment, 2),
+            format!("{line}  search 2: equation error")
+        );
+        moment.rung = "";
+        assert_eq!(message(&moment, 2), format!("{line}  search 2"));
     }
 }

@@ -281,7 +281,11 @@ impl<'p> Run<'_, '_, '_, 'p> {
                 let previous_cost = before.evaluation.cost;
                 progress.point = *point;
                 if let Some(row) = progress.recorder.rows.last() {
-                    self.watch.iteration(row);
+                    let (constraints, at) = (&work.problem().constraints, &progress.point);
+                    self.watch.iteration(row, || {
+                        let worst = constraints.largest_violation(&at.parameters)?;
+                        Some(worst.relative.max(0.0))
+                    });
                     let stopping = &self.settings.stopping;
                     self.outcome = stopping.after(row, previous_cost, hindered);
                 }

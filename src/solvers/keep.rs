@@ -98,9 +98,23 @@ pub trait Keeper {
     fn end(&mut self, piece: Option<&[f64]>);
 }
 
+/// An iteration, and where in a fit it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// The iteration.
+    pub row: &'a Row,
+    /// Where its search started: the name of the rung ([`Rung`](super::Rung)); empty where there is no ladder.
+    pub rung: &'static str,
+    /// The largest violation of a constraint after it, relative to its row's scale; `None` without
+    /// constraints.
+    pub violation: Option<f64>,
+}
+
 /// Who looks on while a fit runs.
 pub struct Watch<'a> {
     observe: &'a mut dyn FnMut(&Row),
+    look: Option<&'a mut dyn FnMut(&Moment)>,
+    rung: &'static str,
     is_shown: bool,
     keeper: Option<&'a mut dyn Keeper>,
 }
@@ -110,9 +124,18 @@ impl<'a> Watch<'a> {
     pub fn new(observe: &'a mut dyn FnMut(&Row)) -> Self {
         Self {
             observe,
+            look: None,
+            rung: "",
             is_shown: true,
             keeper: None,
         }
+    }
+
+    /// And somebody who is also told where in the fit an iteration stands.
+    #[must_use]
+    pub fn looking(mut self, look: &'a mut dyn FnMut(&Moment)) -> Self {
+        self.look = Some(look);
+        self
     }
 
     /// And a place where the fit keeps what it needs to go on.
@@ -157,9 +180,21 @@ impl<'a> Watch<'a> {
         }
     }
 
-    pub(super) fn iteration(&mut self, row: &Row) {
+    /// The searches from here on start from what this rung says.
+    pub(super) fn climb(&mut self, rung: &'static str) {
+        self.rung = rung;
+    }
+
+    pub(super) fn iteration(&mut self, row: &Row, violation: impl FnOnce() -> Option<f64>) {
         if self.is_shown {
             (self.observe)(row);
+            if let Some(look) = &mut self.look {
+                look(&Moment {
+                    row,
+                    rung: self.rung,
+                    violation: violation(),
+                });
+            }
         }
         if let Some(keeper) = &mut self.keeper {
             keeper.row(row);

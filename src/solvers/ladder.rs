@@ -30,6 +30,9 @@ const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
 /// Most iterations on each part.
 const HORIZON_ITERATIONS: u64 = 20;
 
+/// Name of the rung that goes on with the one that came furthest.
+const CONTINUED: &str = "best of these, continued";
+
 /// Where a fit starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Initial {
@@ -156,6 +159,7 @@ pub fn fit_watched(
     let mut trouble = None;
     for attempt in attempts {
         let clock = Instant::now();
+        watch.climb(attempt.name());
         let result = run(
             problem,
             start,
@@ -256,9 +260,10 @@ fn gone_on(
         return Ok(fit);
     }
     let start = &fit.best.parameters;
+    watch.climb(CONTINUED);
     let more = search(problem, start, &settings, reference, watch)?;
     rungs.push(Rung {
-        name: "best of these, continued",
+        name: CONTINUED,
         initial_cost: more.started_from,
         cost: more.best.evaluation.cost,
         iterations: more.history.len() as u64,

@@ -34,7 +34,7 @@ pub use executor::{Fit, fit_from};
 pub(crate) use gauss_newton::{FEW_PARAMETERS, add_priors, linear_readings, weighted_jacobian};
 pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
-pub use keep::{Bits, Keeper, Kept, Memory, Standing, Watch};
+pub use keep::{Bits, Keeper, Kept, Memory, Moment, Standing, Watch};
 pub use kinematics::states_from_readings;
 pub use ladder::{Initial, Rung, fit, fit_watched};
 pub use noise::{fit_with_noise, fit_with_noise_watched};
