@@ -177,7 +177,8 @@ impl<'s, 'p> Ahead<'s, 'p> {
             evaluation,
             ..
         } = Arc::unwrap_or_clone(input);
-        self.linearised = reduced.map(|reduced| (parameters.clone(), reduced));
+        let both = reduced.filter(|_| gradient.is_some());
+        self.linearised = both.map(|reduced| (parameters.clone(), reduced));
         (parameters, evaluation, gradient)
     }
 

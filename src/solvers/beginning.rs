@@ -1,6 +1,6 @@
 //! A start from the beginning of a long record.
 //!
-//! Where every function is a constant, a thousandth of a long record tells its value nearly as well as is needed to
+//! Where every function is a constant, a small part of a long record tells its value nearly as well as is needed to
 //! begin with: the many iterations from a rough start are then made on little, and the few that are left on
 //! all of it.
 
@@ -9,7 +9,6 @@ use super::ladder::Before;
 use super::recorder::Reference;
 use super::timings::timed;
 use super::{FitSettings, Timings, Watch};
-use crate::constraints::Constraints;
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
 use crate::problem::{Drive, Experiment, Problem};
@@ -53,11 +52,10 @@ pub(super) fn beginning(problem: &Problem) -> Option<Problem> {
         problem.experiments.iter().map(first_steps).collect(),
     );
     part.oscillator.grid = grid;
-    part.constraints = Constraints::clone(&problem.constraints);
+    part.constraints = problem.constraints.clone();
     part.soft.clone_from(&problem.soft);
-    let moves = part.experiments.iter().any(Experiment::is_read);
-    let enough = part.reading_count() >= READINGS * part.parameters();
-    (moves && enough && part.parameters() > 0).then_some(part)
+    let sought = part.parameters();
+    (sought > 0 && part.reading_count() >= READINGS * sought).then_some(part)
 }
 
 /// A constant or known function over the first nodes.
