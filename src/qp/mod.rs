@@ -2,7 +2,7 @@
 //!
 //! Every subproblem is a least-squares problem in residual form with linear and second-order-cone
 //! constraints ([`Subproblem`]). [`Subproblem::solve_plain`] solves it without its inequalities by
-//! one elimination along time or one sparse factorisation; [`Subproblem::solve`] solves all of it by Clarabel.
+//! one elimination, at once or along time, or one sparse factorisation; [`Subproblem::solve`] solves all of it by Clarabel.
 
 mod chain;
 mod clarabel;
