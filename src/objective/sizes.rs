@@ -47,9 +47,14 @@ impl Problem {
     /// The largest change of a function or scalar from one point to the parameters `after`, relative
     /// to [`Problem::natural_sizes`] at the first, or to the scalar's own size.
     pub fn relative_change(&self, before: &Evaluation, from: &[f64], after: &[f64]) -> f64 {
+        self.change_in_sizes(&self.natural_sizes(before), from, after)
+    }
+
+    /// [`Problem::relative_change`] with the natural sizes at hand.
+    pub(crate) fn change_in_sizes(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
         let parts = self.functions.iter().zip(self.functions.ranges());
-        let functions = parts.zip(self.natural_sizes(before));
+        let functions = parts.zip(sizes);
         let mut most = 0.0f64;
         for ((function, range), size) in functions {
             let delta = &delta[range.clone()];

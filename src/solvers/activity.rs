@@ -156,9 +156,7 @@ struct Multipliers {
 
 /// The multipliers at `point`; `None` if the quadratic program fails.
 fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
-    let sizes = problem.natural_sizes(&point.evaluation);
-    let duration = problem.oscillator.grid.duration();
-    let metric = problem.functions.relative_metric(&sizes, duration);
+    let metric = point.relative_metric(problem);
     let gradient = &point.gradient.euclidean;
     if problem.constraints.are_simple() {
         return Some(simple_multipliers(problem, point, &metric));

@@ -2,8 +2,8 @@
 //!
 //! A Gauss–Newton search needs at each of its points the gradient, to be told and tested, and the linearised readings,
 //! for the step from there. Neither waits for the other. Where a processor is to spare, a second thread does
-//! the adjoint solve and then reduces the rows of the Jacobian, while this one goes along the tangents. Who does what
-//! changes no bit.
+//! the adjoint solve, while this one goes along the tangents and reduces the rows of the Jacobian; the first to be
+//! done with its own, the second thread goes on with reducing. Who does what changes no bit.
 
 use super::gauss_newton::{FEW_PARAMETERS, Reduced, Residuals};
 use super::{FitSettings, Solver, Timings};
@@ -11,8 +11,9 @@ use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::threads::{self, Companion};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Scope;
 use std::time::{Duration, Instant};
 
@@ -28,12 +29,33 @@ pub(crate) struct Ahead<'s, 'p> {
 }
 
 /// A point to be completed.
-#[derive(Clone)]
 struct Input {
     parameters: Vec<f64>,
     evaluation: Evaluation,
-    /// There before the first piece is.
-    residuals: OnceLock<Residuals>,
+    reduction: Mutex<Reduction>,
+    /// Whether the second thread reduces all rows that are still to come.
+    taken_over: AtomicBool,
+}
+
+/// The rows reduced so far, and the residuals of all.
+struct Reduction {
+    reduced: Reduced,
+    residuals: Residuals,
+    took: Duration,
+}
+
+impl Input {
+    fn reduce(&self, piece: &mut Piece) {
+        let clock = Instant::now();
+        let mut reduction = (self.reduction.lock()).unwrap_or_else(PoisonError::into_inner);
+        let Reduction {
+            reduced,
+            residuals,
+            took,
+        } = &mut *reduction;
+        reduced.add(piece, residuals);
+        *took += clock.elapsed();
+    }
 }
 
 /// What the second thread does.
@@ -45,9 +67,7 @@ struct Job<'p> {
     full: Option<Receiver<Piece>>,
     empty: Option<Sender<Piece>>,
     gradient: Option<Gradient>,
-    reduced: Option<Reduced>,
     adjoint: Duration,
-    algebra: Duration,
 }
 
 impl Job<'_> {
@@ -56,22 +76,14 @@ impl Job<'_> {
             return;
         };
         let clock = Instant::now();
-        let Input {
-            parameters,
-            evaluation,
-            residuals,
-        } = &*input;
+        let (parameters, evaluation) = (&input.parameters, &input.evaluation);
         self.gradient = Some(self.problem.gradient(parameters, evaluation, self.kind));
         self.adjoint = clock.elapsed();
-        self.algebra = Duration::ZERO;
+        input.taken_over.store(true, Ordering::Release);
         loop {
             match full.try_recv() {
                 Ok(mut piece) => {
-                    let clock = Instant::now();
-                    if let (Some(reduced), Some(residuals)) = (&mut self.reduced, residuals.get()) {
-                        reduced.add(&mut piece, residuals);
-                    }
-                    self.algebra += clock.elapsed();
+                    input.reduce(&mut piece);
                     if let Some(empty) = &self.empty {
                         // Nobody may want it any more.
                         let _ = empty.send(piece);
@@ -114,9 +126,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
             full: None,
             empty: None,
             gradient: None,
-            reduced: None,
             adjoint: Duration::ZERO,
-            algebra: Duration::ZERO,
         };
         Some(Self {
             problem,
@@ -136,50 +146,53 @@ impl<'s, 'p> Ahead<'s, 'p> {
         self.linearised = None;
         let clock = Instant::now();
         let problem = self.problem;
+        let order = problem.places();
         let input = Arc::new(Input {
+            reduction: Mutex::new(Reduction {
+                reduced: Reduced::new(order.clone()),
+                residuals: Residuals::at(problem, &evaluation),
+                took: Duration::ZERO,
+            }),
             parameters,
             evaluation,
-            residuals: OnceLock::new(),
+            taken_over: AtomicBool::new(false),
         });
-        let (order, its) = (problem.places(), Arc::clone(&input));
+        let its = Arc::clone(&input);
         let (full, to_reduce) = mpsc::channel();
         let (reduced, again) = mpsc::channel();
-        let found = self.companion.with(
+        let (gradient, adjoint) = self.companion.with(
             |job| {
                 job.input = Some(its);
                 (job.full, job.empty) = (Some(to_reduce), Some(reduced));
-                job.reduced = Some(Reduced::new(order.clone()));
             },
             || {
-                (input.residuals).get_or_init(|| Residuals::at(problem, &input.evaluation));
-                problem.each_piece(&input.evaluation, &order, |piece| {
+                problem.each_piece(&input.evaluation, &order, |mut piece| {
+                    if !input.taken_over.load(Ordering::Acquire) {
+                        input.reduce(&mut piece);
+                        return piece;
+                    }
                     // It is there until it has been told that there are no more.
                     let _ = full.send(piece);
                     (again.try_recv()).unwrap_or_else(|_| Piece::new(order.len()))
                 });
                 drop(full);
             },
-            |(), job| {
-                let (gradient, reduced) = (job.gradient.take(), job.reduced.take());
-                (gradient, reduced, job.adjoint, job.algebra)
-            },
+            |(), job| (job.gradient.take(), job.adjoint),
         );
-        let (gradient, reduced, adjoint, algebra) = found;
+        let input = Arc::into_inner(input).expect("the second thread has given it back");
+        let Reduction { reduced, took, .. } =
+            (input.reduction.into_inner()).unwrap_or_else(PoisonError::into_inner);
         // What was done at once is told once: first the adjoint, then linear algebra.
         let all = clock.elapsed();
         let adjoint = adjoint.min(all);
-        let algebra = algebra.min(all - adjoint);
+        let algebra = took.min(all - adjoint);
         timings.adjoint += adjoint;
         timings.linear_algebra += algebra;
         timings.tangent += all - adjoint - algebra;
-        let Input {
-            parameters,
-            evaluation,
-            ..
-        } = Arc::unwrap_or_clone(input);
-        let both = reduced.filter(|_| gradient.is_some());
-        self.linearised = both.map(|reduced| (parameters.clone(), reduced));
-        (parameters, evaluation, gradient)
+        let parameters = input.parameters;
+        let is_whole = gradient.is_some();
+        self.linearised = is_whole.then(|| (parameters.clone(), reduced));
+        (parameters, input.evaluation, gradient)
     }
 
     /// The readings linearised at the point with these parameters, if they are.

@@ -11,6 +11,7 @@ use super::timings::timed;
 use super::{FitSettings, Timings, Watch};
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
+use crate::objective::Evaluation;
 use crate::problem::{Drive, Experiment, Problem};
 use crate::threads;
 use std::time::Instant;
@@ -29,7 +30,13 @@ const TOLERANCE: f64 = 1e-6;
 /// What is known at the start values, and a better start.
 pub(super) struct Begun {
     pub reference: Option<Reference>,
-    pub start: Option<Vec<f64>>,
+    pub start: Option<BetterStart>,
+}
+
+/// What the beginning of the record says, and what the whole problem says of that.
+pub(super) struct BetterStart {
+    pub parameters: Vec<f64>,
+    pub evaluation: Evaluation,
 }
 
 /// The beginning of a problem's records, with the same parameters; `None` unless they are long and all functions
@@ -98,8 +105,8 @@ fn first_steps(experiment: &Experiment) -> Experiment {
     }
 }
 
-/// Fits the beginning `part` from `start`, and finds cost and gradient of the whole problem there: at once, where a
-/// processor is to spare.
+/// Fits the beginning `part` from `start` and evaluates the whole problem at what it finds; beside that, where a
+/// processor is to spare, finds cost and gradient of the whole problem at `start`.
 pub(super) fn begin(
     problem: &Problem,
     part: &Problem,
@@ -114,7 +121,15 @@ pub(super) fn begin(
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
     let fit_part = |watch: &mut Watch| {
         let found = watch.unseen(|watch| search(part, start, &short, None, watch));
-        found.ok()
+        let fit = found.ok()?;
+        let clock = Instant::now();
+        let parameters = fit.best.parameters.clone();
+        let evaluation = (parameters != start).then(|| problem.evaluate(&parameters).ok());
+        let better = evaluation.flatten().map(|evaluation| BetterStart {
+            parameters,
+            evaluation,
+        });
+        Some((fit, better, clock.elapsed()))
     };
     let clock = Instant::now();
     let (found, (reference, mut timings)) = match threads::spare() {
@@ -131,19 +146,22 @@ pub(super) fn begin(
     };
     before.counts.forward += 1;
     before.counts.adjoint += u64::from(reference.is_some());
-    if let Some(fit) = &found {
+    let mut better = None;
+    if let Some((fit, start, evaluating)) = found {
         before.counts += fit.counts;
         before.timings += fit.timings;
+        before.timings.forward += evaluating;
         // What was done at once is told once.
-        let rest = clock.elapsed().saturating_sub(fit.elapsed);
+        let rest = clock.elapsed().saturating_sub(fit.elapsed + evaluating);
         timings.forward = timings.forward.min(rest);
         timings.adjoint = timings.adjoint.min(rest - timings.forward);
+        better = start;
     }
     before.timings += timings;
-    let start = found
-        .map(|fit| fit.best.parameters)
-        .filter(|found| found != start);
-    Begun { reference, start }
+    Begun {
+        reference,
+        start: better,
+    }
 }
 
 /// Cost and gradient at the start values.

@@ -11,6 +11,7 @@ use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step, Timings, equation_error};
 use crate::dynamics::{Breakdown, Cause};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
@@ -66,6 +67,18 @@ pub(super) fn search(
     reference: Option<Reference>,
     watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
+    search_evaluated(problem, start, None, settings, reference, watch)
+}
+
+/// [`search`], where `start` may have been evaluated already.
+pub(super) fn search_evaluated(
+    problem: &Problem,
+    start: &[f64],
+    evaluation: Option<Evaluation>,
+    settings: &FitSettings,
+    reference: Option<Reference>,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
         return Ok(equation_error::fit(problem, start, watch.observe()));
     }
@@ -75,6 +88,7 @@ pub(super) fn search(
             method: method(settings.solver),
             settings,
             reference,
+            at_start: evaluation,
             clock: Instant::now(),
             timings: Timings::default(),
             progress: Err(NOT_STARTED),
@@ -123,6 +137,8 @@ struct Run<'a, 'w, 's, 'p> {
     method: Box<dyn Descend>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
+    /// The evaluation at the start, if there is one already.
+    at_start: Option<Evaluation>,
     clock: Instant,
     timings: Timings,
     progress: Result<Progress, Breakdown>,
@@ -160,9 +176,15 @@ const NOT_STARTED: Breakdown = Breakdown {
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 impl<'p> Run<'_, '_, '_, 'p> {
-    fn start(&self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
-        let mut evaluation = work.problem().workspace();
-        work.evaluate_into(&parameters, &mut evaluation)?;
+    fn start(&mut self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
+        let evaluation = match self.at_start.take() {
+            Some(evaluation) => work.forwards(1, || evaluation),
+            None => {
+                let mut evaluation = work.problem().workspace();
+                work.evaluate_into(&parameters, &mut evaluation)?;
+                evaluation
+            }
+        };
         let point = work.complete(parameters, evaluation);
         Ok(Progress {
             recorder: Recorder::new(&point, self.reference),

@@ -7,8 +7,8 @@
 //! functions together, from a motion near the readings.
 
 use super::all_at_once::all_at_once;
-use super::beginning::{begin, beginning, reference};
-use super::executor::search;
+use super::beginning::{BetterStart, begin, beginning, reference};
+use super::executor::{search, search_evaluated};
 use super::recorder::Reference;
 use super::timings::timed;
 use super::{
@@ -69,7 +69,7 @@ pub struct Rung {
 
 enum Attempt {
     /// From what the beginning of the record says.
-    Beginning(Vec<f64>),
+    Beginning(BetterStart),
     Functions,
     Data,
     GrowingHorizon,
@@ -159,12 +159,13 @@ pub fn fit_watched(
     let mut trouble = None;
     for attempt in attempts {
         let clock = Instant::now();
-        watch.climb(attempt.name());
+        let name = attempt.name();
+        watch.climb(name);
         let result = run(
             problem,
             start,
             &probing,
-            &attempt,
+            attempt,
             reference,
             &mut before,
             watch,
@@ -174,7 +175,7 @@ pub fn fit_watched(
                 // With the work that made the start, and what was done before it went on.
                 fit.elapsed = fit.elapsed.max(clock.elapsed());
                 rungs.push(Rung {
-                    name: attempt.name(),
+                    name,
                     initial_cost: fit.started_from,
                     cost: fit.best.evaluation.cost,
                     iterations: fit.history.len() as u64,
@@ -201,7 +202,7 @@ pub fn fit_watched(
             }
             Err(breakdown) => {
                 rungs.push(Rung {
-                    name: attempt.name(),
+                    name,
                     initial_cost: f64::NAN,
                     cost: f64::NAN,
                     iterations: 0,
@@ -324,14 +325,20 @@ fn run(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    attempt: &Attempt,
+    attempt: Attempt,
     reference: Option<Reference>,
     before: &mut Before,
     watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     let clock = &mut before.timings.start;
     let parameters = match attempt {
-        Attempt::Beginning(begun) => begun.clone(),
+        Attempt::Beginning(BetterStart {
+            parameters,
+            evaluation,
+        }) => {
+            let known = Some(evaluation);
+            return search_evaluated(problem, &parameters, known, settings, reference, watch);
+        }
         Attempt::Functions => start.to_vec(),
         Attempt::Data => from_data(problem, start, clock),
         Attempt::GrowingHorizon => over_growing_parts(problem, start, settings, before, watch),

@@ -8,6 +8,7 @@ use crate::dynamics::{Breakdown, Trajectory};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Parameters with everything known about them.
 #[derive(Debug, Clone)]
@@ -18,6 +19,36 @@ pub struct Point {
     pub evaluation: Evaluation,
     /// Gradient of the cost.
     pub gradient: Gradient,
+    /// Once somebody has asked for them.
+    sizes: OnceLock<Vec<f64>>,
+}
+
+impl Point {
+    pub(crate) fn new(parameters: Vec<f64>, evaluation: Evaluation, gradient: Gradient) -> Self {
+        Self {
+            parameters,
+            evaluation,
+            gradient,
+            sizes: OnceLock::new(),
+        }
+    }
+
+    /// [`Problem::natural_sizes`] here.
+    fn natural_sizes(&self, problem: &Problem) -> &[f64] {
+        (self.sizes).get_or_init(|| problem.natural_sizes(&self.evaluation))
+    }
+
+    /// [`Functions::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
+    /// whole grid.
+    pub(crate) fn relative_metric(&self, problem: &Problem) -> Vec<f64> {
+        let duration = problem.oscillator.grid.duration();
+        (problem.functions).relative_metric(self.natural_sizes(problem), duration)
+    }
+
+    /// [`Problem::relative_change`] from here to the parameters `after`.
+    pub(crate) fn relative_change(&self, problem: &Problem, after: &[f64]) -> f64 {
+        problem.change_in_sizes(self.natural_sizes(problem), &self.parameters, after)
+    }
 }
 
 /// How often the equations were solved; one count is one pass over all experiments, or over the part of them that a
@@ -86,11 +117,7 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             false => problem.evaluate_into(&parameters, &mut evaluation)?,
         }
         let gradient = problem.gradient(&parameters, &evaluation, self.kind);
-        Ok(Point {
-            parameters,
-            evaluation,
-            gradient,
-        })
+        Ok(Point::new(parameters, evaluation, gradient))
     }
 
     /// The motions at a point that was there before, computed again without counting.
@@ -167,11 +194,7 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             }
             None => self.gradient(&parameters, &evaluation),
         };
-        Point {
-            parameters,
-            evaluation,
-            gradient,
-        }
+        Point::new(parameters, evaluation, gradient)
     }
 }
 

@@ -91,9 +91,7 @@ impl Descend for ProjectedGradient {
 impl ProjectedGradient {
     fn prepare(&mut self, work: &Work, point: &Point) {
         let problem = work.problem();
-        let sizes = problem.natural_sizes(&point.evaluation);
-        let duration = problem.oscillator.grid.duration();
-        self.metric = problem.functions.relative_metric(&sizes, duration);
+        self.metric = point.relative_metric(problem);
         // The step at which the linear model of J reaches zero.
         let gradient = &point.gradient.euclidean;
         let squared: f64 = gradient

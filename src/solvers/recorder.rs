@@ -134,11 +134,7 @@ impl Recorder {
                 self.initial_norm_squared,
             ),
             step,
-            relative_change: problem.relative_change(
-                &before.evaluation,
-                &before.parameters,
-                &after.parameters,
-            ),
+            relative_change: before.relative_change(problem, &after.parameters),
         });
         self.keep_snapshot(iteration, after);
     }

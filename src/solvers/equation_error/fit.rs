@@ -108,11 +108,7 @@ fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
             first.gradient.norm_squared,
         ),
         step: 1.0,
-        relative_change: problem.relative_change(
-            &first.evaluation,
-            &first.parameters,
-            &best.parameters,
-        ),
+        relative_change: first.relative_change(problem, &best.parameters),
     }
 }
 
@@ -126,15 +122,15 @@ fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
         }
     }
     Fit {
-        best: Point {
-            parameters: start.to_vec(),
+        best: Point::new(
+            start.to_vec(),
             evaluation,
-            gradient: Gradient {
+            Gradient {
                 euclidean: vec![f64::NAN; start.len()],
                 l2: vec![f64::NAN; start.len()],
                 norm_squared: f64::NAN,
             },
-        },
+        ),
         initial_cost: f64::NAN,
         started_from: f64::NAN,
         initial_norm_squared: f64::NAN,
@@ -229,11 +225,8 @@ impl<'a> Cost<'a> {
         evaluation.regularisation = problem.regularisation(&theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         self.say_motions(&mut evaluation);
-        Point {
-            gradient: self.gradient(&theta),
-            parameters: theta,
-            evaluation,
-        }
+        let gradient = self.gradient(&theta);
+        Point::new(theta, evaluation, gradient)
     }
 
     /// The measured motions, and what the model says of the readings there.

@@ -83,7 +83,8 @@ impl Descend for GaussNewton {
             return Step::Minimum("the cost is zero to rounding".into());
         }
         let mut sub = linearise(work, point);
-        let scales = proximal_scales(problem, point);
+        // Diagonal of the proximal term.
+        let scales = point.relative_metric(problem);
         let mut evaluation = problem.workspace();
         let mut trouble = None;
         let before = self.damping;
@@ -180,7 +181,7 @@ fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<S
 
 /// The largest change of a function that a proposal asks for, relative to the function's size.
 fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
-    problem.relative_change(&point.evaluation, &point.parameters, &proposal.parameters)
+    point.relative_change(problem, &proposal.parameters)
 }
 
 /// The best step that the subproblem offers in the constraint set.
@@ -447,12 +448,4 @@ fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
             }
         }
     }
-}
-
-/// Diagonal of the proximal term: `1/T integral (delta p / size of p)^2 dt`, summed over functions.
-fn proximal_scales(problem: &Problem, point: &Point) -> Vec<f64> {
-    let sizes = problem.natural_sizes(&point.evaluation);
-    problem
-        .functions
-        .relative_metric(&sizes, problem.oscillator.grid.duration())
 }
