@@ -7,7 +7,7 @@ use common::sensed::{Record, Response, cost};
 use kmcfit::dynamics::{
     ChannelKind, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
 };
-use kmcfit::functions::{CoefficientFunction, Functions, Prior, Quantity, Scalar, Value};
+use kmcfit::functions::{Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value};
 use kmcfit::objective::{Channel, GradientKind, Loss, Sensor, Weighting};
 use kmcfit::problem::{Experiment, Problem};
 use num_dual::{Dual64, DualNum};
@@ -103,6 +103,10 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
             times.extend([0.0, 1.0, steps as f64]);
             times.sort_by(f64::total_cmp);
             times.dedup();
+            if (seed as usize + n).is_multiple_of(3) {
+                // Or one on every node, as a sensor sampled with the grid gives them.
+                times = (0..nodes).map(|i| i as f64).collect();
+            }
             let place = |x: &f64| {
                 let step = (x.floor() as usize).min(steps - 1);
                 (step, x - step as f64)
@@ -337,6 +341,78 @@ proptest! {
             for (a, b) in jacobian.column(j).iter().zip(&column) {
                 prop_assert!((a - b).abs() <= 1e-12 * size, "{j}: {a} is not {b}");
             }
+        }
+    }
+}
+
+/// The same with constants and knots in place of one value a node.
+fn on_few_parameters(problem: &Problem) -> Problem {
+    let grid = problem.oscillator.grid;
+    let knots = Basis::PiecewiseLinear {
+        knots: (0..3)
+            .map(|i| 0.5 * f64::from(i) * grid.duration())
+            .collect(),
+    };
+    let list = problem.functions.iter().enumerate().map(|(i, nodal)| {
+        // No term that drives the motion out of bounds.
+        let start = nodal.start[0].abs();
+        match i % 3 {
+            0 => CoefficientFunction::constant(nodal.quantity, start, grid.nodes()),
+            1 => CoefficientFunction::free(nodal.quantity, knots.clone(), &grid, vec![start; 3]),
+            _ => CoefficientFunction {
+                offset: nodal.start.iter().map(|x| x.abs()).collect(),
+                ..CoefficientFunction::constant(nodal.quantity, start, grid.nodes())
+            },
+        }
+    });
+    let functions = Functions::new(list.collect(), grid.nodes(), grid.step()).unwrap();
+    Problem {
+        functions: functions.with_scalars(problem.functions.scalars().to_vec()),
+        ..problem.clone()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    /// Constants are carried along by a way of their own: against values at the nodes, to which a design takes
+    /// their gradient, and against one direction at a time.
+    #[test]
+    fn few_parameters_move_what_values_at_the_nodes_do(
+        methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],
+        nodes in prop_oneof![4usize..14, 60..70usize],
+        seed in any::<u64>(),
+    ) {
+        let nodal = case(methods, nodes, seed).problem();
+        let problem = on_few_parameters(&nodal);
+        let theta = problem.start();
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let jacobian = problem.predictions_jacobian(&evaluation);
+        let mut unit = vec![0.0; theta.len()];
+        for j in 0..theta.len() {
+            unit[j] = 1.0;
+            let change = problem.predictions_tangent(&evaluation, &unit);
+            unit[j] = 0.0;
+            let column: Vec<f64> = change.into_iter().flatten().flatten().collect();
+            let size = column.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+            for (a, b) in jacobian.column(j).iter().zip(&column) {
+                prop_assert!((a - b).abs() <= 1e-12 * size, "{j}: {a} is not {b}");
+            }
+        }
+        let gradient = problem.gradient(&theta, &evaluation, GradientKind::Discrete).euclidean;
+        let mut values = problem.functions.values(&theta).concat();
+        values.extend(problem.scalars(&theta));
+        let at_nodes = nodal.evaluate(&values).unwrap();
+        prop_assert!((evaluation.cost - at_nodes.cost).abs() <= 1e-13 * at_nodes.cost);
+        let by_values = nodal.gradient(&values, &at_nodes, GradientKind::Discrete).euclidean;
+        let largest = by_values.iter().fold(0.0f64, |m, g| m.max(g.abs())) * nodes as f64;
+        for j in 0..theta.len() {
+            unit[j] = 1.0;
+            let mut along = problem.functions.direction(&unit, 0).functions().map(<[f64]>::to_vec).collect::<Vec<_>>().concat();
+            along.extend(problem.scalars(&unit));
+            unit[j] = 0.0;
+            let expected: f64 = by_values.iter().zip(&along).map(|(g, d)| g * d).sum();
+            prop_assert!((gradient[j] - expected).abs() <= 1e-13 * largest, "{j}: {} is not {expected}", gradient[j]);
         }
     }
 }

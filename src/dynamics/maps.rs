@@ -115,20 +115,21 @@ fn by<A: Arithmetic, const S: usize>(
         }
         v[s] = v_s;
         let per_mass = per_mass.at(position);
+        let minus_per_mass = -per_mass;
         let mut push = force.at(position);
         for (j, term) in rhs.terms.iter().enumerate().take(MOST_TERMS) {
             let p = functions[j].at(position);
             let response = term.respond(arithmetic, y_s, v_s);
             push = push - p * response.phi;
-            by_y[s] = by_y[s] - p * response.by_y;
-            by_v[s] = by_v[s] - p * response.by_v;
-            answers[s][j + 1] = -response.phi * per_mass;
+            answers[s][j + 1] = response.phi * minus_per_mass;
+            by_y[s] = response.by_y.taken_from(by_y[s], p);
+            by_v[s] = response.by_v.taken_from(by_v[s], p);
         }
         let inertia = push * per_mass;
         a[s] = inertia - base.at(position);
         by_y[s] = by_y[s] * per_mass;
         by_v[s] = by_v[s] * per_mass;
-        answers[s][0] = -inertia * per_mass;
+        answers[s][0] = inertia * minus_per_mass;
     }
 
     // Backwards, from each component of the state at the right node.

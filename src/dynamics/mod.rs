@@ -28,11 +28,11 @@ mod tangent;
 mod tangents;
 mod term;
 mod trials;
-mod window;
+pub(crate) mod window;
 
 pub(crate) use maps::FUNCTIONS;
 pub(crate) use sense_nodes::{Accelerations, Sight};
-pub(crate) use tangents::{Course, Slot, TILE, TILE_NODES, Tangents};
+pub(crate) use tangents::{Change, Course, Slot, Steady, TILE, TILE_NODES, Tangents};
 
 pub use device::{Device, State};
 pub use excitation::{Excitation, Stepwise};

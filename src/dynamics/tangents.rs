@@ -24,6 +24,33 @@ pub(crate) struct Slot {
     pub function: usize,
 }
 
+/// A constant that changes along one direction of a group: by how much.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Steady {
+    /// The direction's lane.
+    pub lane: usize,
+    /// The change, at every node.
+    pub value: f64,
+}
+
+/// What a slot's function does in a tile.
+#[derive(Clone, Copy)]
+pub(crate) struct Change<'a> {
+    /// The function, mass first.
+    pub function: usize,
+    /// Its changes at the nodes of the tile.
+    pub rows: &'a [Row; TILE_NODES],
+    /// What they are, if they are the same everywhere.
+    pub steady: Option<Steady>,
+}
+
+impl Change<'_> {
+    /// Whether it is not that of a constant.
+    pub fn varies(&self) -> bool {
+        self.steady.is_none()
+    }
+}
+
 /// The tangents at the nodes of one tile.
 pub(crate) struct Tangents {
     slots: Vec<Slot>,
@@ -32,9 +59,14 @@ pub(crate) struct Tangents {
     changes: Vec<[Row; TILE_NODES]>,
     /// Whether a slot's function changes in this tile.
     moves: Vec<bool>,
+    /// The slots whose functions change by the same in all tiles.
+    steady: Vec<Option<Steady>>,
     states: Vec<[[Row; 2]; TILE_NODES]>,
     /// Whether a group has been anything but zero.
     begun: Vec<bool>,
+    /// What constants push displacement and velocity of each group by in eight steps: one direction a row.
+    held: Vec<[[Row; LANES]; 2]>,
+    maps: Maps,
 }
 
 /// A motion to go through.
@@ -63,10 +95,13 @@ impl Tangents {
             wanted: std::array::from_fn(|f| slots.iter().any(|s| s.function == f)),
             changes: vec![[[0.0; LANES]; TILE_NODES]; slots.len()],
             moves: vec![false; slots.len()],
+            steady: vec![None; slots.len()],
             slots,
             begun: (initial.iter())
                 .map(|states| states.as_flattened().iter().any(|x| *x != 0.0))
                 .collect(),
+            held: vec![[[[0.0; LANES]; LANES]; 2]; initial.len()],
+            maps: Maps::NOTHING,
             states,
         }
     }
@@ -85,16 +120,34 @@ impl Tangents {
         &mut self.changes[slot]
     }
 
-    /// The functions that change along a direction of a group, and their changes at the nodes of the tile.
-    pub fn changes(&self, group: usize) -> impl Iterator<Item = (usize, &[Row; TILE_NODES])> {
+    /// A slot's function changes by the same at all nodes, along one direction only.
+    pub fn hold(&mut self, slot: usize, steady: Steady) {
+        let mut row = [0.0; LANES];
+        row[steady.lane] = steady.value;
+        self.changes_mut(slot).fill(row);
+        self.steady[slot] = Some(steady);
+    }
+
+    /// The functions that change along a direction of a group.
+    pub fn changes(&self, group: usize) -> impl Iterator<Item = Change<'_>> {
         let slots = self.of_group[group].clone();
         let moving = slots.filter(|slot| self.moves[*slot]);
-        moving.map(|slot| (self.slots[slot].function, &self.changes[slot]))
+        moving.map(|slot| Change {
+            function: self.slots[slot].function,
+            rows: &self.changes[slot],
+            steady: self.steady[slot],
+        })
     }
 
     /// Whether the tangents of a group have been anything but zero.
     pub fn has_begun(&self, group: usize) -> bool {
         self.begun[group]
+    }
+
+    /// The groups up to the last one that has been anything but zero.
+    pub fn begun_groups(&self) -> usize {
+        let last = self.begun.iter().rposition(|begun| *begun);
+        last.map_or(0, |last| last + 1)
     }
 
     /// Displacement and velocity at the nodes of the tile, along each direction of a group.
@@ -140,7 +193,6 @@ impl Kernel for Advance<'_> {
                 .clone()
                 .any(|slot| tangents.moves[slot]);
         }
-        let mut maps = Maps::NOTHING;
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
         let mut from = 0;
         while from < count {
@@ -152,9 +204,10 @@ impl Kernel for Advance<'_> {
                 self.motion,
                 first + from,
                 wanted,
-                &mut maps,
+                &mut tangents.maps,
             );
             let to = (from + LANES).min(count);
+            let maps = &tangents.maps;
             for (g, range) in tangents.of_group.iter().enumerate() {
                 if !tangents.begun[g] {
                     continue;
@@ -162,25 +215,69 @@ impl Kernel for Advance<'_> {
                 // A group has at most one slot for each function.
                 let mut moving = [0; FUNCTIONS];
                 let mut count = 0;
+                let held = &mut tangents.held[g];
+                let mut holds = false;
                 for slot in range.clone().filter(|slot| tangents.moves[*slot]) {
-                    moving[count] = slot;
-                    count += 1;
+                    match tangents.steady[slot] {
+                        None => {
+                            moving[count] = slot;
+                            count += 1;
+                        }
+                        Some(steady) => {
+                            hold(
+                                arithmetic,
+                                maps,
+                                tangents.slots[slot].function,
+                                steady,
+                                held,
+                            );
+                            holds = true;
+                        }
+                    }
                 }
+                let held = match holds {
+                    true => [
+                        arithmetic.transpose(&held[0]),
+                        arithmetic.transpose(&held[1]),
+                    ],
+                    false => *held,
+                };
                 let pushes = Pushes {
+                    held: &held,
                     moving: &moving[..count],
                     slots: &tangents.slots,
                     changes: &tangents.changes,
                 };
-                carry(arithmetic, &maps, pushes, &mut tangents.states[g], from..to);
+                carry(arithmetic, maps, pushes, &mut tangents.states[g], from..to);
             }
             from = to;
         }
     }
 }
 
+/// The pushes of eight steps, one a lane, to the direction along which a constant changes.
+#[inline(always)]
+fn hold<A: Arithmetic>(
+    arithmetic: A,
+    maps: &Maps,
+    function: usize,
+    steady: Steady,
+    held: &mut [[Row; LANES]; 2],
+) {
+    let change = Eight::splat(arithmetic, steady.value);
+    for (end, held) in held.iter_mut().enumerate() {
+        let left = Eight::load(arithmetic, &maps.left[function][end]);
+        let right = Eight::load(arithmetic, &maps.right[function][end]);
+        held[steady.lane] = (left * change + right * change).row();
+    }
+}
+
 /// The functions that change along the directions of a group.
 #[derive(Clone, Copy)]
 struct Pushes<'a> {
+    /// What constants push displacement and velocity by in each step.
+    held: &'a [[Row; LANES]; 2],
+    /// The slots of all other functions.
     moving: &'a [usize],
     slots: &'a [Slot],
     changes: &'a [[Row; TILE_NODES]],
@@ -198,7 +295,11 @@ fn carry<A: Arithmetic>(
     let [y, v] = &states[steps.start];
     let (mut y, mut v) = (Eight::load(arithmetic, y), Eight::load(arithmetic, v));
     for (l, i) in steps.enumerate() {
-        let mut push = [Eight::splat(arithmetic, 0.0); 2];
+        let [to_y, to_v] = pushes.held;
+        let mut push = [
+            Eight::load(arithmetic, &to_y[l & (LANES - 1)]),
+            Eight::load(arithmetic, &to_v[l & (LANES - 1)]),
+        ];
         for &slot in pushes.moving {
             let (change, function) = (&pushes.changes[slot], pushes.slots[slot].function);
             let here = Eight::load(arithmetic, &change[i]);

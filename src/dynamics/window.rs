@@ -5,7 +5,7 @@ use crate::lanes::{LANES, Row};
 
 /// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.
 #[inline(always)]
-pub(super) fn row(values: &[f64], i: usize) -> Row {
+pub(crate) fn row(values: &[f64], i: usize) -> Row {
     let inside = values.get(i..).and_then(<[f64]>::first_chunk::<LANES>);
     match inside {
         Some(row) => *row,
@@ -22,7 +22,7 @@ fn padded(values: &[f64], i: usize) -> Row {
 
 /// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`.
 #[inline(always)]
-pub(super) fn stepwise(part: Option<&Stepwise>, i: usize) -> [Row; 3] {
+pub(crate) fn stepwise(part: Option<&Stepwise>, i: usize) -> [Row; 3] {
     let mut rows = [[0.0; LANES]; 3];
     if let Some(steps) = part.map(Stepwise::values) {
         let last = steps.len().saturating_sub(1);

@@ -24,6 +24,8 @@ pub struct Functions {
     first_nodes: Vec<u32>,
     /// Whether each function is constant.
     constant: Vec<bool>,
+    /// The fixed part and the only entry of the design of each function that has the same value at every node.
+    flat: Vec<Option<[f64; 2]>>,
 }
 
 impl Functions {
@@ -72,6 +74,7 @@ impl Functions {
         }
         Some(Self {
             constant: list.iter().map(|f| f.design.is_constant()).collect(),
+            flat: list.iter().map(CoefficientFunction::flat).collect(),
             first_nodes,
             list,
             ranges,
@@ -195,7 +198,11 @@ impl Functions {
     /// Device `which` with parameters `theta`, into storage that is used again.
     pub fn device_into(&self, theta: &[f64], which: usize, device: &mut Device) {
         for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
-            self.list[f].values_into(&theta[self.ranges[f].clone()], values);
+            let theta = &theta[self.ranges[f].clone()];
+            match (self.flat[f], theta) {
+                (Some([offset, entry]), [theta]) => values.fill(offset + entry * theta),
+                _ => self.list[f].values_into(theta, values),
+            }
         }
     }
 

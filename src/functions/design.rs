@@ -1,6 +1,6 @@
 //! Design matrices: from parameters to values at the nodes.
 
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
+use nalgebra_sparse::CsrMatrix;
 
 /// A matrix `B` of shape `nodes x parameters`.
 #[derive(Debug, Clone)]
@@ -128,9 +128,9 @@ impl Design {
 
     /// One parameter that is the value at all nodes.
     pub fn ones(nodes: usize) -> Self {
-        let mut entries = CooMatrix::new(nodes, 1);
-        (0..nodes).for_each(|i| entries.push(i, 0, 1.0));
-        Design::Sparse(CsrMatrix::from(&entries))
+        let (offsets, columns) = ((0..=nodes).collect(), vec![0; nodes]);
+        let matrix = CsrMatrix::try_from_csr_data(nodes, 1, offsets, columns, vec![1.0; nodes]);
+        Design::Sparse(matrix.expect("one entry a row"))
     }
 }
 

@@ -118,6 +118,13 @@ impl CoefficientFunction {
         self.start.len()
     }
 
+    /// The value of the fixed part and the entry of the design, if both are the same at every node.
+    fn flat(&self) -> Option<[f64; 2]> {
+        let is_flat = self.offset.windows(2).all(|pair| pair[0] == pair[1]);
+        let (_, entry) = self.design.row(0).next()?;
+        (self.design.is_constant() && is_flat).then_some([*self.offset.first()?, entry])
+    }
+
     /// Values at the nodes for the parameters `theta`.
     pub fn values_into(&self, theta: &[f64], values: &mut [f64]) {
         match &self.design {

@@ -1,12 +1,12 @@
 //! One channel of a record: readings at times of their own, and what the model says of them.
 
+use super::on_nodes::{AddTranspose, Predict};
 use super::{Loss, Sensor, Weighting};
 use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::dynamics::{
-    Accelerations, ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings,
-    Trajectory,
+    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
 };
-use crate::lanes::LANES;
+use crate::lanes;
 use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
 
 /// The readings of one sensor.
@@ -26,7 +26,8 @@ pub struct Channel {
     weighting: Weighting,
     loss: Loss,
     sensor: Sensor,
-    around: Vec<Surroundings>,
+    /// Forces and accelerations of the base at the readings, if they are given.
+    around: Option<[Vec<f64>; 2]>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
     /// Whether reading `i` stands on node `i`.
@@ -92,7 +93,7 @@ impl Channel {
             weighting,
             loss: Loss::Squares,
             sensor: Sensor::default(),
-            around: Vec::new(),
+            around: None,
             base: Vec::new(),
             filter: Vec::new(),
         })
@@ -145,7 +146,9 @@ impl Channel {
     #[must_use]
     pub fn with_surroundings(mut self, around: Vec<Surroundings>) -> Self {
         assert_eq!(around.len(), self.times.len(), "one for each reading");
-        self.around = around;
+        let forces = around.iter().map(|a| a.force).collect();
+        let bases = around.iter().map(|a| a.base).collect();
+        self.around = Some([forces, bases]);
         self
     }
 
@@ -220,7 +223,7 @@ impl Channel {
             weighting,
             loss: self.loss,
             sensor: self.sensor,
-            around: self.around[..count.min(self.around.len())].to_vec(),
+            around: (self.around.as_ref()).map(|parts| parts.each_ref().map(|p| short(p))),
             base: short(&self.base),
             filter: self.filter.clone(),
             on_every_node: self.on_every_node,
@@ -318,9 +321,15 @@ impl Channel {
         self.kind == ChannelKind::Displacement && (self.on_every_node || all())
     }
 
-    /// Whether reading `i` is the acceleration at node `i`.
-    pub(super) fn is_acceleration_on_nodes(&self) -> bool {
-        self.kind == ChannelKind::Acceleration && self.on_every_node
+    /// Whether reading `i` stands on node `i`.
+    pub(super) fn is_on_every_node(&self) -> bool {
+        self.on_every_node
+    }
+
+    /// Forces and accelerations of the base at the readings, if they are given.
+    #[inline(always)]
+    pub(super) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
+        self.around.as_ref()
     }
 
     /// What the filter makes of a series over the readings.
@@ -363,8 +372,11 @@ impl Channel {
 
     /// Force and base at reading `i`: as given, or else linear over the step.
     pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
-        match (self.around.get(i), excitation) {
-            (Some(around), _) => *around,
+        match (&self.around, excitation) {
+            (Some([forces, bases]), _) => Surroundings {
+                force: forces[i],
+                base: bases[i],
+            },
             (None, Some(excitation)) => excitation.around(self.places[i]),
             (None, None) => Surroundings::default(),
         }
@@ -376,6 +388,12 @@ impl Channel {
             (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
             _ => self.sensed(view, i).value,
         }
+    }
+
+    /// [`Channel::base_at`] every reading; empty for none.
+    #[inline(always)]
+    pub(super) fn base(&self) -> &[f64] {
+        &self.base
     }
 
     /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
@@ -404,10 +422,8 @@ impl Channel {
             return;
         }
         if self.is_acceleration_on_nodes() {
-            let [gain, offset, drift] = self.sensor.values(view.scalars);
-            self.accelerations(view, |i, l, seen| {
-                out.push(gain * (seen.value[l] + self.base_at(i)) + offset + drift * self.age(i));
-            });
+            let channel = self;
+            lanes::run(Predict { channel, view, out });
         } else if self.sensor == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
         } else {
@@ -464,22 +480,18 @@ impl Channel {
             pairs.for_each(|(source, slope)| *source += slope);
             return;
         }
+        if self.is_acceleration_on_nodes() {
+            return lanes::run(AddTranspose {
+                channel: self,
+                view,
+                slopes,
+                source,
+                direct,
+                scalars,
+            });
+        }
         let [gain, ..] = self.sensor.values(view.scalars);
         let indices = self.sensor.indices();
-        if self.is_acceleration_on_nodes() {
-            let (by_y, by_v) = (&mut source.displacement, &mut source.velocity);
-            self.accelerations(view, |i, l, seen| {
-                let slope = slopes[i];
-                by_y[i] += gain * slope * seen.states[0][l];
-                by_v[i] += gain * slope * seen.states[1][l];
-                for (values, by) in direct.functions_mut().zip(&seen.functions) {
-                    values[i] += gain * slope * by[l];
-                }
-                let factors = [seen.value[l] + self.base_at(i), 1.0, self.age(i)];
-                add_to_scalars(indices, factors, slope, scalars);
-            });
-            return;
-        }
         let simple = self.kind == ChannelKind::Displacement && indices == [None; 3];
         for (i, slope) in slopes.iter().enumerate() {
             let place = self.places[i];
@@ -492,19 +504,6 @@ impl Channel {
             let factors = [sensed.value, 1.0, self.age(i)];
             add_to_scalars(indices, factors, *slope, scalars);
         }
-    }
-
-    /// Calls `each` with every reading, its lane, and the accelerations at eight nodes, for readings that
-    /// are accelerations on the nodes.
-    fn accelerations(&self, view: View, mut each: impl FnMut(usize, usize, &Accelerations)) {
-        let count = self.len();
-        let around = |i| self.around_reading(view.excitation, i);
-        let oscillator = view.oscillator;
-        oscillator.accelerations(view.device, view.motion, 0..count, around, |from, seen| {
-            for l in 0..LANES.min(count - from) {
-                each(from + l, l, seen);
-            }
-        });
     }
 
     /// Whether the predictions depend on the functions also at fixed states.
@@ -630,7 +629,12 @@ fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
 }
 
 /// Adds what gain, offset and drift are worth.
-fn add_to_scalars(indices: [Option<usize>; 3], factors: [f64; 3], slope: f64, scalars: &mut [f64]) {
+pub(super) fn add_to_scalars(
+    indices: [Option<usize>; 3],
+    factors: [f64; 3],
+    slope: f64,
+    scalars: &mut [f64],
+) {
     for (index, factor) in indices.into_iter().zip(factors) {
         if let Some(index) = index {
             scalars[index] += slope * factor;

@@ -5,6 +5,7 @@ mod cost_and_gradient;
 mod gradient;
 mod jacobian;
 mod loss;
+mod on_nodes;
 mod refine;
 mod sensor;
 mod sizes;

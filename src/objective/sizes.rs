@@ -56,9 +56,12 @@ impl Problem {
         let parts = self.functions.iter().zip(self.functions.ranges());
         let functions = parts.zip(sizes);
         let mut most = 0.0f64;
-        for ((function, range), size) in functions {
+        for (index, ((function, range), size)) in functions.enumerate() {
             let delta = &delta[range.clone()];
-            let change = function.design.largest(delta, self.functions.nodes());
+            let change = match self.functions.is_constant(index) {
+                true => (function.design.row(0)).fold(0.0, |_, (j, b)| (b * delta[j]).abs()),
+                false => function.design.largest(delta, self.functions.nodes()),
+            };
             if change != 0.0 {
                 most = most.max(change / size);
             }

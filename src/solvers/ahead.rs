@@ -5,15 +5,15 @@
 //! the adjoint solve, while this one goes along the tangents and reduces the rows of the Jacobian; the first to be
 //! done with its own, the second thread goes on with reducing. Who does what changes no bit.
 
-use super::gauss_newton::{FEW_PARAMETERS, Reduced, Residuals};
-use super::{FitSettings, Solver, Timings};
+use super::gauss_newton::{FEW_PARAMETERS, Reduced, is_wide};
+use super::{FitSettings, Point, Solver, Timings};
 use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::threads::{self, Companion};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Scope;
 use std::time::{Duration, Instant};
 
@@ -32,30 +32,16 @@ pub(crate) struct Ahead<'s, 'p> {
 struct Input {
     parameters: Vec<f64>,
     evaluation: Evaluation,
-    reduction: Mutex<Reduction>,
-    /// Whether the second thread reduces all rows that are still to come.
-    taken_over: AtomicBool,
+    /// Whether the second thread waits for rows to reduce.
+    is_free: AtomicBool,
 }
 
-/// The rows reduced so far, and the residuals of all.
-struct Reduction {
-    reduced: Reduced,
-    residuals: Residuals,
-    took: Duration,
-}
-
-impl Input {
-    fn reduce(&self, piece: &mut Piece) {
-        let clock = Instant::now();
-        let mut reduction = (self.reduction.lock()).unwrap_or_else(PoisonError::into_inner);
-        let Reduction {
-            reduced,
-            residuals,
-            took,
-        } = &mut *reduction;
-        reduced.add(piece, residuals);
-        *took += clock.elapsed();
-    }
+/// What is handed over to the second thread.
+enum Handed {
+    /// What has been reduced until then.
+    Reduced(Reduced),
+    /// More rows.
+    Rows(Piece),
 }
 
 /// What the second thread does.
@@ -63,27 +49,35 @@ struct Job<'p> {
     problem: &'p Problem,
     kind: GradientKind,
     input: Option<Arc<Input>>,
-    /// Pieces with rows, and the way back for those without.
-    full: Option<Receiver<Piece>>,
+    handed: Option<Receiver<Handed>>,
+    /// The way back for pieces without rows.
     empty: Option<Sender<Piece>>,
     gradient: Option<Gradient>,
+    sizes: Option<Vec<f64>>,
+    reduced: Option<Reduced>,
     adjoint: Duration,
 }
 
 impl Job<'_> {
     fn run(&mut self) {
-        let (Some(input), Some(full)) = (self.input.take(), self.full.take()) else {
+        let (Some(input), Some(handed)) = (self.input.take(), self.handed.take()) else {
             return;
         };
         let clock = Instant::now();
         let (parameters, evaluation) = (&input.parameters, &input.evaluation);
         self.gradient = Some(self.problem.gradient(parameters, evaluation, self.kind));
         self.adjoint = clock.elapsed();
-        input.taken_over.store(true, Ordering::Release);
+        if !is_wide(parameters.len()) {
+            self.sizes = Some(self.problem.natural_sizes(evaluation));
+        }
+        input.is_free.store(true, Ordering::Release);
         loop {
-            match full.try_recv() {
-                Ok(mut piece) => {
-                    input.reduce(&mut piece);
+            match handed.try_recv() {
+                Ok(Handed::Reduced(reduced)) => self.reduced = Some(reduced),
+                Ok(Handed::Rows(mut piece)) => {
+                    if let Some(reduced) = &mut self.reduced {
+                        reduced.add(&mut piece);
+                    }
                     if let Some(empty) = &self.empty {
                         // Nobody may want it any more.
                         let _ = empty.send(piece);
@@ -123,9 +117,11 @@ impl<'s, 'p> Ahead<'s, 'p> {
             problem,
             kind: settings.gradient,
             input: None,
-            full: None,
+            handed: None,
             empty: None,
             gradient: None,
+            sizes: None,
+            reduced: None,
             adjoint: Duration::ZERO,
         };
         Some(Self {
@@ -135,64 +131,56 @@ impl<'s, 'p> Ahead<'s, 'p> {
         })
     }
 
-    /// The gradient at an evaluated point, if it was made by a second thread; the readings are then linearised,
-    /// too.
-    pub fn gradient(
+    /// The point that an evaluation belongs to; the readings are then linearised, too. If the second thread has not
+    /// done its part, the parameters and the evaluation come back.
+    pub fn point(
         &mut self,
         parameters: Vec<f64>,
         evaluation: Evaluation,
         timings: &mut Timings,
-    ) -> (Vec<f64>, Evaluation, Option<Gradient>) {
+    ) -> Result<Point, (Vec<f64>, Evaluation)> {
         self.linearised = None;
         let clock = Instant::now();
         let problem = self.problem;
-        let order = problem.places();
         let input = Arc::new(Input {
-            reduction: Mutex::new(Reduction {
-                reduced: Reduced::new(order.clone()),
-                residuals: Residuals::at(problem, &evaluation),
-                took: Duration::ZERO,
-            }),
             parameters,
             evaluation,
-            taken_over: AtomicBool::new(false),
+            is_free: AtomicBool::new(false),
         });
         let its = Arc::clone(&input);
-        let (full, to_reduce) = mpsc::channel();
-        let (reduced, again) = mpsc::channel();
-        let (gradient, adjoint) = self.companion.with(
+        let (hand, handed) = mpsc::channel();
+        let (empty, again) = mpsc::channel();
+        let found = self.companion.with(
             |job| {
                 job.input = Some(its);
-                (job.full, job.empty) = (Some(to_reduce), Some(reduced));
+                (job.handed, job.empty) = (Some(handed), Some(empty));
             },
-            || {
-                problem.each_piece(&input.evaluation, &order, |mut piece| {
-                    if !input.taken_over.load(Ordering::Acquire) {
-                        input.reduce(&mut piece);
-                        return piece;
-                    }
-                    // It is there until it has been told that there are no more.
-                    let _ = full.send(piece);
-                    (again.try_recv()).unwrap_or_else(|_| Piece::new(order.len()))
-                });
-                drop(full);
+            || along(problem, &input, hand, &again),
+            |(reduced, sizes), job| {
+                let reduced = reduced.or(job.reduced.take());
+                let sizes = sizes.or(job.sizes.take());
+                (reduced, sizes, job.gradient.take(), job.adjoint)
             },
-            |(), job| (job.gradient.take(), job.adjoint),
         );
-        let input = Arc::into_inner(input).expect("the second thread has given it back");
-        let Reduction { reduced, took, .. } =
-            (input.reduction.into_inner()).unwrap_or_else(PoisonError::into_inner);
+        let (reduced, sizes, gradient, adjoint) = found;
         // What was done at once is told once: first the adjoint, then linear algebra.
         let all = clock.elapsed();
         let adjoint = adjoint.min(all);
-        let algebra = took.min(all - adjoint);
+        let algebra = reduced.as_ref().map_or(Duration::ZERO, Reduced::took);
+        let algebra = algebra.min(all - adjoint);
         timings.adjoint += adjoint;
         timings.linear_algebra += algebra;
         timings.tangent += all - adjoint - algebra;
-        let parameters = input.parameters;
-        let is_whole = gradient.is_some();
-        self.linearised = is_whole.then(|| (parameters.clone(), reduced));
-        (parameters, input.evaluation, gradient)
+        let Input {
+            parameters,
+            evaluation,
+            ..
+        } = Arc::into_inner(input).expect("the second thread has given it back");
+        let (Some(gradient), Some(sizes)) = (gradient, sizes) else {
+            return Err((parameters, evaluation));
+        };
+        self.linearised = reduced.map(|reduced| (parameters.clone(), reduced));
+        Ok(Point::new(parameters, evaluation, gradient).with_sizes(sizes))
     }
 
     /// The readings linearised at the point with these parameters, if they are.
@@ -200,6 +188,35 @@ impl<'s, 'p> Ahead<'s, 'p> {
         let (at, reduced) = self.linearised.take()?;
         (at == parameters).then_some(reduced)
     }
+}
+
+/// Goes along the tangents and reduces the rows, until the second thread is free to go on with that. With many columns
+/// that is at the end busy with the last rows: meanwhile the sizes are found here.
+fn along(
+    problem: &Problem,
+    input: &Input,
+    hand: Sender<Handed>,
+    again: &Receiver<Piece>,
+) -> (Option<Reduced>, Option<Vec<f64>>) {
+    let order = problem.places();
+    let wide = is_wide(order.len());
+    let mut own = Some(Reduced::new(problem, &input.evaluation, order.clone()));
+    // It is there until it has been told that there is no more.
+    let give = |handed| hand.send(handed).is_ok();
+    problem.each_piece(&input.evaluation, &order, |mut piece| {
+        if wide && input.is_free.load(Ordering::Acquire) {
+            own.take().map(|own| give(Handed::Reduced(own)));
+        }
+        if let Some(own) = &mut own {
+            own.add(&mut piece);
+            return piece;
+        }
+        give(Handed::Rows(piece));
+        (again.try_recv()).unwrap_or_else(|_| Piece::new(order.len()))
+    });
+    drop(hand);
+    let sizes = wide.then(|| problem.natural_sizes(&input.evaluation));
+    (own, sizes)
 }
 
 #[cfg(test)]
@@ -259,8 +276,12 @@ mod tests {
             let evaluation = problem.evaluate(&problem.start()).expect("a motion");
             let gradient = problem.gradient(&problem.start(), &evaluation, settings.gradient);
             let mut timings = Timings::default();
-            let found = ahead.gradient(problem.start(), evaluation.clone(), &mut timings);
-            assert!(found == (problem.start(), evaluation, Some(gradient)));
+            let found = ahead.point(problem.start(), evaluation.clone(), &mut timings);
+            let found = found.expect("the second thread has done its part");
+            assert!(found.parameters == problem.start() && found.evaluation == evaluation);
+            assert!(found.gradient == gradient);
+            let alone = Point::new(problem.start(), evaluation, gradient);
+            assert!(found.relative_metric(&problem) == alone.relative_metric(&problem));
             assert!(ahead.linearised(&[0.0]).is_none());
         });
         let together = fitted(&problem);

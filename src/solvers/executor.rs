@@ -301,7 +301,8 @@ impl<'p> Run<'_, '_, '_, 'p> {
                     .recorder
                     .record(work.problem(), before, &point, length);
                 let previous_cost = before.evaluation.cost;
-                progress.point = *point;
+                let left = std::mem::replace(&mut progress.point, *point);
+                self.method.recycle(left.evaluation);
                 if let Some(row) = progress.recorder.rows.last() {
                     let (constraints, at) = (&work.problem().constraints, &progress.point);
                     self.watch.iteration(row, || {

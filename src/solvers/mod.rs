@@ -48,6 +48,7 @@ pub(crate) use timings::timed;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
 use crate::dynamics::Breakdown;
+use crate::objective::Evaluation;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
 use point::Work;
@@ -158,6 +159,11 @@ pub(crate) enum Step {
 pub(crate) trait Descend {
     /// One iteration from `point`.
     fn step(&mut self, work: &mut Work, point: &Point) -> Step;
+
+    /// Storage for the next step, from a point that has been left.
+    fn recycle(&mut self, evaluation: Evaluation) {
+        let _ = evaluation;
+    }
 
     /// What decides its next steps beside the point.
     fn memory(&self) -> Memory {

@@ -33,6 +33,12 @@ impl Point {
         }
     }
 
+    /// With [`Problem::natural_sizes`] here.
+    pub(crate) fn with_sizes(self, sizes: Vec<f64>) -> Self {
+        let sizes = OnceLock::from(sizes);
+        Self { sizes, ..self }
+    }
+
     /// [`Problem::natural_sizes`] here.
     fn natural_sizes(&self, problem: &Problem) -> &[f64] {
         (self.sizes).get_or_init(|| problem.natural_sizes(&self.evaluation))
@@ -183,17 +189,17 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
 
     /// The point that an evaluation belongs to, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
-        let (parameters, evaluation, gradient) = match &mut self.ahead {
-            Some(ahead) => ahead.gradient(parameters, evaluation, &mut self.timings),
-            None => (parameters, evaluation, None),
+        let (parameters, evaluation) = match &mut self.ahead {
+            None => (parameters, evaluation),
+            Some(ahead) => match ahead.point(parameters, evaluation, &mut self.timings) {
+                Ok(point) => {
+                    *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
+                    return point;
+                }
+                Err(back) => back,
+            },
         };
-        let gradient = match gradient {
-            Some(gradient) => {
-                *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
-                gradient
-            }
-            None => self.gradient(&parameters, &evaluation),
-        };
+        let gradient = self.gradient(&parameters, &evaluation);
         Point::new(parameters, evaluation, gradient)
     }
 }

@@ -74,16 +74,18 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[0]),
                 Eight::load(arithmetic, &ends[1]),
             ];
-            add(
-                arithmetic,
-                &maps.left[0],
-                &maps.right[0],
-                ends,
-                &mut self.gradient.mass[from..],
-            );
-            for (f, values) in self.gradient.coefficients.iter_mut().enumerate() {
-                let (left, right) = (&maps.left[f + 1], &maps.right[f + 1]);
-                add(arithmetic, left, right, ends, &mut values[from..]);
+            let all =
+                std::iter::once(&mut self.gradient.mass).chain(&mut self.gradient.coefficients);
+            for (f, values) in all.enumerate() {
+                let (left, right) = (&maps.left[f], &maps.right[f]);
+                set(
+                    arithmetic,
+                    left,
+                    right,
+                    ends,
+                    to - from,
+                    &mut values[from..],
+                );
             }
             to = from;
         }
@@ -94,31 +96,29 @@ impl Kernel for Back<'_> {
     }
 }
 
-/// Adds the shares of up to eight steps to the gradient of a function from their first node on.
+/// Takes the shares of up to eight steps to the gradient of a function from their first node on: the node behind
+/// them has its share of the step behind, the others have none yet.
 #[inline(always)]
-fn add<A: Arithmetic>(
+fn set<A: Arithmetic>(
     arithmetic: A,
     left: &[Row; 2],
     right: &[Row; 2],
     ends: [Eight<A>; 2],
+    steps: usize,
     gradient: &mut [f64],
 ) {
     let left =
         Eight::load(arithmetic, &left[0]) * ends[0] + Eight::load(arithmetic, &left[1]) * ends[1];
     let right =
         Eight::load(arithmetic, &right[0]) * ends[0] + Eight::load(arithmetic, &right[1]) * ends[1];
-    spread(arithmetic, left, gradient);
-    spread(arithmetic, right, &mut gradient[1..]);
-}
-
-#[inline(always)]
-fn spread<A: Arithmetic>(arithmetic: A, share: Eight<A>, gradient: &mut [f64]) {
-    match gradient.first_chunk_mut::<LANES>() {
-        Some(sum) => *sum = (Eight::load(arithmetic, sum) + share).row(),
-        None => {
-            for (sum, share) in gradient.iter_mut().zip(share.row()) {
-                *sum += share;
-            }
-        }
+    let right = right.row();
+    // The share of the step before a node.
+    let mut before = [0.0; LANES];
+    before[1..].copy_from_slice(&right[..LANES - 1]);
+    let nodes = (left + Eight::load(arithmetic, &before)).row();
+    match (steps, gradient.first_chunk_mut::<LANES>()) {
+        (LANES, Some(values)) => *values = nodes,
+        _ => gradient[..steps].copy_from_slice(&nodes[..steps]),
     }
+    gradient[steps] += right[steps - 1];
 }

@@ -6,8 +6,27 @@ use crate::lanes::{Arithmetic, Eight, LANES};
 /// A response and its derivatives with respect to displacement and velocity.
 pub(in crate::dynamics) struct Response<A: Arithmetic> {
     pub phi: Eight<A>,
-    pub by_y: Eight<A>,
-    pub by_v: Eight<A>,
+    pub by_y: Derivative<A>,
+    pub by_v: Derivative<A>,
+}
+
+/// A derivative, of which the plainest need no product.
+pub(in crate::dynamics) enum Derivative<A: Arithmetic> {
+    Zero,
+    One,
+    Of(Eight<A>),
+}
+
+impl<A: Arithmetic> Derivative<A> {
+    /// `sum - p` times this.
+    #[inline(always)]
+    pub fn taken_from(self, sum: Eight<A>, p: Eight<A>) -> Eight<A> {
+        match self {
+            Derivative::Zero => sum,
+            Derivative::One => sum - p,
+            Derivative::Of(by) => sum - p * by,
+        }
+    }
 }
 
 impl Term {
@@ -19,24 +38,23 @@ impl Term {
         y: Eight<A>,
         v: Eight<A>,
     ) -> Response<A> {
-        let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
         match self {
             Term::Damping => Response {
                 phi: v,
-                by_y: zero,
-                by_v: one,
+                by_y: Derivative::Zero,
+                by_v: Derivative::One,
             },
             Term::Stiffness => Response {
                 phi: y,
-                by_y: one,
-                by_v: zero,
+                by_y: Derivative::One,
+                by_v: Derivative::Zero,
             },
             Term::CubicStiffness => {
                 let square = y * y;
                 Response {
                     phi: square * y,
-                    by_y: Eight::splat(arithmetic, 3.0) * square,
-                    by_v: zero,
+                    by_y: Derivative::Of(Eight::splat(arithmetic, 3.0) * square),
+                    by_v: Derivative::Zero,
                 }
             }
             Term::QuadraticDamping | Term::CoulombFriction { .. } | Term::Offset => {
@@ -56,8 +74,8 @@ impl Term {
         }
         Response {
             phi: Eight::load(arithmetic, &phi),
-            by_y: Eight::load(arithmetic, &by_y),
-            by_v: Eight::load(arithmetic, &by_v),
+            by_y: Derivative::Of(Eight::load(arithmetic, &by_y)),
+            by_v: Derivative::Of(Eight::load(arithmetic, &by_v)),
         }
     }
 }

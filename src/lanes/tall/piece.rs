@@ -12,24 +12,50 @@ pub(crate) struct Piece {
     pub first: usize,
     /// Number of rows.
     pub count: usize,
+    /// Columns that have begun: what stands behind them means nothing, and stands for zeros.
+    begun: usize,
     /// A column at each place, and one to spare.
     pub(super) columns: Vec<Column>,
 }
 
 impl Piece {
-    /// One without rows, for so many places.
+    /// One without rows, for so many places, that have all begun with zeros.
     pub fn new(places: usize) -> Self {
         Self {
             first: 0,
             count: 0,
+            begun: places,
             columns: vec![[[0.0; LANES]; HIGH]; places + 1],
         }
     }
 
     /// No rows, and zeros everywhere.
     pub fn clear(&mut self) {
-        self.count = 0;
+        (self.count, self.begun) = (0, self.places());
         self.columns.fill([[0.0; LANES]; HIGH]);
+    }
+
+    /// No rows, and no column has begun; the first row will be row `first` of the matrix.
+    pub fn restart(&mut self, first: usize) {
+        (self.first, self.count, self.begun) = (first, 0, 0);
+    }
+
+    /// So many columns have begun: those that had not are zero so far.
+    pub fn widen(&mut self, begun: usize) {
+        for column in self
+            .columns
+            .get_mut(self.begun..begun)
+            .into_iter()
+            .flatten()
+        {
+            column.as_flattened_mut()[..self.count].fill(0.0);
+        }
+        self.begun = self.begun.max(begun);
+    }
+
+    /// How many columns have begun.
+    pub fn begun(&self) -> usize {
+        self.begun
     }
 
     /// How many rows there is room for.

@@ -71,10 +71,12 @@ impl Triangle {
     }
 
     /// Takes in the columns that begin in a piece: how many have.
-    fn begin(&mut self, piece: &Piece) -> usize {
-        let has_begun = |place: &usize| piece.column(*place).iter().any(|a| *a != 0.0);
-        let last = (self.begun..piece.places()).rev().find(has_begun);
+    fn begin(&mut self, piece: &mut Piece) -> usize {
+        let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
+        let has_begun = |place: &usize| piece.column(*place).chunks(4 * LANES).any(any);
+        let last = (self.begun..piece.begun()).rev().find(has_begun);
         self.widen(last.map_or(self.begun, |last| last + 1));
+        piece.widen(self.begun);
         self.begun
     }
 

@@ -19,7 +19,7 @@ impl Problem {
         let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
         let order = self.places();
         self.each_piece(evaluation, &order, |piece| {
-            for (place, j) in order.iter().enumerate() {
+            for (place, j) in order.iter().enumerate().take(piece.begun()) {
                 let mut column = jacobian.column_mut(*j);
                 let rows = piece.first..piece.first + piece.count;
                 column.as_mut_slice()[rows].copy_from_slice(piece.column(place));
@@ -115,7 +115,7 @@ fn sweep(
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
         let mut piece = Piece::new(order.len());
-        piece.first = row;
+        piece.restart(row);
         readers.push((Reader::new(channel, view), piece));
         row += channel.len();
     }
@@ -123,7 +123,7 @@ fn sweep(
         let next = piece.first + piece.count;
         let full = std::mem::take(piece);
         *piece = take(full);
-        (piece.first, piece.count) = (next, 0);
+        piece.restart(next);
     };
     let course = Course {
         oscillator: view.oscillator,

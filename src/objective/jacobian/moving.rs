@@ -1,6 +1,6 @@
 //! Which functions change along which parameter, tile by tile.
 
-use crate::dynamics::{Slot, TILE_NODES, Tangents};
+use crate::dynamics::{Slot, Steady, TILE_NODES, Tangents};
 use crate::functions::{Design, Functions};
 use crate::lanes::LANES;
 use crate::problem::Experiment;
@@ -77,15 +77,24 @@ impl<'a> Moving<'a> {
     /// How the functions change at the nodes of the tile from node `first` on.
     pub fn fill(&self, tangents: &mut Tangents, first: usize) {
         for part in &self.parts {
-            if !part.constant || first == 0 {
+            if !part.constant {
                 part.slots.iter().for_each(|slot| tangents.rest(*slot));
                 part.fill(tangents, first);
+            } else if first == 0 {
+                part.hold(tangents);
             }
         }
     }
 }
 
 impl Part<'_> {
+    /// A constant changes along its one parameter, everywhere by the same.
+    fn hold(&self, tangents: &mut Tangents) {
+        for ((_, value), &(slot, lane)) in self.design.row(0).zip(&self.lanes) {
+            tangents.hold(slot, Steady { lane, value });
+        }
+    }
+
     fn fill(&self, tangents: &mut Tangents, first: usize) {
         let mut set = |node: usize, parameter: usize, value: f64| {
             let (slot, lane) = self.lanes[parameter];

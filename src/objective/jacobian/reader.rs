@@ -1,8 +1,8 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::dynamics::{Accelerations, FUNCTIONS, Sensed, Sight, Tangents};
+use crate::dynamics::{Accelerations, Change, FUNCTIONS, Sensed, Steady, TILE, Tangents};
 use crate::lanes::tall::Piece;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
+use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::objective::{Channel, View};
 use std::ops::Range;
 
@@ -14,13 +14,14 @@ pub(super) struct Reader<'a> {
     next: usize,
     gain: f64,
     kind: Kind,
+    glance: Glance,
 }
 
 /// How a channel's readings answer to the states.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Displacements, each at a node.
-    Nodes,
+    Displacements,
     /// Accelerations, reading `i` on node `i`.
     Accelerations,
     /// Anything.
@@ -30,20 +31,20 @@ enum Kind {
 /// Up to eight readings, a reading after the other.
 struct Glance {
     count: usize,
-    /// Left node of each reading's step, from the start of the tile.
-    steps: [usize; LANES],
+    /// Each reading's node or, for any reading, the left node of its step, from the start of the tile.
+    nodes: [usize; LANES],
     states: [[f64; 4]; LANES],
     functions: [[[f64; FUNCTIONS]; 2]; LANES],
     /// Whether nothing at the right node is looked at.
     at_left: [bool; LANES],
-    /// What accelerations on left nodes answer to.
+    /// What accelerations on nodes answer to.
     seen: Accelerations,
 }
 
 impl Glance {
     const NOTHING: Self = Self {
         count: 0,
-        steps: [0; LANES],
+        nodes: [0; LANES],
         states: [[0.0; 4]; LANES],
         functions: [[[0.0; FUNCTIONS]; 2]; LANES],
         at_left: [false; LANES],
@@ -61,7 +62,7 @@ impl<'a> Reader<'a> {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
             kind: match () {
-                () if channel.is_displacement_at_nodes() => Kind::Nodes,
+                () if channel.is_displacement_at_nodes() => Kind::Displacements,
                 () if channel.is_acceleration_on_nodes() => Kind::Accelerations,
                 () => Kind::Any,
             },
@@ -69,6 +70,7 @@ impl<'a> Reader<'a> {
             view,
             next: 0,
             gain,
+            glance: Glance::NOTHING,
         }
     }
 
@@ -86,55 +88,38 @@ impl<'a> Reader<'a> {
 
     /// Takes at most so many next readings within the steps `steps`: how many they are and where they stand.
     #[inline(always)]
-    fn glance<A: Arithmetic>(
-        &self,
-        arithmetic: A,
-        steps: &Range<usize>,
-        most: usize,
-        glance: &mut Glance,
-    ) {
-        let places = &self.channel.places()[self.next..];
-        glance.count = 0;
-        for (l, place) in places.iter().take(most.min(LANES)).enumerate() {
-            if place.step >= steps.end {
-                break;
+    fn glance<A: Arithmetic>(&mut self, arithmetic: A, steps: &Range<usize>, most: usize) {
+        let glance = &mut self.glance;
+        let most = most.min(LANES).min(self.channel.len() - self.next);
+        if self.channel.is_on_every_node() && self.kind != Kind::Any {
+            // The last node of the motion belongs to its last step.
+            let last = steps.end + 1 == self.view.motion.nodes();
+            let end = steps.end + usize::from(last);
+            glance.count = most.min(end.saturating_sub(self.next));
+            let from = self.next.saturating_sub(steps.start);
+            for (l, node) in glance.nodes.iter_mut().enumerate() {
+                *node = (from + l).min(TILE);
             }
-            glance.count = l + 1;
-            glance.steps[l] = place.step - steps.start;
-            glance.at_left[l] = place.fraction == 0.0;
-            match self.kind {
-                Kind::Nodes => glance.steps[l] += usize::from(place.fraction == 1.0),
-                Kind::Accelerations if place.fraction == 0.0 => {}
-                _ => glance.set(l, &self.channel.sensed(self.view, self.next + l)),
+        } else {
+            glance.count = 0;
+            let places = &self.channel.places()[self.next..];
+            for (l, place) in places.iter().take(most).enumerate() {
+                if place.step >= steps.end {
+                    break;
+                }
+                glance.count = l + 1;
+                glance.nodes[l] = place.step - steps.start;
+                if self.kind == Kind::Displacements {
+                    glance.nodes[l] += usize::from(place.fraction == 1.0);
+                } else {
+                    glance.at_left[l] = place.fraction == 0.0;
+                    glance.set(l, &self.channel.sensed(self.view, self.next + l));
+                }
             }
         }
         if self.kind == Kind::Accelerations && glance.count > 0 {
-            self.glance_at_accelerations(arithmetic, glance);
+            (self.channel).accelerations(arithmetic, self.view, self.next, &mut glance.seen);
         }
-    }
-
-    #[inline(always)]
-    fn glance_at_accelerations<A: Arithmetic>(&self, arithmetic: A, glance: &mut Glance) {
-        let View {
-            oscillator,
-            device,
-            excitation,
-            motion,
-            ..
-        } = self.view;
-        let sight = Sight {
-            oscillator,
-            device,
-            states: motion,
-        };
-        let around = |i| self.channel.around_reading(excitation, i);
-        sight.see(
-            arithmetic,
-            self.next,
-            glance.count,
-            around,
-            &mut glance.seen,
-        );
     }
 }
 
@@ -151,22 +136,20 @@ impl Kernel for Read<'_, '_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
-        let mut glance = Glance::NOTHING;
+        let reader = self.reader;
         loop {
-            let room = self.piece.room();
-            self.reader
-                .glance(arithmetic, &self.steps, room, &mut glance);
-            if glance.count == 0 {
+            reader.glance(arithmetic, &self.steps, self.piece.room());
+            if reader.glance.count == 0 {
                 return;
             }
             let answer = Answer {
                 tangents: self.tangents,
-                glance: &glance,
-                kind: self.reader.kind,
-                gain: self.reader.gain,
+                glance: &reader.glance,
+                kind: reader.kind,
+                gain: reader.gain,
             };
             answer.write(arithmetic, self.piece);
-            self.reader.next += glance.count;
+            reader.next += reader.glance.count;
         }
     }
 }
@@ -185,25 +168,40 @@ impl Answer<'_> {
     fn write<A: Arithmetic>(&self, arithmetic: A, piece: &mut Piece) {
         let gain = Eight::splat(arithmetic, self.gain);
         let count = self.glance.count;
-        let (row, places) = (piece.count, piece.places());
+        let begun = self.tangents.begun_groups() * LANES;
+        let (row, places) = (piece.count, begun.min(piece.places()));
+        piece.widen(places);
         piece.count += count;
         for (g, first) in (0..places).step_by(LANES).enumerate() {
             let mut answers = [[0.0; LANES]; LANES];
             if self.tangents.has_begun(g) {
-                for (l, answer) in answers.iter_mut().enumerate().take(count) {
-                    let sum = match self.kind {
-                        Kind::Nodes => {
-                            let step = self.glance.steps[l];
-                            Eight::load(arithmetic, &self.tangents.states(g)[step][0])
+                // Of lanes without a reading nobody wants to know.
+                match self.kind {
+                    Kind::Displacements => {
+                        let states = self.tangents.states(g);
+                        for (answer, node) in answers.iter_mut().zip(self.glance.nodes) {
+                            *answer = states[node][0];
                         }
-                        Kind::Accelerations if self.glance.at_left[l] => {
-                            self.at_acceleration(arithmetic, g, l)
+                    }
+                    Kind::Accelerations => {
+                        let varies = self.tangents.changes(g).any(|change| change.varies());
+                        for (l, answer) in answers.iter_mut().enumerate() {
+                            *answer = self.at_acceleration(arithmetic, g, l, varies).row();
                         }
-                        Kind::Accelerations | Kind::Any => self.at_step(arithmetic, g, l),
-                    };
-                    *answer = (gain * sum).row();
+                    }
+                    Kind::Any => {
+                        for (l, answer) in answers.iter_mut().enumerate().take(count) {
+                            *answer = self.at_step(arithmetic, g, l).row();
+                        }
+                    }
                 }
                 answers = arithmetic.transpose(&answers);
+                if self.kind == Kind::Accelerations {
+                    self.add_constants(arithmetic, g, &mut answers);
+                }
+                for answer in answers.iter_mut().take(places - first) {
+                    *answer = (gain * Eight::load(arithmetic, answer)).row();
+                }
             }
             for (place, answer) in (first..places).zip(&answers) {
                 let rows = &mut piece.column_mut(place)[row..row + count];
@@ -215,17 +213,37 @@ impl Answer<'_> {
         }
     }
 
-    /// The answer of an acceleration on a left node.
+    /// What accelerations answer to constants, for one direction a row.
     #[inline(always)]
-    fn at_acceleration<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
-        let (step, seen) = (self.glance.steps[l], &self.glance.seen);
+    fn add_constants<A: Arithmetic>(&self, arithmetic: A, g: usize, answers: &mut [Row; LANES]) {
+        for change in self.tangents.changes(g) {
+            if let Some(Steady { lane, value }) = change.steady {
+                let slopes = Eight::load(arithmetic, &self.glance.seen.functions[change.function]);
+                let push = slopes * Eight::splat(arithmetic, value);
+                answers[lane] = (Eight::load(arithmetic, &answers[lane]) + push).row();
+            }
+        }
+    }
+
+    /// The answer of an acceleration, but for what it answers to constants.
+    #[inline(always)]
+    fn at_acceleration<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        g: usize,
+        l: usize,
+        varies: bool,
+    ) -> Eight<A> {
+        let (node, seen) = (self.glance.nodes[l], &self.glance.seen);
         let mut answer = Eight::splat(arithmetic, 0.0);
-        for (by, tangent) in seen.states.iter().zip(&self.tangents.states(g)[step]) {
+        for (by, tangent) in seen.states.iter().zip(&self.tangents.states(g)[node]) {
             answer += Eight::splat(arithmetic, by[l]) * Eight::load(arithmetic, tangent);
         }
-        for (f, changes) in self.tangents.changes(g) {
-            let slope = Eight::splat(arithmetic, seen.functions[f][l]);
-            answer += slope * Eight::load(arithmetic, &changes[step]);
+        if varies {
+            for change in self.tangents.changes(g).filter(Change::varies) {
+                let slope = Eight::splat(arithmetic, seen.functions[change.function][l]);
+                answer += slope * Eight::load(arithmetic, &change.rows[node]);
+            }
         }
         answer
     }
@@ -234,28 +252,28 @@ impl Answer<'_> {
     #[inline(always)]
     fn at_step<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
         let Glance {
-            steps,
+            nodes,
             states,
             functions,
             ..
         } = self.glance;
-        let (step, by) = (steps[l], &states[l]);
+        let (node, by) = (nodes[l], &states[l]);
         let tangent = self.tangents.states(g);
         let mut answer = Eight::splat(arithmetic, 0.0);
         for side in 0..2 {
             if side == 1 && self.glance.at_left[l] {
                 return answer;
             }
-            let at = step + side;
+            let at = node + side;
             for state in 0..2 {
                 answer += Eight::splat(arithmetic, by[2 * side + state])
                     * Eight::load(arithmetic, &tangent[at][state]);
             }
-            for (f, changes) in self.tangents.changes(g) {
-                let slope = functions[l][side][f];
+            for change in self.tangents.changes(g) {
+                let slope = functions[l][side][change.function];
                 if slope != 0.0 {
-                    answer +=
-                        Eight::splat(arithmetic, slope) * Eight::load(arithmetic, &changes[at]);
+                    let row = Eight::load(arithmetic, &change.rows[at]);
+                    answer += Eight::splat(arithmetic, slope) * row;
                 }
             }
         }

@@ -1,17 +1,16 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
+use crate::lanes::LANES;
 use crate::lanes::tall::{Piece, Triangle};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::solvers::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
-use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// How the residuals of the readings of all channels are weighed.
-#[derive(Clone)]
-pub(crate) struct Residuals {
+struct Residuals {
     /// `sqrt(w)`.
     roots: Vec<f64>,
     /// `sqrt(w) r`.
@@ -20,7 +19,7 @@ pub(crate) struct Residuals {
 
 impl Residuals {
     /// At an evaluated point.
-    pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
+    fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let mut roots = Vec::with_capacity(problem.reading_count());
         let mut weighted = Vec::with_capacity(problem.reading_count());
         for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
@@ -45,12 +44,19 @@ impl Residuals {
     }
 }
 
+/// Whether the reduction of rows with so many columns takes much longer than a look at the clock.
+pub(crate) fn is_wide(columns: usize) -> bool {
+    columns > LANES
+}
+
 /// The readings, linearised and reduced to as many rows as there are parameters:
 /// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
 pub(crate) struct Reduced {
     triangle: Triangle,
     /// The parameter of each column.
     order: Vec<usize>,
+    residuals: Residuals,
+    took: Duration,
 }
 
 impl Reduced {
@@ -60,52 +66,57 @@ impl Reduced {
         problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
     }
 
-    /// Of no rows yet, for the parameters in `order` ([`Problem::places`]).
-    pub fn new(order: Vec<usize>) -> Self {
+    /// Of no rows yet, at an evaluated point, for the parameters in `order` ([`Problem::places`]).
+    pub fn new(problem: &Problem, evaluation: &Evaluation, order: Vec<usize>) -> Self {
         Self {
             triangle: Triangle::new(order.len()),
             order,
+            residuals: Residuals::at(problem, evaluation),
+            took: Duration::ZERO,
         }
     }
 
     /// Adds the rows of a piece.
-    pub fn add(&mut self, piece: &mut Piece, residuals: &Residuals) {
-        let Range { start, end } = piece.first..piece.first + piece.count;
-        let (roots, right) = (
-            &residuals.roots[start..end],
-            &residuals.weighted[start..end],
-        );
-        self.triangle.add_weighted(piece, roots, right);
+    pub fn add(&mut self, piece: &mut Piece) {
+        let rows = piece.first..piece.first + piece.count;
+        let Residuals { roots, weighted } = &self.residuals;
+        let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
+        let mut add = || self.triangle.add_weighted(piece, roots, right);
+        match is_wide(self.order.len()) {
+            true => timed(&mut self.took, add),
+            false => add(),
+        }
+    }
+
+    /// How long it took, if it was long enough to be told: else it is part of what brings the rows.
+    pub fn took(&self) -> Duration {
+        self.took
     }
 
     /// All rows, piece by piece.
     fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
-        let residuals = Residuals::at(problem, evaluation);
-        let mut reduced = Self::new(problem.places());
-        let order = reduced.order.clone();
-        let (clock, before) = (Instant::now(), timings.linear_algebra);
+        let clock = Instant::now();
+        let order = problem.places();
+        let mut reduced = Self::new(problem, evaluation, order.clone());
         problem.each_piece(evaluation, &order, |mut piece| {
-            timed(&mut timings.linear_algebra, || {
-                reduced.add(&mut piece, &residuals);
-            });
+            reduced.add(&mut piece);
             piece
         });
-        timings.tangent += clock
-            .elapsed()
-            .saturating_sub(timings.linear_algebra - before);
+        timings.linear_algebra += reduced.took;
+        timings.tangent += clock.elapsed().saturating_sub(reduced.took);
         reduced
     }
+}
 
-    /// The subproblem in `delta theta`, with what no step can change as a row of its own.
-    fn subproblem(&self) -> Subproblem {
-        let mut sub = empty(self.order.len());
-        for (entries, b) in self.triangle.rows() {
-            let entries = entries.map(|(place, r)| (self.order[place], r));
-            sub.residuals.push(entries, -b);
-        }
-        sub.residuals.push([], self.triangle.rest());
-        sub
+/// The subproblem in `delta theta`, with what no step can change as a row of its own.
+fn of_triangle(triangle: &Triangle, order: &[usize]) -> Subproblem {
+    let mut sub = empty(order.len());
+    for (entries, b) in triangle.rows() {
+        let entries = entries.map(|(place, r)| (order[place], r));
+        sub.residuals.push(entries, -b);
     }
+    sub.residuals.push([], triangle.rest());
+    sub
 }
 
 /// A subproblem whose variables are eliminated all at once.
@@ -127,7 +138,9 @@ pub(super) fn subproblem(
         let reduced = ahead.unwrap_or_else(|| Reduced::at(problem, evaluation, timings));
         // Else in another order of operations.
         if reduced.triangle.is_finite() {
-            return timed(&mut timings.linear_algebra, || reduced.subproblem());
+            return timed(&mut timings.linear_algebra, || {
+                of_triangle(&reduced.triangle, &reduced.order)
+            });
         }
     }
     let residuals = Residuals::at(problem, evaluation);
@@ -138,7 +151,7 @@ pub(super) fn subproblem(
         let Residuals { roots, weighted } = &residuals;
         if jacobian.nrows() > jacobian.ncols() {
             let (triangle, order) = Triangle::of(&jacobian, roots, weighted);
-            return Reduced { triangle, order }.subproblem();
+            return of_triangle(&triangle, &order);
         }
         let mut sub = empty(jacobian.ncols());
         for ((row, root), r) in jacobian.row_iter().zip(roots).zip(weighted) {

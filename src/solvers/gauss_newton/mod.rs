@@ -9,7 +9,7 @@
 mod dense;
 mod structured;
 
-pub(crate) use dense::{Reduced, Residuals, weighted_jacobian};
+pub(crate) use dense::{Reduced, is_wide, weighted_jacobian};
 
 use super::infeasible::no_step;
 use super::point::Work;
@@ -51,6 +51,7 @@ const SMALLEST_CHANGE: f64 = 1e-9;
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
+    spare: Option<Evaluation>,
 }
 
 impl Default for GaussNewton {
@@ -58,6 +59,7 @@ impl Default for GaussNewton {
         Self {
             damping: FIRST_DAMPING,
             first_cost: None,
+            spare: None,
         }
     }
 }
@@ -85,7 +87,7 @@ impl Descend for GaussNewton {
         let mut sub = linearise(work, point);
         // Diagonal of the proximal term.
         let scales = point.relative_metric(problem);
-        let mut evaluation = problem.workspace();
+        let mut evaluation = self.spare.take().unwrap_or_else(|| problem.workspace());
         let mut trouble = None;
         let before = self.damping;
         while self.damping <= MOST_DAMPING {
@@ -132,6 +134,10 @@ impl Descend for GaussNewton {
             Some(status) => no_step(problem, point, status),
             None => Step::Stuck("no Gauss-Newton step lowers the cost".into()),
         }
+    }
+
+    fn recycle(&mut self, evaluation: Evaluation) {
+        self.spare = Some(evaluation);
     }
 
     fn memory(&self) -> Memory {
