@@ -132,3 +132,60 @@ pub(crate) fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f
     };
     [displacement, displacement * omega]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+
+    /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it.
+    #[test]
+    fn the_state_of_a_sine_has_its_size_whatever_was_read() {
+        let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
+        let readings = |size: f64, phase: f64| -> Vec<f64> {
+            let at = |i: usize| size * (omega * spacing * i as f64 + phase).sin();
+            (0..400).map(at).collect()
+        };
+        let quarter = TAU / 4.0;
+        let cases = [
+            (ChannelKind::Displacement, amplitude, 0.0),
+            (ChannelKind::Velocity, amplitude * omega, quarter),
+            (
+                ChannelKind::Acceleration,
+                amplitude * omega * omega,
+                2.0 * quarter,
+            ),
+        ];
+        let rms = amplitude / 2f64.sqrt();
+        for (kind, size, phase) in cases {
+            let [displacement, velocity] = state_sizes(kind, &readings(size, phase), spacing);
+            // The dominant frequency is known to a small part of its distance to the next.
+            assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
+            assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
+        }
+    }
+
+    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
+    /// then the size of its own values, and not an infinite one.
+    #[test]
+    fn a_term_that_sees_nothing_has_its_own_size() {
+        let grid = Grid::new(0.0, 10.0, 101).unwrap();
+        let times = grid.times();
+        let readings: Vec<f64> = times.iter().map(|t| 1e-60 * t.cos()).collect();
+        let record = Record::new("tiny")
+            .from_state(1e-60, 0.0)
+            .displacement(&times, &readings);
+        let parts = [Part::fixed(1.0), Part::fixed(0.0), Part::constant(0.1)];
+        let problem = Builder::new(parts)
+            .cubic_stiffness(Part::constant(0.25))
+            .record(record)
+            .build()
+            .unwrap();
+        let sizes = problem.natural_sizes(&problem.evaluate(&problem.start()).unwrap());
+        assert_eq!(sizes[3], 0.25, "{sizes:?}");
+        // The motion is y'' = -0.1 y, to 1 % by its differences at the ends: so a stiffness of 0.1 is as
+        // strong as the mass.
+        assert!((sizes[2] / 0.1 - 1.0).abs() < 0.01, "{sizes:?}");
+    }
+}

@@ -406,3 +406,52 @@ fn remark(
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a path at these natural logarithms of misfit and roughness.
+    fn path(places: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
+        let point = |[misfit, roughness]: [f64; 2]| PathPoint {
+            weight: 1.0,
+            iterations: 1,
+            misfit: misfit.exp(),
+            roughness: roughness.exp(),
+            degrees_of_freedom: 1.0,
+            gcv: 1.0,
+            parameters: Vec::new(),
+        };
+        places.into_iter().map(point).collect()
+    }
+
+    /// As the weight falls, first the misfit falls and then the roughness rises.
+    #[test]
+    fn the_corner_is_where_roughness_begins_to_rise() {
+        for corner in 1..8 {
+            let place = |i: usize| {
+                let [left, right] = [corner.max(i) - i, corner.max(i) - corner];
+                [3.0 + 2.0 * left as f64, 2.0 * right as f64 - 5.0]
+            };
+            assert_eq!(l_curve(&path((0..9).map(place))), Some(corner));
+            // The other way round it turns to the other side, and has no corner.
+            assert_eq!(l_curve(&path((0..9).rev().map(place))), None);
+        }
+    }
+
+    /// From falling misfit to rising roughness in two turns, at the third point and at the fifth.
+    #[test]
+    fn the_sharper_of_two_turns_is_the_corner() {
+        for (between, corner) in [(160f64, 4), (110.0, 2)] {
+            let headings = [180.0, 180.0, between, between, 90.0, 90.0];
+            let mut at = [1.0, -2.0];
+            let steps = headings.map(|degrees| {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                at = [at[0] + cosine, at[1] + sine];
+                at
+            });
+            let places = std::iter::once([1.0, -2.0]).chain(steps);
+            assert_eq!(l_curve(&path(places)), Some(corner));
+        }
+    }
+}
