@@ -104,22 +104,24 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     );
     let mut tight = RowGroup::new("-2 c >= -0.8");
     tight.push([(0, -2.0)], [-0.8, f64::INFINITY], [0.0, common::DURATION]);
-    problem.constraints.groups = vec![wide, tight];
-    let start = problem.functions.start();
-    let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
-    assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
-    let active = active_constraints(&problem, &found.best);
-    let [bound] = active.as_slice() else {
-        panic!("{active:?}");
-    };
-    assert_eq!(bound.name, "-2 c >= -0.8");
-    assert!(!bound.pushed.is_empty(), "{bound:?}");
-    let expected = 0.5 * found.best.gradient.euclidean[0].abs();
-    // Exact but for the distance of the parameter from its bound.
-    assert!(
-        (bound.multiplier / expected - 1.0).abs() < 1e-10,
-        "{bound:?} {expected}"
-    );
+    for groups in [[wide.clone(), tight.clone()], [tight, wide]] {
+        problem.constraints.groups = groups.to_vec();
+        let start = problem.functions.start();
+        let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
+        assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
+        let active = active_constraints(&problem, &found.best);
+        let [bound] = active.as_slice() else {
+            panic!("{active:?}");
+        };
+        assert_eq!(bound.name, "-2 c >= -0.8");
+        assert!(!bound.pushed.is_empty(), "{bound:?}");
+        let expected = 0.5 * found.best.gradient.euclidean[0].abs();
+        // Exact but for the distance of the parameter from its bound.
+        assert!(
+            (bound.multiplier / expected - 1.0).abs() < 1e-10,
+            "{bound:?} {expected}"
+        );
+    }
 }
 
 /// m = 1 known, c = 0.8 and k = 1 sought, their sum at most `cap`.

@@ -147,14 +147,14 @@ fn irregular_velocities_are_integrated() {
     assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
 }
 
-/// Mass, stiffness and penalty in another unit of mass: the readings count as they did, so the start is
-/// the same but for the unit.
+/// Mass, stiffness and readings in other units, and the penalty with them: the readings count as they did,
+/// so the start is the same but for the unit.
 #[test]
-fn the_start_knows_no_unit_of_mass() {
+fn the_start_knows_no_unit_of_mass_or_length() {
     let plain = problem(Some(0.0), false);
     let observed = plain.experiments[0].channels[0].observed().to_vec();
     let observed = common::synthetic::with_noise(&observed, 0.05, 4);
-    let start = |unit: f64, weight: f64| -> Vec<f64> {
+    let start = |unit: f64, length: f64, weight: f64| -> Vec<f64> {
         let basis = Basis::PiecewiseLinear {
             knots: uniform_knots(&plain.oscillator.grid, 6),
         };
@@ -170,10 +170,10 @@ fn the_start_knows_no_unit_of_mass() {
                 stiffness,
             ),
         ];
-        let mut problem =
-            common::problem_of(plain.oscillator.clone(), list, observed.clone(), None);
-        let penalty = Penalty::new(2, 1, weight / (unit * unit), rows);
-        problem.penalties.push(penalty);
+        let observed = observed.iter().map(|y| y * length).collect();
+        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        let weight = weight * (length / unit).powi(2);
+        problem.penalties.push(Penalty::new(2, 1, weight, rows));
         let found = equation_error(&problem, &problem.functions.start()).unwrap();
         found.iter().map(|k| k / unit).collect()
     };
@@ -181,12 +181,12 @@ fn the_start_knows_no_unit_of_mass() {
         let pairs = a.iter().zip(b).map(|(a, b)| (a - b).abs());
         pairs.fold(0.0, f64::max)
     };
-    let smoothed = start(1.0, 1e2);
+    let smoothed = start(1.0, 1.0, 1e2);
     // The penalty has its part in it.
-    let free = start(1.0, 1e-6);
+    let free = start(1.0, 1.0, 1e-6);
     assert!(most(&smoothed, &free) > 1e-3, "{smoothed:?} {free:?}");
-    for unit in [1e-3, 1e3] {
-        let other = start(unit, 1e2);
+    for (unit, length) in [(1e-3, 1.0), (1e3, 1.0), (1.0, 1e-3), (1.0, 1e3)] {
+        let other = start(unit, length, 1e2);
         assert!(most(&other, &smoothed) < 1e-6, "{other:?} {smoothed:?}");
     }
 }

@@ -5,7 +5,7 @@ mod common;
 use common::synthetic::{settings, with_noise};
 use kmcfit::constraints::RowGroup;
 use kmcfit::dynamics::{Device, Method};
-use kmcfit::functions::{CoefficientFunction, Quantity, Scalar, Value};
+use kmcfit::functions::{CoefficientFunction, Prior, Quantity, Scalar, Value};
 use kmcfit::objective::{Sensor, Weighting};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::{Fit, FitSettings, Stopping, fit_from};
@@ -13,6 +13,10 @@ use nalgebra::{Matrix2, Vector2};
 
 const NODES: usize = 101;
 const SIZES: [f64; 2] = [0.5, 0.03];
+const PRIOR: Prior = Prior {
+    mean: 5.0,
+    sigma: 0.5,
+};
 
 /// A known motion, read with an offset (m) and a drift (m/s) that are sought: the readings are linear in
 /// both. The noise is as large, so that a step leaves half of the cost.
@@ -38,7 +42,7 @@ fn problem() -> Problem {
         unit: String::new(),
         start: 0.0,
         size,
-        prior: None,
+        prior: Some(PRIOR),
     };
     problem.functions = problem.functions.with_scalars(SIZES.map(scalar).to_vec());
     let channel = problem.experiments[0].channels.remove(0);
@@ -53,7 +57,7 @@ fn problem() -> Problem {
     problem
 }
 
-/// `J = |A theta - b|^2` with the rows `(1, t)` of A and the readings less the motion in b.
+/// `J = |A theta - b|^2` with the rows `(1, t)` of A and the readings less the motion in b, and the priors.
 struct Squares {
     matrix: Matrix2<f64>,
     right: Vector2<f64>,
@@ -76,6 +80,10 @@ impl Squares {
             squares.right -= row * r;
             squares.constant += r * r;
         }
+        let weight = PRIOR.sigma.powi(-2);
+        squares.matrix += Matrix2::identity() * weight;
+        squares.right += Vector2::repeat(PRIOR.mean * weight);
+        squares.constant += 2.0 * PRIOR.mean.powi(2) * weight;
         squares
     }
 
@@ -124,7 +132,7 @@ fn a_step_beyond_a_bound_is_clipped_or_is_the_best_in_it() {
     let (plain, _) = squares.step(&zero, 1e-2, f64::INFINITY);
     let decrease = squares.cost(&zero) - squares.cost(&plain);
     // What clipping costs, as a share of the decrease of the plain step.
-    for (share, is_clipped) in [(0.04, true), (0.14, false)] {
+    for (share, is_clipped, programs) in [(0.04, true, 0), (0.11, false, 0), (0.3, false, 1)] {
         let most = plain[0] - (share * decrease / squares.matrix[(0, 0)]).sqrt();
         assert!(most > 0.0);
         let mut bounded = free.clone();
@@ -140,7 +148,7 @@ fn a_step_beyond_a_bound_is_clipped_or_is_the_best_in_it() {
             let found = after(&bounded, iteration);
             if iteration == 1 {
                 assert_eq!(clipped, is_clipped);
-                assert_eq!(found.counts.qp, 0);
+                assert_eq!(found.counts.qp, programs);
             }
             let off = (Vector2::from_row_slice(&found.best.parameters) - theta).norm();
             // Steps after the first may be solved by a quadratic program.

@@ -406,6 +406,8 @@ mod tests {
         first.timings.start = hours;
         first.elapsed = hours;
         let (before, cost) = (first.counts, first.best.evaluation.cost);
+        let snapshots = first.snapshots.clone();
+        assert!(!snapshots.is_empty());
         let mut rungs = Vec::new();
         let mut observe = |_: &Row| {};
         let mut watch = Watch::new(&mut observe);
@@ -413,6 +415,7 @@ mod tests {
         let numbers: Vec<u64> = whole.history.iter().map(|row| row.iteration).collect();
         assert_eq!(numbers, [1, 2, 3, 4, 5]);
         assert!(whole.best.evaluation.cost < cost);
+        assert_eq!(whole.snapshots, snapshots);
         let [rung] = rungs.as_slice() else {
             panic!("{rungs:?}");
         };

@@ -454,4 +454,22 @@ mod tests {
             assert_eq!(l_curve(&path(places)), Some(corner));
         }
     }
+
+    /// Two arcs: one of radius 3 by chords of 40 degrees, then one of radius 1 by chords of 10 degrees. The
+    /// turns from chord to chord are sharper on the first, and the second has the larger curvature.
+    #[test]
+    fn the_corner_is_that_of_curvature_however_dense_the_points() {
+        let chord = |radius: f64, degrees: f64| 2.0 * radius * (0.5 * degrees).to_radians().sin();
+        let wide = [160.0, 120.0].map(|heading| (heading, chord(3.0, 40.0)));
+        let narrow = [95.0, 85.0, 75.0, 65.0].map(|heading| (heading, chord(1.0, 10.0)));
+        let mut at = [0.0, 0.0];
+        let steps = wide.into_iter().chain(narrow).map(|(heading, length)| {
+            let (sine, cosine) = f64::to_radians(heading).sin_cos();
+            at = [at[0] + length * cosine, at[1] + length * sine];
+            at
+        });
+        let places: Vec<_> = std::iter::once([0.0, 0.0]).chain(steps).collect();
+        let corner = l_curve(&path(places)).expect("a corner");
+        assert!((3..=5).contains(&corner), "{corner}");
+    }
 }
