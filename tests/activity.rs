@@ -7,7 +7,7 @@ use kmcfit::dynamics::{Device, Method};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit::objective::GradientKind;
 use kmcfit::problem::Problem;
-use kmcfit::solvers::{FitSettings, Initial, Solver, Stopping, active_constraints, fit};
+use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, active_constraints, fit};
 
 const NODES: usize = 101;
 
@@ -104,20 +104,136 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     );
     let mut tight = RowGroup::new("-2 c >= -0.8");
     tight.push([(0, -2.0)], [-0.8, f64::INFINITY], [0.0, common::DURATION]);
-    problem.constraints.groups = vec![wide, tight];
-    let start = problem.functions.start();
-    let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
-    assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
-    let active = active_constraints(&problem, &found.best);
-    let [bound] = active.as_slice() else {
+    for groups in [[wide.clone(), tight.clone()], [tight, wide]] {
+        problem.constraints.groups = groups.to_vec();
+        let start = problem.functions.start();
+        let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
+        assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
+        let active = active_constraints(&problem, &found.best);
+        let [bound] = active.as_slice() else {
+            panic!("{active:?}");
+        };
+        assert_eq!(bound.name, "-2 c >= -0.8");
+        assert!(!bound.pushed.is_empty(), "{bound:?}");
+        let expected = 0.5 * found.best.gradient.euclidean[0].abs();
+        // Exact but for the distance of the parameter from its bound.
+        assert!(
+            (bound.multiplier / expected - 1.0).abs() < 1e-10,
+            "{bound:?} {expected}"
+        );
+    }
+}
+
+/// m = 1 known, c = 0.8 and k = 1 sought, their sum at most `cap`.
+fn with_sum_below(cap: f64) -> Problem {
+    let mut problem = capped(0.2);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Damping, 0.4, NODES),
+        CoefficientFunction::constant(Quantity::Stiffness, 0.4, NODES),
+    ];
+    problem.functions = Functions::new(list, NODES, problem.oscillator.grid.step()).unwrap();
+    let mut group = RowGroup::new("sum");
+    let times = [0.0, common::DURATION];
+    group.push([(0, 1.0), (1, 1.0)], [f64::NEG_INFINITY, cap], times);
+    problem.constraints = Default::default();
+    problem.constraints.groups = vec![group];
+    problem
+}
+
+/// The multiplier is what the least J loses per unit by which the bound gives way.
+#[test]
+fn a_bound_on_a_sum_is_reported_with_its_multiplier() {
+    let best = |cap: f64| {
+        let problem = with_sum_below(cap);
+        let start = problem.functions.start();
+        let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
+        (problem, found.best)
+    };
+    let (problem, found) = best(1.5);
+    let active = active_constraints(&problem, &found);
+    let [sum] = active.as_slice() else {
         panic!("{active:?}");
     };
-    assert_eq!(bound.name, "-2 c >= -0.8");
-    assert!(!bound.pushed.is_empty(), "{bound:?}");
-    let expected = 0.5 * found.best.gradient.euclidean[0].abs();
-    // Exact but for the distance of the parameter from its bound.
+    assert!(!sum.pushed.is_empty(), "{sum:?}");
+    let cost = |cap: f64| best(cap).1.evaluation.cost;
+    let h = 1e-3;
+    let expected = (cost(1.5 - h) - cost(1.5 + h)) / (2.0 * h);
+    // Central differences: h^2.
     assert!(
-        (bound.multiplier / expected - 1.0).abs() < 1e-10,
-        "{bound:?} {expected}"
+        (sum.multiplier / expected - 1.0).abs() < 1e-4,
+        "{sum:?} {expected}"
     );
+}
+
+/// [`capped`] with noise, and with m, c and k times `unit`: the motions are the same.
+fn capped_in_units(unit: f64, cap: f64) -> Problem {
+    let mut problem = capped(cap);
+    let observed = problem.experiments[0].channels[0].observed().to_vec();
+    let observed = common::synthetic::with_noise(&observed, 0.5, 3);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![unit; NODES]),
+        CoefficientFunction::constant(Quantity::Damping, 0.1 * unit, NODES),
+        CoefficientFunction::fixed(Quantity::Stiffness, vec![unit; NODES]),
+    ];
+    problem = common::problem_of(problem.oscillator, list, observed, None);
+    let statement = Statement::DampingRatio { max: cap };
+    let built = statement.build(&problem.oscillator.grid, &problem.functions);
+    problem.constraints = built.unwrap();
+    problem
+}
+
+/// A push counts if giving way by one per cent would lower J by more than a millionth, to first order.
+/// The bound m + k gives way by one per cent where c = zeta (m + k) does.
+#[test]
+fn whether_a_push_counts_is_no_matter_of_units() {
+    let best = |unit: f64, cap: f64| {
+        let problem = capped_in_units(unit, cap);
+        let start = problem.functions.start();
+        let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
+        (problem, found.best)
+    };
+    let (free, at) = best(1.0, 10.0);
+    let (c, cost) = (at.parameters[0], at.evaluation.cost);
+    let slope_at = |c: f64| free.euclidean_gradient(&[c], &free.evaluate(&[c]).unwrap())[0];
+    let h = 1e-3;
+    let bend = (slope_at(c + h) - slope_at(c - h)) / (2.0 * h);
+    for (share, counts) in [(20.0, true), (0.05, false)] {
+        // So far below the best c the slope is this share of the least that counts.
+        let distance = share * 1e-6 * cost / (0.01 * c * bend);
+        assert!(distance < 0.05 * c, "{distance}");
+        for unit in [1e-3, 1.0, 1e3] {
+            let (problem, found) = best(unit, 0.5 * (c - distance));
+            let active = active_constraints(&problem, &found);
+            let [cap] = active.as_slice() else {
+                panic!("{active:?}");
+            };
+            assert_eq!(!cap.pushed.is_empty(), counts, "{share} {unit} {cap:?}");
+        }
+    }
+}
+
+/// Where the bound stops the step altogether, the start is the minimum.
+#[test]
+fn a_start_that_is_pressed_against_its_bound_is_the_minimum() {
+    let mut problem = capped(0.2);
+    let mut group = RowGroup::new("c <= 0.1");
+    let times = [0.0, common::DURATION];
+    group.push([(0, 1.0)], [f64::NEG_INFINITY, 0.1], times);
+    problem.constraints = Default::default();
+    problem.constraints.groups = vec![group];
+    let settings = FitSettings {
+        solver: Solver::ProjectedGradient,
+        ..settings()
+    };
+    let start = problem.functions.start();
+    let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
+    assert_eq!(
+        found.outcome.status,
+        Status::Converged,
+        "{:?}",
+        found.outcome
+    );
+    assert_eq!(found.best.parameters, [0.1]);
+    assert!(found.best.gradient.euclidean[0] < 0.0);
 }

@@ -420,3 +420,28 @@ proptest! {
 fn index_of_prior(problem: &Problem) -> usize {
     problem.functions.scalar_range().start + 1
 }
+
+/// The motions are far apart, so that the difference of two rounded costs is exact enough.
+#[test]
+fn the_difference_of_costs_is_that_of_both_costs() {
+    let grid = Grid::new(0.0, 1.0, 9).unwrap();
+    let observed: Vec<f64> = (0..9).map(|i| (1.3 * f64::from(i)).sin()).collect();
+    let [from, to] = [0.7, 2.9].map(|w| -> Vec<f64> {
+        let off = |(i, y): (usize, &f64)| y + (w * i as f64).cos();
+        observed.iter().enumerate().map(off).collect()
+    });
+    let sigmas: Vec<f64> = (0..9).map(|i| 0.2 + 0.05 * f64::from(i)).collect();
+    for weighting in [Weighting::Sigma(0.3), Weighting::Sigmas(sigmas)] {
+        for loss in LOSSES {
+            let kind = ChannelKind::Displacement;
+            let readings = observed.clone();
+            let channel = Channel::new(kind, grid.times(), readings, weighting.clone(), &grid, 9);
+            let channel = channel.unwrap().with_loss(loss);
+            let expected = channel.cost(&to) - channel.cost(&from);
+            let found = channel.cost_difference(&from, &to);
+            let size = channel.cost(&to) + channel.cost(&from);
+            assert!(expected.abs() > 1e-3 * size);
+            assert!((found - expected).abs() < 1e-13 * size, "{loss:?}: {found}");
+        }
+    }
+}

@@ -6,7 +6,8 @@ mod common;
 use common::synthetic::Truth;
 use kmcfit::constraints::RowGroup;
 use kmcfit::dynamics::{ChannelKind, Device, Excitation, Method, Term};
-use kmcfit::functions::{CoefficientFunction, Quantity};
+use kmcfit::functions::basis::uniform_knots;
+use kmcfit::functions::{Basis, CoefficientFunction, Penalty, Quantity};
 use kmcfit::objective::{Channel, Weighting};
 use kmcfit::problem::Problem;
 use kmcfit::solvers::equation_error;
@@ -144,4 +145,48 @@ fn irregular_velocities_are_integrated() {
     // The damping is known, so the scale is: to the few per cent of a start.
     let ratio = found[1] / found[0];
     assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
+}
+
+/// Mass, stiffness and readings in other units, and the penalty with them: the readings count as they did,
+/// so the start is the same but for the unit.
+#[test]
+fn the_start_knows_no_unit_of_mass_or_length() {
+    let plain = problem(Some(0.0), false);
+    let observed = plain.experiments[0].channels[0].observed().to_vec();
+    let observed = common::synthetic::with_noise(&observed, 0.05, 4);
+    let start = |unit: f64, length: f64, weight: f64| -> Vec<f64> {
+        let basis = Basis::PiecewiseLinear {
+            knots: uniform_knots(&plain.oscillator.grid, 6),
+        };
+        let rows = basis.roughness(&plain.oscillator.grid, 1);
+        let stiffness = vec![unit; 6];
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![unit; NODES]),
+            CoefficientFunction::fixed(Quantity::Damping, vec![0.0; NODES]),
+            CoefficientFunction::free(
+                Quantity::Stiffness,
+                basis,
+                &plain.oscillator.grid,
+                stiffness,
+            ),
+        ];
+        let observed = observed.iter().map(|y| y * length).collect();
+        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        let weight = weight * (length / unit).powi(2);
+        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        let found = equation_error(&problem, &problem.functions.start()).unwrap();
+        found.iter().map(|k| k / unit).collect()
+    };
+    let most = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        pairs.fold(0.0, f64::max)
+    };
+    let smoothed = start(1.0, 1.0, 1e2);
+    // The penalty has its part in it.
+    let free = start(1.0, 1.0, 1e-6);
+    assert!(most(&smoothed, &free) > 1e-3, "{smoothed:?} {free:?}");
+    for (unit, length) in [(1e-3, 1.0), (1e3, 1.0), (1.0, 1e-3), (1.0, 1e3)] {
+        let other = start(unit, length, 1e2);
+        assert!(most(&other, &smoothed) < 1e-6, "{other:?} {smoothed:?}");
+    }
 }

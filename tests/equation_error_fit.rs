@@ -607,3 +607,76 @@ fn model_files() {
       expected: readings from which displacement, velocity and acceleration follow
     ");
 }
+
+/// y = cos t solves y'' + y = 0, so with k = 1.5 the error is 0.5 cos t: the cost at the start is the
+/// integral of its square over all readings but the two at each end, where no differences are known.
+#[test]
+fn the_cost_is_the_integral_of_the_squared_error() {
+    let duration = 20.0;
+    for stride in [1, 4] {
+        let nodes = 100 * stride + 1;
+        let oscillator = Oscillator {
+            grid: Grid::new(0.0, duration, nodes).unwrap(),
+            ..oscillator()
+        };
+        let grid = oscillator.grid;
+        let spacing = duration / 100.0;
+        let observed: Vec<f64> = (0..=100).map(|i| (spacing * f64::from(i)).cos()).collect();
+        let weighting = Weighting::Integral { spacing };
+        let channel = Channel::displacement_at_nodes(observed, stride, weighting, &grid);
+        let initial = State {
+            displacement: 1.0,
+            velocity: 0.0,
+        };
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
+            CoefficientFunction::fixed(Quantity::Damping, vec![0.0; nodes]),
+            CoefficientFunction::constant(Quantity::Stiffness, 1.5, nodes),
+        ];
+        let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
+        let found = run(&problem_of(oscillator, list, experiment));
+        // Each time stands for one spacing about it.
+        let (from, to) = (1.5 * spacing, duration - 1.5 * spacing);
+        let integral = |t: f64| 0.25 * (0.5 * t + 0.25 * (2.0 * t).sin());
+        let expected = integral(to) - integral(from);
+        assert!(
+            (found.initial_cost / expected - 1.0).abs() < 0.01,
+            "{stride}: {} {expected}",
+            found.initial_cost
+        );
+        close(&found.best.parameters, &[1.0], 1e-3);
+    }
+}
+
+/// The device swings with sqrt(k/m) = 12.2 rad/s. Where a force is known, two periods are left out at
+/// either end; without one, only one reading is.
+#[test]
+fn two_periods_are_left_out_beside_a_known_force() {
+    let excitation = Excitation {
+        force: Some(random_function(&oscillator().grid, 1)),
+        base: None,
+    };
+    let mut problem = driven(ChannelKind::Acceleration, excitation, None);
+    let left_out = |problem: &Problem| {
+        let found = run(problem);
+        let predicted = &found.best.evaluation.predictions[0][0];
+        let residuals: Vec<f64> = problem.experiments[0].channels[0]
+            .residuals(predicted)
+            .collect();
+        // What is left out stands for itself.
+        let zeros = |r: &mut dyn Iterator<Item = &f64>| r.take_while(|r| **r == 0.0).count();
+        [
+            zeros(&mut residuals.iter()),
+            zeros(&mut residuals.iter().rev()),
+        ]
+    };
+    let period = TAU / (300.0_f64 / 2.0).sqrt();
+    let expected = 2.0 * period / problem.oscillator.grid.step();
+    for count in left_out(&problem) {
+        // The largest line of the spectrum is within the width of the resonance, 6 %.
+        let share = count as f64 / expected;
+        assert!((0.9..1.1).contains(&share), "{count} {expected}");
+    }
+    problem.experiments[0].excitation = None;
+    assert_eq!(left_out(&problem), [1, 1]);
+}

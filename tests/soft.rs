@@ -139,3 +139,27 @@ fn the_gradient_of_the_price_is_its_derivative() {
         assert!((found - 0.25 - slope).abs() < 1e-10, "{j}: {found} {slope}");
     }
 }
+
+/// `2 m >= 1.4` breaks by twice as much as `m >= 0.7`, so at a quarter of the price it is the same
+/// constraint, on every step of the way.
+#[test]
+fn a_row_in_other_units_is_the_same_at_its_price() {
+    let found = |factor: f64| {
+        let mut group = RowGroup::new("mass >= 0.7");
+        for j in 0..6 {
+            let lower = 0.7 * factor;
+            group.push([(j, factor)], [lower, f64::INFINITY], [0.0, 0.0]);
+        }
+        group.soft = Some(1e2 / (factor * factor));
+        let mut problem = problem();
+        problem.soft.push(group);
+        run(&problem)
+    };
+    // Powers of two, so that all is the same but for the exponents.
+    let plain = found(1.0);
+    for factor in [4.0, 0.25] {
+        let other = found(factor);
+        assert_eq!(other.best.parameters, plain.best.parameters, "{factor}");
+        assert_eq!(other.history.len(), plain.history.len(), "{factor}");
+    }
+}

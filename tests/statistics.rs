@@ -3,11 +3,13 @@
 
 mod common;
 
-use common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
+use common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
 use kmcfit::dynamics::{ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term};
-use kmcfit::functions::{CoefficientFunction, Functions, Quantity, Scalar, Value};
+use kmcfit::functions::basis::uniform_knots;
+use kmcfit::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar, Value};
 use kmcfit::objective::{Channel, Loss, Sensor, Weighting};
 use kmcfit::problem::{Experiment, Problem};
+use kmcfit::solvers::fit_with_noise;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -261,4 +263,240 @@ fn robust_losses_stay_close_where_least_squares_does_not() {
     // of Student's t about the same: 1.4 is three of its standard errors more.
     assert!(huber < 1.4, "{huber}");
     assert!(student < 1.4, "{student}");
+}
+
+/// The covariance by a decomposition of the Jacobian against the inverse of the information.
+#[test]
+fn the_covariance_is_that_of_cramer_and_rao() {
+    let mut setup = Setup::forced(ChannelKind::Acceleration);
+    setup.start[0] = Some(1.1);
+    let problem = setup.problem(setup.clean(), 0.1);
+    let theta = setup.theta();
+    let found = problem.covariance(&problem.evaluate(&theta).unwrap());
+    let found = found.expect("a force gives the mass");
+    let expected = cramer_rao(&problem, &theta);
+    for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+        let size = (expected[(i, i)] * expected[(j, j)]).sqrt();
+        let off = (found[(i, j)] - expected[(i, j)]).abs();
+        assert!(off < 1e-9 * size, "{i} {j}: {found} {expected}");
+    }
+}
+
+/// Where no sigma is given the residuals tell it: by their weighted mean square, with `n - p` below it.
+#[test]
+fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
+    let mut setup = Setup::forced(ChannelKind::Acceleration);
+    setup.start[0] = Some(1.1);
+    let theta = setup.theta();
+    let found = |values: Vec<f64>| {
+        let mut problem = setup.problem(values, 0.1);
+        let channel = problem.experiments[0].channels.remove(0);
+        let weighting = Weighting::Integral {
+            spacing: DURATION / (NODES - 1) as f64,
+        };
+        let channel = channel.with_weighting(weighting);
+        problem.experiments[0].channels.push(channel);
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let covariance = problem.covariance(&evaluation);
+        (problem, evaluation, covariance)
+    };
+    let (problem, evaluation, covariance) = found(with_noise(&setup.clean(), 0.1, 5));
+    let covariance = covariance.expect("residuals");
+    let variance = evaluation.misfit / (NODES - theta.len()) as f64;
+    let expected = cramer_rao(&problem, &theta) * variance;
+    for j in 0..theta.len() {
+        let ratio = covariance[(j, j)] / expected[(j, j)];
+        assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
+    }
+    // Readings that leave no residual do not tell it.
+    let exact = evaluation.predictions[0][0].clone();
+    assert!(found(exact).2.is_none());
+}
+
+/// Stiffnesses at knots, over the whole of a record and over its first half.
+#[test]
+fn a_covariance_is_formed_of_up_to_64_parameters() {
+    let setup = Setup::free(ChannelKind::Displacement);
+    let covariance = |knots: usize, readings: usize| {
+        let mut problem = setup.problem(setup.clean(), 0.1);
+        let grid = problem.oscillator.grid;
+        let basis = Basis::PiecewiseLinear {
+            knots: uniform_knots(&grid, knots),
+        };
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+            CoefficientFunction::fixed(Quantity::Damping, vec![0.2; NODES]),
+            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, vec![4.0; knots]),
+        ];
+        problem.functions = Functions::new(list, NODES, grid.step()).unwrap();
+        let times = grid.times()[..readings].to_vec();
+        let values = setup.clean()[..readings].to_vec();
+        let weighting = Weighting::Sigma(0.1);
+        let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
+        problem.experiments[0].channels = vec![channel.unwrap()];
+        problem.covariance(&problem.evaluate(&problem.start()).unwrap())
+    };
+    // The stiffness at the last knot moves the last reading by next to nothing: one knot fewer is seen.
+    assert!(covariance(63, NODES).is_some());
+    assert!(covariance(64, NODES).is_some());
+    assert!(covariance(65, NODES).is_none());
+    assert!(covariance(20, NODES / 2).is_none());
+}
+
+/// A free motion tells the ratios to the mass alone; and as many readings as functions leave nothing to
+/// judge these by.
+#[test]
+fn what_the_readings_do_not_see_has_no_covariance() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    let covariance = |setup: &Setup, readings: usize| {
+        let mut problem = setup.problem(setup.clean(), 0.1);
+        let grid = problem.oscillator.grid;
+        let times = grid.times()[50..50 + readings].to_vec();
+        let values = setup.clean()[50..50 + readings].to_vec();
+        let weighting = Weighting::Sigma(0.1);
+        let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
+        problem.experiments[0].channels = vec![channel.unwrap()];
+        problem.covariance(&problem.evaluate(&setup.theta()).unwrap())
+    };
+    assert!(covariance(&setup, 3).is_some());
+    assert!(covariance(&setup, 2).is_none());
+    setup.start[0] = Some(1.1);
+    assert!(covariance(&setup, 100).is_none());
+}
+
+/// Readings of a known motion by a sensor whose offset is sought, with an unknown sigma.
+fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
+    let mut problem = setup.problem(values, 1.0);
+    let offset = Scalar {
+        name: "offset".into(),
+        unit: "m".into(),
+        start: 0.0,
+        size: 1.0,
+        prior: None,
+    };
+    problem.functions = problem.functions.with_scalars(vec![offset]);
+    let channel = problem.experiments[0].channels.remove(0);
+    let sensor = Sensor {
+        offset: Value::Sought(0),
+        ..Sensor::default()
+    };
+    let weighting = Weighting::Estimated { sigma: 1.0 };
+    let channel = channel.with_sensor(sensor).with_weighting(weighting);
+    problem.experiments[0].channels.push(channel);
+    problem
+}
+
+fn sigma_of(problem: &Problem) -> f64 {
+    let channel = &problem.experiments[0].channels[0];
+    channel.weighting().sigma(0).expect("a sigma")
+}
+
+/// The offset of readings of a known motion is their mean distance from it, and the sigma their sample
+/// standard deviation, with `n - 1` below the squares.
+#[test]
+fn the_sigma_is_the_sample_standard_deviation() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start = vec![None; 3];
+    let clean = setup.clean();
+    let readings: Vec<f64> = (with_noise(&clean, 0.05, 9).iter())
+        .map(|x| x + 0.3)
+        .collect();
+    let problem = with_an_offset(readings.clone(), &setup);
+    let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
+    let (with_sigma, fit) = found.unwrap();
+    let n = NODES as f64;
+    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c);
+    let mean = residuals.clone().sum::<f64>() / n;
+    let squares: f64 = residuals.map(|r| (r - mean).powi(2)).sum();
+    let expected = (squares / (n - 1.0)).sqrt();
+    let sigma = sigma_of(&with_sigma);
+    // The readings are simulated twice, to rounding.
+    assert!((fit.best.parameters[0] - mean).abs() < 1e-9);
+    assert!((sigma / expected - 1.0).abs() < 1e-9, "{sigma} {expected}");
+    // The sigma changes nothing about the mean: it is found in the first round and confirmed by the
+    // second. Twenty rounds would take twenty motions at least; the first fit takes two, and each of the
+    // two rounds one at least.
+    assert!((4..20).contains(&fit.counts.forward), "{:?}", fit.counts);
+}
+
+/// Two sensors of one motion with the same offset, one ten times as noisy: their sigmas are those about the
+/// offset, and the offset is the mean with the weights of these sigmas.
+#[test]
+fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start = vec![None; 3];
+    let clean = setup.clean();
+    let noisy = [(0.02, 11), (0.2, 12)].map(|(sigma, seed)| with_noise(&clean, sigma, seed));
+    let mut problem = with_an_offset(noisy[0].clone(), &setup);
+    let other = with_an_offset(noisy[1].clone(), &setup);
+    let other = other.experiments[0].channels[0].clone();
+    problem.experiments[0].channels.push(other);
+    let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
+    let (with_sigmas, fit) = found.unwrap();
+
+    let n = NODES as f64;
+    let residuals = noisy.each_ref().map(|readings| -> Vec<f64> {
+        let pairs = readings.iter().zip(&clean);
+        pairs.map(|(r, c)| r - c).collect()
+    });
+    let means = residuals.each_ref().map(|r| r.iter().sum::<f64>() / n);
+    let mut variances = [1.0; 2];
+    let mut offset = 0.0;
+    for _ in 0..100 {
+        let [one, two] = variances;
+        offset = (means[0] / one + means[1] / two) / (1.0 / one + 1.0 / two);
+        // One parameter of 2 n readings.
+        variances = residuals.each_ref().map(|r| {
+            let squares = r.iter().map(|r| (r - offset).powi(2)).sum::<f64>();
+            squares / n / (1.0 - 0.5 / n)
+        });
+    }
+    assert!((fit.best.parameters[0] - offset).abs() < 1e-6 * offset.abs());
+    let channels = with_sigmas.experiments[0].channels.iter();
+    for (channel, variance) in channels.zip(variances) {
+        let sigma = channel.weighting().sigma(0).unwrap();
+        // Where the sigmas are said to rest.
+        assert!((sigma / variance.sqrt() - 1.0).abs() < 1e-6, "{sigma}");
+    }
+    assert!(!fit.rungs.is_empty() && !fit.history.is_empty() && !fit.snapshots.is_empty());
+    let cost = with_sigmas.evaluate(&problem.start()).unwrap().cost;
+    assert_eq!(fit.initial_cost, cost);
+}
+
+/// With a robust loss the sigma is told by the median of the residuals, half of which are below 0.6745 sigma
+/// where they are Gaussian.
+#[test]
+fn a_robust_sigma_is_that_of_the_median() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start = vec![None; 3];
+    setup.loss = Loss::Huber { threshold: 1.345 };
+    let clean = setup.clean();
+    let readings = with_outliers(&clean, 0.05, 3);
+    let problem = with_an_offset(readings.clone(), &setup);
+    let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
+    let (with_sigma, fit) = found.unwrap();
+    let offset = fit.best.parameters[0];
+    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c - offset);
+    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    sizes.sort_by(f64::total_cmp);
+    let n = NODES as f64;
+    let expected = sizes[NODES / 2] / 0.674_49 / (1.0 - 1.0 / n).sqrt();
+    let sigma = sigma_of(&with_sigma);
+    // The quantile is known to five digits.
+    assert!((sigma / expected - 1.0).abs() < 1e-4, "{sigma} {expected}");
+}
+
+/// Readings without noise: their sigma is the last digit of a reading, and not zero.
+#[test]
+fn readings_that_are_fitted_exactly_have_a_sigma() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start = vec![None; 3];
+    let silent = with_an_offset(vec![0.0; NODES], &setup);
+    let exact = silent.evaluate(&silent.start()).unwrap().predictions[0][0].clone();
+    let problem = with_an_offset(exact.clone(), &setup);
+    let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
+    let (with_sigma, fit) = found.unwrap();
+    assert_eq!(fit.best.evaluation.cost, 0.0);
+    let sigma = sigma_of(&with_sigma) / (f64::EPSILON * rms(&exact));
+    assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
 }

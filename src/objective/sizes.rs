@@ -140,3 +140,95 @@ pub(crate) fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f
     };
     [displacement, displacement * omega]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+
+    /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it, by a sensor with
+    /// an offset.
+    #[test]
+    fn the_state_of_a_sine_has_its_size_whatever_was_read() {
+        let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
+        let readings = |size: f64, phase: f64| -> Vec<f64> {
+            let at = |i: usize| size * (5.0 + (omega * spacing * i as f64 + phase).sin());
+            (0..400).map(at).collect()
+        };
+        let quarter = TAU / 4.0;
+        let cases = [
+            (ChannelKind::Displacement, amplitude, 0.0),
+            (ChannelKind::Velocity, amplitude * omega, quarter),
+            (
+                ChannelKind::Acceleration,
+                amplitude * omega * omega,
+                2.0 * quarter,
+            ),
+        ];
+        let rms = amplitude / 2f64.sqrt();
+        for (kind, size, phase) in cases {
+            let [displacement, velocity] = state_sizes(kind, &readings(size, phase), spacing);
+            // The dominant frequency is known to a small part of its distance to the next.
+            assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
+            assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
+            assert_eq!(state_sizes(kind, &[2.0; 400], spacing), [0.0; 2]);
+        }
+    }
+
+    /// One period of `y = size cos(w t)` with m = 1 and k = w^2, a cubic stiffness of next to nothing, and
+    /// another such motion of three times the size, read or not.
+    fn swinging(size: f64, other_is_read: bool) -> Problem {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let record = |size: f64| {
+            let readings: Vec<f64> = times
+                .iter()
+                .map(|t| size * (TAU * t / 10.0).cos())
+                .collect();
+            Record::new("swinging")
+                .from_state(size, 0.0)
+                .displacement(&times, &readings)
+        };
+        let stiffness = (TAU / 10.0).powi(2);
+        let parts = [1.0, 0.0, stiffness].map(Part::fixed);
+        let mut problem = Builder::new(parts)
+            .cubic_stiffness(Part::constant(1e-9))
+            .record(record(size))
+            .record(record(3.0 * size))
+            .build()
+            .unwrap();
+        if !other_is_read {
+            problem.experiments[1].channels.clear();
+        }
+        problem
+    }
+
+    fn sizes(problem: &Problem) -> Vec<f64> {
+        problem.natural_sizes(&problem.evaluate(&problem.start()).unwrap())
+    }
+
+    /// A force as large as the mass's, in the mean of squares: that of a damping is `m w`, that of a
+    /// cubic stiffness `m w^2 / y^2` with `mean y^6 / mean y^2 = 5/8 y^4`.
+    #[test]
+    fn the_natural_size_makes_a_force_as_large_as_that_of_the_mass() {
+        let omega = TAU / 10.0;
+        // One motion of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
+        // sixth powers.
+        for (read, six_over_two) in [(false, 1.0), (true, 73.0)] {
+            let found = sizes(&swinging(0.5, read));
+            let cubic = omega * omega / (0.625f64 * 0.0625 * six_over_two).sqrt();
+            let expected = [1.0, omega, omega * omega, cubic];
+            for (found, expected) in found.iter().zip(expected) {
+                // Sums over nodes and differences of second order.
+                assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+            }
+        }
+    }
+
+    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
+    /// then the size of its own values, and not an infinite one.
+    #[test]
+    fn a_term_that_sees_nothing_has_its_own_size() {
+        assert_eq!(sizes(&swinging(1e-60, true))[3], 1e-9);
+    }
+}

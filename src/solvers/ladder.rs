@@ -385,3 +385,51 @@ fn from_data(problem: &Problem, start: &[f64], clock: &mut Duration) -> Vec<f64>
     });
     found.unwrap_or_else(|| start.to_vec())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+    use crate::solvers::{Stopping, fit_from};
+
+    /// Iterations, work and time of both parts, and the numbers of the iterations one after the other.
+    #[test]
+    fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("free decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let parts = [Part::fixed(1.0), Part::constant(0.5), Part::constant(2.0)];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let settings = |iterations| FitSettings {
+            solver: Solver::SteepestDescent,
+            stopping: Stopping::exactly(iterations),
+            ..FitSettings::default()
+        };
+        let mut first = fit_from(&problem, &problem.start(), &settings(2)).unwrap();
+        let hours = Duration::from_secs(36_000);
+        first.timings.start = hours;
+        first.elapsed = hours;
+        let (before, cost) = (first.counts, first.best.evaluation.cost);
+        let snapshots = first.snapshots.clone();
+        assert!(!snapshots.is_empty());
+        let mut rungs = Vec::new();
+        let mut observe = |_: &Row| {};
+        let mut watch = Watch::new(&mut observe);
+        let whole = gone_on(&problem, first, &settings(5), None, &mut rungs, &mut watch).unwrap();
+        let numbers: Vec<u64> = whole.history.iter().map(|row| row.iteration).collect();
+        assert_eq!(numbers, [1, 2, 3, 4, 5]);
+        assert!(whole.best.evaluation.cost < cost);
+        assert_eq!(whole.snapshots, snapshots);
+        let [rung] = rungs.as_slice() else {
+            panic!("{rungs:?}");
+        };
+        assert_eq!((rung.iterations, rung.initial_cost), (3, cost));
+        // Every iteration of steepest descent has one gradient at least.
+        assert!(whole.counts.adjoint >= before.adjoint + 3);
+        assert!(whole.timings.start >= hours && whole.timings.adjoint > Duration::ZERO);
+        assert!(whole.elapsed > hours);
+    }
+}

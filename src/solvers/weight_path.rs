@@ -406,3 +406,70 @@ fn remark(
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a path at these natural logarithms of misfit and roughness.
+    fn path(places: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
+        let point = |[misfit, roughness]: [f64; 2]| PathPoint {
+            weight: 1.0,
+            iterations: 1,
+            misfit: misfit.exp(),
+            roughness: roughness.exp(),
+            degrees_of_freedom: 1.0,
+            gcv: 1.0,
+            parameters: Vec::new(),
+        };
+        places.into_iter().map(point).collect()
+    }
+
+    /// As the weight falls, first the misfit falls and then the roughness rises.
+    #[test]
+    fn the_corner_is_where_roughness_begins_to_rise() {
+        for corner in 1..8 {
+            let place = |i: usize| {
+                let [left, right] = [corner.max(i) - i, corner.max(i) - corner];
+                [3.0 + 2.0 * left as f64, 2.0 * right as f64 - 5.0]
+            };
+            assert_eq!(l_curve(&path((0..9).map(place))), Some(corner));
+            // The other way round it turns to the other side, and has no corner.
+            assert_eq!(l_curve(&path((0..9).rev().map(place))), None);
+        }
+    }
+
+    /// From falling misfit to rising roughness in two turns, at the third point and at the fifth.
+    #[test]
+    fn the_sharper_of_two_turns_is_the_corner() {
+        for (between, corner) in [(160f64, 4), (110.0, 2)] {
+            let headings = [180.0, 180.0, between, between, 90.0, 90.0];
+            let mut at = [1.0, -2.0];
+            let steps = headings.map(|degrees| {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                at = [at[0] + cosine, at[1] + sine];
+                at
+            });
+            let places = std::iter::once([1.0, -2.0]).chain(steps);
+            assert_eq!(l_curve(&path(places)), Some(corner));
+        }
+    }
+
+    /// Two arcs: one of radius 3 by chords of 40 degrees, then one of radius 1 by chords of 10 degrees. The
+    /// turns from chord to chord are sharper on the first, and the second has the larger curvature.
+    #[test]
+    fn the_corner_is_that_of_curvature_however_dense_the_points() {
+        let chord = |radius: f64, degrees: f64| 2.0 * radius * (0.5 * degrees).to_radians().sin();
+        let wide = [160.0, 120.0].map(|heading| (heading, chord(3.0, 40.0)));
+        let narrow = [95.0, 85.0, 75.0, 65.0].map(|heading| (heading, chord(1.0, 10.0)));
+        let mut at = [0.0, 0.0];
+        let steps = wide.into_iter().chain(narrow).map(|(heading, length)| {
+            let (sine, cosine) = f64::to_radians(heading).sin_cos();
+            at = [at[0] + length * cosine, at[1] + length * sine];
+            at
+        });
+        let places: Vec<_> = std::iter::once([0.0, 0.0]).chain(steps).collect();
+        let corner = l_curve(&path(places)).expect("a corner");
+        assert!((3..=5).contains(&corner), "{corner}");
+    }
+}

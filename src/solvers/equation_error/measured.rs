@@ -409,3 +409,99 @@ impl Measured {
         squares.sum::<f64>() / n.max(1) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP: f64 = 0.25;
+    const NODES: usize = 24;
+
+    fn grid() -> Grid {
+        Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
+    }
+
+    /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
+    fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
+        let between = |step| Place {
+            step,
+            fraction: 0.5,
+        };
+        let node = |i| Place::node(i, NODES);
+        let places = vec![node(3), node(5), between(6), between(9), node(12), node(18)];
+        let time = |p: &Place| (p.step as f64 + p.fraction) * STEP;
+        let all: Vec<[f64; 3]> = places.iter().map(|p| state(time(p))).collect();
+        let part = |j: usize| all.iter().map(|state| state[j]).collect::<Vec<f64>>();
+        Measured {
+            first: 0,
+            y: part(0),
+            v: part(1),
+            a: part(2),
+            force: vec![0.0; all.len()],
+            base: vec![0.0; all.len()],
+            weight: STEP,
+            frequency,
+            corner: None,
+            places,
+        }
+    }
+
+    /// The largest distance of a motion from what `state` tells of displacement and velocity.
+    fn distance(
+        motion: &Trajectory,
+        nodes: impl Iterator<Item = usize>,
+        state: impl Fn(f64) -> [f64; 3],
+    ) -> f64 {
+        let one = |i: usize| {
+            let [y, v, _] = state(i as f64 * STEP);
+            let [of_y, of_v] = [motion.displacement[i] - y, motion.velocity[i] - v];
+            of_y.abs() + of_v.abs()
+        };
+        // What is no number is the largest.
+        nodes.map(one).max_by(f64::total_cmp).unwrap()
+    }
+
+    /// Polynomials of degree 3 through values and slopes give back one, at the places and between.
+    #[test]
+    fn a_cubic_motion_is_exact_between_its_readings() {
+        let cubic = |t: f64| {
+            [
+                0.3 + t - 2.0 * t * t + 0.7 * t * t * t,
+                1.0 - 4.0 * t + 2.1 * t * t,
+                4.2 * t - 4.0,
+            ]
+        };
+        let motion = measured(1.0, cubic).trajectory(&grid(), NODES);
+        let off = distance(&motion, 3..=18, cubic);
+        assert!(off < 1e-12, "{off}");
+    }
+
+    #[test]
+    fn a_harmonic_motion_swings_on_beyond_its_readings() {
+        let w = 1.7;
+        let harmonic = |t: f64| {
+            let (sine, cosine) = (w * t + 0.4).sin_cos();
+            [2.0 * cosine, -2.0 * w * sine, -2.0 * w * w * cosine]
+        };
+        let motion = measured(w, harmonic).trajectory(&grid(), NODES);
+        let off = distance(&motion, (0..=3).chain(18..NODES), harmonic);
+        assert!(off < 1e-12, "{off}");
+    }
+
+    /// Whether times are equally spaced is no matter of how long a second is.
+    #[test]
+    fn equal_spacing_knows_no_unit() {
+        for spacing in [1e-6, 1.0, 1e6] {
+            let times = |off: f64| -> Vec<f64> {
+                let late = |i: usize| if i == 3 { off } else { 0.0 };
+                (0..8)
+                    .map(|i| spacing * (7.0 + i as f64 + late(i)))
+                    .collect()
+            };
+            let found = equal_spacing(&times(0.1 * Place::SAME_TIME)).expect("equal");
+            assert!((found / spacing - 1.0).abs() < 1e-12);
+            assert_eq!(equal_spacing(&times(0.1)), None, "{spacing}");
+        }
+        assert_eq!(equal_spacing(&[1.0]), None);
+    }
+}
