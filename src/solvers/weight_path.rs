@@ -356,7 +356,7 @@ fn l_curve(points: &[PathPoint]) -> Option<usize> {
     let place = |p: &PathPoint| (p.misfit.ln(), p.roughness.ln());
     let curvature = |w: &[PathPoint]| {
         let [(x0, y0), (x1, y1), (x2, y2)] = [place(&w[0]), place(&w[1]), place(&w[2])];
-        // Menger's curvature with the sign of the turn; the corner turns left as the weight falls.
+        // Menger's curvature with the sign of the turn; the corner turns right as the weight falls.
         let cross = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
         let side = |ax: f64, ay: f64, bx: f64, by: f64| (ax - bx).hypot(ay - by);
         let sides = side(x0, y0, x1, y1) * side(x1, y1, x2, y2) * side(x0, y0, x2, y2);
