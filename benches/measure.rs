@@ -102,6 +102,7 @@ fn triad() {
 /// Median times over as many evaluations as take `seconds`, and the memory at the peak of those of
 /// cost and gradient together.
 fn evaluation(nodes: usize, seconds: f64) {
+    refuse_beyond_memory(nodes);
     let problem = common::paper(nodes);
     let theta = problem.start();
     let mut gradient = vec![0.0; theta.len()];
@@ -127,6 +128,24 @@ fn evaluation(nodes: usize, seconds: f64) {
          \"gradient_seconds\": {gradients:.6e}, \"cost\": {cost:.12e}, \"peak_bytes\": {}}}",
         peak.map_or("null".into(), |bytes| bytes.to_string()),
     );
+}
+
+/// Bytes that making a problem of so many nodes, evaluating it and its gradient take at most, per node.
+const BYTES_A_NODE: f64 = 600.0;
+
+/// Ends the program where so many nodes do not fit into what memory is free, if the system says how much that is.
+fn refuse_beyond_memory(nodes: usize) {
+    let Ok(text) = std::fs::read_to_string("/proc/meminfo") else {
+        return;
+    };
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"));
+    let kilobytes = line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
+    let (needed, free) = (BYTES_A_NODE * nodes as f64, kilobytes.map(|k| k * 1024.0));
+    if let Some(free) = free.filter(|free| needed > *free) {
+        let [needed, free] = [needed, free].map(|bytes| bytes * 1e-9);
+        eprintln!("{nodes} nodes take some {needed:.1} GB; {free:.1} GB of memory are free");
+        std::process::exit(2);
+    }
 }
 
 /// Median time of one call over as many as take `seconds`, at least five.
