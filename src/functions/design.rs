@@ -1,5 +1,6 @@
 //! Design matrices: from parameters to values at the nodes.
 
+use crate::lanes::{self, Elementwise};
 use nalgebra_sparse::CsrMatrix;
 
 /// A matrix `B` of shape `nodes x parameters`.
@@ -154,14 +155,16 @@ fn each_row(matrix: &CsrMatrix<f64>, theta: &[f64], count: usize, mut act: impl 
 
 /// The largest size of any of the values.
 pub(crate) fn largest(f: &[f64]) -> f64 {
-    // Four at a time: one maximum would wait for itself.
-    let (fours, rest) = f.as_chunks::<4>();
-    let mut most = [0.0f64; 4];
-    for four in fours {
-        for (most, p) in most.iter_mut().zip(four) {
-            *most = most.max(p.abs());
+    // Many side by side: one maximum would wait for itself.
+    let (parts, rest) = f.as_chunks::<32>();
+    let mut most = [0.0f64; 32];
+    lanes::run(Elementwise(|| {
+        for part in parts {
+            for (most, p) in most.iter_mut().zip(part) {
+                *most = most.max(p.abs());
+            }
         }
-    }
+    }));
     let rest = rest.iter().map(|p| p.abs());
     rest.chain(most).fold(0.0, f64::max)
 }

@@ -1,7 +1,7 @@
 //! How large a change of a function is large.
 
 use super::Evaluation;
-use crate::dynamics::quadrature::curvature;
+use crate::dynamics::quadrature::curvature_into;
 use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
 use crate::functions::largest;
 use crate::problem::{Experiment, Problem};
@@ -77,11 +77,12 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
         displacement: y,
         velocity: v,
     } = motion;
-    let acceleration = curvature(y, step);
+    let mut acceleration = [0.0; PART];
     let mut sums = vec![0.0; terms.len() + 1];
     let mut phi = [[0.0; PART]; MOST_TERMS];
     for from in (0..motion.nodes()).step_by(PART) {
         let range = from..(from + PART).min(motion.nodes());
+        curvature_into(y, step, from, &mut acceleration[..range.len()]);
         let (y, v) = (&y[range.clone()], &v[range.clone()]);
         for (term, phi) in terms.iter().zip(&mut phi) {
             if !matches!(term, Term::Damping | Term::Stiffness) {
@@ -95,7 +96,7 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
             Term::Stiffness => y,
             _ => &phi[..range.len()],
         });
-        let columns: Vec<&[f64]> = std::iter::once(&acceleration[range.clone()])
+        let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
             .chain(seen)
             .collect();
         for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {

@@ -11,7 +11,7 @@ use super::timings::timed;
 use super::{FitSettings, Timings, Watch};
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
-use crate::objective::Evaluation;
+use crate::objective::{Channel, Evaluation};
 use crate::problem::{Drive, Experiment, Problem};
 use crate::threads;
 use std::time::Instant;
@@ -39,15 +39,28 @@ pub(super) struct BetterStart {
     pub evaluation: Evaluation,
 }
 
-/// The beginning of a problem's records, with the same parameters; `None` unless they are long and all functions
-/// constants.
-pub(super) fn beginning(problem: &Problem) -> Option<Problem> {
-    let grid = problem.oscillator.grid;
-    let plain = problem.penalties.is_empty()
+/// Whether the records of a problem are long, all functions constants, and the beginning has readings enough.
+pub(super) fn has_beginning(problem: &Problem) -> bool {
+    let is_constant = |f: &CoefficientFunction| {
+        matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
+    };
+    let within = |channel: &Channel| {
+        let places = channel.places();
+        places.partition_point(|p| p.step < STEPS)
+    };
+    let parameters = problem.parameters();
+    problem.oscillator.grid.nodes() > LONG * STEPS
+        && problem.penalties.is_empty()
         && problem.variations.is_empty()
         && problem.comes_in_pieces()
-        && grid.nodes() > LONG * STEPS;
-    plain.then_some(())?;
+        && problem.functions.iter().all(is_constant)
+        && parameters > 0
+        && problem.channels().map(within).sum::<usize>() >= READINGS * parameters
+}
+
+/// The beginning of a problem's records, with the same parameters.
+fn beginning(problem: &Problem) -> Option<Problem> {
+    let grid = problem.oscillator.grid;
     let grid = Grid::new(grid.start(), grid.step() * STEPS as f64, STEPS + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
@@ -61,8 +74,7 @@ pub(super) fn beginning(problem: &Problem) -> Option<Problem> {
     part.oscillator.grid = grid;
     part.constraints = problem.constraints.clone();
     part.soft.clone_from(&problem.soft);
-    let sought = part.parameters();
-    (sought > 0 && part.reading_count() >= READINGS * sought).then_some(part)
+    Some(part)
 }
 
 /// A constant or known function over the first nodes.
@@ -105,11 +117,10 @@ fn first_steps(experiment: &Experiment) -> Experiment {
     }
 }
 
-/// Fits the beginning `part` from `start` and evaluates the whole problem at what it finds; beside that, where a
+/// Fits the beginning from `start` and evaluates the whole problem at what it finds; beside that, where a
 /// processor is to spare, finds cost and gradient of the whole problem at `start`.
 pub(super) fn begin(
     problem: &Problem,
-    part: &Problem,
     start: &[f64],
     settings: &FitSettings,
     before: &mut Before,
@@ -120,7 +131,8 @@ pub(super) fn begin(
     short.stopping.tolerance = Some(TOLERANCE);
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
     let fit_part = |watch: &mut Watch| {
-        let found = watch.unseen(|watch| search(part, start, &short, None, watch));
+        let part = beginning(problem)?;
+        let found = watch.unseen(|watch| search(&part, start, &short, None, watch));
         let fit = found.ok()?;
         let clock = Instant::now();
         let parameters = fit.best.parameters.clone();

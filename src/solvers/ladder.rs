@@ -7,7 +7,7 @@
 //! functions together, from a motion near the readings.
 
 use super::all_at_once::all_at_once;
-use super::beginning::{BetterStart, begin, beginning, reference};
+use super::beginning::{BetterStart, begin, has_beginning, reference};
 use super::executor::{search, search_evaluated};
 use super::recorder::Reference;
 use super::timings::timed;
@@ -127,18 +127,16 @@ pub fn fit_watched(
     let mut before = Before::default();
     let clock = Instant::now();
     let climbs = settings.solver == Solver::GaussNewton;
-    let from_functions = settings.initial == Initial::Functions;
-    let can_begin = climbs && from_functions && settings.stopping.has_test();
-    let part = can_begin.then(|| beginning(problem)).flatten();
+    let can_begin = climbs && settings.stopping.has_test();
     // To cost and gradient at the start values all rungs are compared; if the first one begins there, it finds out
     // for itself.
-    let (mut reference, begun) = match (part, settings.initial) {
-        (Some(part), _) => {
-            let begun = begin(problem, &part, start, settings, &mut before, watch);
+    let (mut reference, begun) = match settings.initial {
+        Initial::Functions if can_begin && has_beginning(problem) => {
+            let begun = begin(problem, start, settings, &mut before, watch);
             (begun.reference, begun.start)
         }
-        (None, Initial::Functions) => (None, None),
-        (None, Initial::Data) => {
+        Initial::Functions => (None, None),
+        Initial::Data => {
             let (reference, timings) = reference(problem, start, settings);
             before.counts.forward += 1;
             before.counts.adjoint += u64::from(reference.is_some());
