@@ -345,8 +345,8 @@ proptest! {
     }
 }
 
-/// The same with constants and knots in place of one value a node.
-fn on_few_parameters(problem: &Problem) -> Problem {
+/// The same with constants and, if `with_knots`, knots in place of one value a node.
+fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
     let grid = problem.oscillator.grid;
     let knots = Basis::PiecewiseLinear {
         knots: (0..3)
@@ -357,12 +357,14 @@ fn on_few_parameters(problem: &Problem) -> Problem {
         // No term that drives the motion out of bounds.
         let start = nodal.start[0].abs();
         match i % 3 {
-            0 => CoefficientFunction::constant(nodal.quantity, start, grid.nodes()),
-            1 => CoefficientFunction::free(nodal.quantity, knots.clone(), &grid, vec![start; 3]),
-            _ => CoefficientFunction {
+            1 if with_knots => {
+                CoefficientFunction::free(nodal.quantity, knots.clone(), &grid, vec![start; 3])
+            }
+            2 => CoefficientFunction {
                 offset: nodal.start.iter().map(|x| x.abs()).collect(),
                 ..CoefficientFunction::constant(nodal.quantity, start, grid.nodes())
             },
+            _ => CoefficientFunction::constant(nodal.quantity, start, grid.nodes()),
         }
     });
     let functions = Functions::new(list.collect(), grid.nodes(), grid.step()).unwrap();
@@ -382,9 +384,10 @@ proptest! {
         methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],
         nodes in prop_oneof![4usize..14, 60..70usize],
         seed in any::<u64>(),
+        with_knots in any::<bool>(),
     ) {
         let nodal = case(methods, nodes, seed).problem();
-        let problem = on_few_parameters(&nodal);
+        let problem = on_few_parameters(&nodal, with_knots);
         let theta = problem.start();
         let evaluation = problem.evaluate(&theta).unwrap();
         let jacobian = problem.predictions_jacobian(&evaluation);

@@ -156,13 +156,19 @@ impl Oscillator {
         let rhs = self.rhs(device, excitation, trajectory.nodes());
         // Linear free motion of any other kind keeps its order: how far descents along the gradient alone
         // come in so many iterations depends on it.
-        if !rhs.is_linear_and_free()
+        if !self.is_linear_and_free(excitation)
             && rates::forward(rhs, self.method, initial, trajectory)
             && trajectory.ends_finite()
         {
             return Ok(());
         }
         self.forward_into(device, initial, excitation, trajectory)
+    }
+
+    /// Whether the motion is linear in the state and nothing drives it.
+    pub(crate) fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
+        let is_free = || excitation.is_none_or(Excitation::is_zero);
+        self.terms.iter().all(|term| term.is_linear()) && is_free()
     }
 
     pub(super) fn rhs<'a>(

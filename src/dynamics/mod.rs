@@ -34,7 +34,7 @@ pub(crate) use maps::FUNCTIONS;
 pub(crate) use sense_nodes::{Accelerations, Sight};
 pub(crate) use tangents::{Change, Course, Slot, Steady, TILE, TILE_NODES, Tangents};
 
-pub use device::{Device, State};
+pub use device::{Device, Slopes, State};
 pub use excitation::{Excitation, Stepwise};
 pub use forward::{Breakdown, Cause, Oscillator, Trajectory};
 pub use grid::Grid;

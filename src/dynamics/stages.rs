@@ -45,12 +45,6 @@ impl Rhs<'_> {
         }
     }
 
-    /// Whether linear terms alone move the mass.
-    pub fn is_linear_and_free(&self) -> bool {
-        let free = || self.excitation.is_none_or(Excitation::is_zero);
-        self.terms.iter().all(|term| term.is_linear()) && free()
-    }
-
     /// What the mass resists: `y'' + b''` for the acceleration `y'' = a`.
     #[inline(always)]
     pub fn absolute(&self, i: usize, position: Position, a: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::directions::Directions;
 use super::linear::right_svd;
-use crate::dynamics::{Trajectory, adjoint};
+use crate::dynamics::{Slopes, Trajectory, adjoint};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use nalgebra::DMatrix;
@@ -160,11 +160,7 @@ fn by_adjoints(
     transposed.transpose()
 }
 
-type Parts<'a> = (
-    &'a mut Trajectory,
-    &'a mut crate::dynamics::Device,
-    &'a mut [f64],
-);
+type Parts<'a, 'b> = (&'a mut Trajectory, &'a mut Slopes<'b>, &'a mut [f64]);
 
 /// Gradient in the parameters of a linear function of the predictions of experiment `e`.
 fn reading_gradient(
@@ -178,7 +174,8 @@ fn reading_gradient(
     let mut source = Trajectory::zeros(experiment.nodes);
     let mut nodal = problem.functions.empty_device();
     let mut scalars = vec![0.0; evaluation.scalars.len()];
-    add(view, (&mut source, &mut nodal, &mut scalars));
+    let mut direct = Slopes::AtNodes(&mut nodal);
+    add(view, (&mut source, &mut direct, &mut scalars));
     let share = adjoint::discrete::gradient(
         view.oscillator,
         view.device,

@@ -4,7 +4,8 @@ use super::on_nodes::{AddTranspose, Predict};
 use super::{Loss, Sensor, Weighting};
 use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Surroundings, Trajectory,
+    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Sensed, Slopes, Surroundings,
+    Trajectory,
 };
 use crate::lanes;
 use crate::signal::{SecondOrder, zero_phase, zero_phase_transpose};
@@ -464,7 +465,7 @@ impl Channel {
         view: View,
         slopes: &[f64],
         source: &mut Trajectory,
-        direct: &mut Device,
+        direct: &mut Slopes,
         scalars: &mut [f64],
     ) {
         let filtered;
@@ -643,14 +644,14 @@ pub(super) fn add_to_scalars(
 }
 
 /// Transpose of [`answer`].
-fn spread(sensed: &Sensed, step: usize, slope: f64, source: &mut Trajectory, direct: &mut Device) {
+fn spread(sensed: &Sensed, step: usize, slope: f64, source: &mut Trajectory, direct: &mut Slopes) {
     for side in 0..2 {
         source.displacement[step + side] += slope * sensed.states[2 * side];
         source.velocity[step + side] += slope * sensed.states[2 * side + 1];
     }
-    for (f, values) in direct.functions_mut().enumerate() {
+    for f in 0..direct.functions() {
         for side in 0..2 {
-            values[step + side] += slope * sensed.functions[side][f];
+            direct.add(f, step + side, slope * sensed.functions[side][f]);
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use super::Channel;
 use super::channel::{View, add_to_scalars};
-use crate::dynamics::{Accelerations, ChannelKind, Device, Excitation, Sight, Trajectory, window};
+use crate::dynamics::{
+    Accelerations, ChannelKind, Excitation, FUNCTIONS, Sight, Slopes, Trajectory, window,
+};
 use crate::lanes::{Arithmetic, Eight, Kernel, LANES, Row};
 
 impl Channel {
@@ -83,16 +85,16 @@ impl Kernel for Predict<'_> {
 }
 
 /// [`Channel::add_transpose`] of such readings, after the filter.
-pub(super) struct AddTranspose<'a> {
+pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: View<'a>,
     pub slopes: &'a [f64],
     pub source: &'a mut Trajectory,
-    pub direct: &'a mut Device,
+    pub direct: &'a mut Slopes<'b>,
     pub scalars: &'a mut [f64],
 }
 
-impl Kernel for AddTranspose<'_> {
+impl Kernel for AddTranspose<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -110,6 +112,7 @@ impl Kernel for AddTranspose<'_> {
         let seeks = indices.iter().any(Option::is_some);
         let factor = Eight::splat(arithmetic, gain);
         let mut seen = Accelerations::NOTHING;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
         for (from, slopes) in (0..).step_by(LANES).zip(slopes.chunks(LANES)) {
             channel.accelerations(arithmetic, view, from, &mut seen);
             let mut row = [0.0; LANES];
@@ -124,8 +127,18 @@ impl Kernel for AddTranspose<'_> {
                 &mut source.displacement[nodes.clone()],
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
-            for (values, by) in direct.functions_mut().zip(&seen.functions) {
-                add_products(arithmetic, push, by, &mut values[nodes.clone()]);
+            match direct {
+                Slopes::AtNodes(device) => {
+                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, &mut values[nodes.clone()]);
+                    }
+                }
+                // Lanes without a reading have no slope.
+                Slopes::Summed(_) => {
+                    for (sums, by) in sums.iter_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, sums);
+                    }
+                }
             }
             if seeks {
                 for (l, slope) in slopes.iter().enumerate() {
@@ -133,6 +146,11 @@ impl Kernel for AddTranspose<'_> {
                     let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
                     add_to_scalars(indices, factors, *slope, scalars);
                 }
+            }
+        }
+        if let Slopes::Summed(all) = direct {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
             }
         }
     }

@@ -4,7 +4,9 @@ use super::in_lanes;
 use crate::dynamics::blocks::LinearDevice;
 use crate::dynamics::stages::{Rhs, Stages};
 use crate::dynamics::tableau::{MIDPOINT, RK4, Tableau};
-use crate::dynamics::{Device, DeviceTangent, Excitation, Method, Oscillator, State, Trajectory};
+use crate::dynamics::{
+    Device, DeviceTangent, Excitation, Method, Oscillator, Slopes, State, Trajectory,
+};
 
 /// Gradient of a scalar cost of the motion with respect to the nodal values of all functions and
 /// to the initial state, in the Euclidean inner product of the nodal values.
@@ -38,13 +40,35 @@ pub fn gradient(
         }
     }
     let rhs = oscillator.rhs(device, excitation, nodes);
-    if !rhs.is_linear_and_free() {
+    if !oscillator.is_linear_and_free(excitation) {
         let gradient = in_lanes::gradient(rhs, oscillator.method, trajectory, source);
         if gradient.is_finite() {
             return gradient;
         }
     }
     gradient_in_order(oscillator, device, excitation, trajectory, source)
+}
+
+/// The sums over the nodes of [`gradient`], all that constants ask for, and its initial state. `None` where
+/// [`gradient`] has another way: for linear free motion, and where numbers leave their range.
+pub(crate) fn sums(
+    oscillator: &Oscillator,
+    device: &Device,
+    excitation: Option<&Excitation>,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+) -> Option<(Vec<f64>, State)> {
+    (!oscillator.is_linear_and_free(excitation)).then_some(())?;
+    let rhs = oscillator.rhs(device, excitation, trajectory.nodes());
+    let mut sums = vec![0.0; 1 + oscillator.terms.len()];
+    let gradient = Slopes::Summed(&mut sums);
+    let initial = in_lanes::back(rhs, oscillator.method, trajectory, source, gradient);
+    let State {
+        displacement,
+        velocity,
+    } = initial;
+    let is_finite = displacement.is_finite() && velocity.is_finite();
+    (is_finite && sums.iter().all(|x| x.is_finite())).then_some((sums, initial))
 }
 
 /// [`gradient`], one step after the other whatever the device.

@@ -3,7 +3,7 @@
 
 use crate::dynamics::maps::{self, FUNCTIONS, Maps};
 use crate::dynamics::stages::Rhs;
-use crate::dynamics::{Device, DeviceTangent, Method, State, Trajectory};
+use crate::dynamics::{Device, DeviceTangent, Method, Slopes, State, Trajectory};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
 
 /// As [`super::discrete::gradient_in_order`], to rounding; not finite where a product of this order
@@ -14,18 +14,28 @@ pub(super) fn gradient(
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> DeviceTangent {
-    let mut gradient = Device::zeros(rhs.device.mass.len(), rhs.terms.len());
-    let initial = lanes::run(Back {
+    let mut device = Device::zeros(rhs.device.mass.len(), rhs.terms.len());
+    let gradient = Slopes::AtNodes(&mut device);
+    let initial = back(rhs, method, trajectory, source, gradient);
+    DeviceTangent { device, initial }
+}
+
+/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
+/// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
+pub(super) fn back(
+    rhs: Rhs,
+    method: Method,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+    gradient: Slopes,
+) -> State {
+    lanes::run(Back {
         rhs,
         method,
         trajectory,
         source,
-        gradient: &mut gradient,
-    });
-    DeviceTangent {
-        device: gradient,
-        initial,
-    }
+        gradient,
+    })
 }
 
 struct Back<'a> {
@@ -33,7 +43,7 @@ struct Back<'a> {
     method: Method,
     trajectory: &'a Trajectory,
     source: &'a Trajectory,
-    gradient: &'a mut Device,
+    gradient: Slopes<'a>,
 }
 
 impl Kernel for Back<'_> {
@@ -42,6 +52,8 @@ impl Kernel for Back<'_> {
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> State {
         let (rhs, source) = (&self.rhs, self.source);
+        let mut gradient = self.gradient;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
         let mut wanted = [false; FUNCTIONS];
         wanted[..=rhs.terms.len()].fill(true);
@@ -74,20 +86,25 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[0]),
                 Eight::load(arithmetic, &ends[1]),
             ];
-            let all =
-                std::iter::once(&mut self.gradient.mass).chain(&mut self.gradient.coefficients);
-            for (f, values) in all.enumerate() {
-                let (left, right) = (&maps.left[f], &maps.right[f]);
-                set(
-                    arithmetic,
-                    left,
-                    right,
-                    ends,
-                    to - from,
-                    &mut values[from..],
-                );
+            for f in 0..=rhs.terms.len() {
+                let [left, right] = shares(arithmetic, &maps.left[f], &maps.right[f], ends);
+                match &mut gradient {
+                    Slopes::AtNodes(device) => {
+                        let values = &mut device.function_mut(f)[from..];
+                        set(arithmetic, left, right, to - from, values);
+                    }
+                    Slopes::Summed(_) => {
+                        let sum = Eight::load(arithmetic, &sums[f]);
+                        sums[f] = (sum + (left + right)).row();
+                    }
+                }
             }
             to = from;
+        }
+        if let Slopes::Summed(all) = gradient {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
+            }
         }
         State {
             displacement: x[0],
@@ -96,21 +113,30 @@ impl Kernel for Back<'_> {
     }
 }
 
+/// The shares of eight steps in the gradient of a function, at their left and at their right nodes.
+#[inline(always)]
+fn shares<A: Arithmetic>(
+    arithmetic: A,
+    left: &[Row; 2],
+    right: &[Row; 2],
+    ends: [Eight<A>; 2],
+) -> [Eight<A>; 2] {
+    [
+        Eight::load(arithmetic, &left[0]) * ends[0] + Eight::load(arithmetic, &left[1]) * ends[1],
+        Eight::load(arithmetic, &right[0]) * ends[0] + Eight::load(arithmetic, &right[1]) * ends[1],
+    ]
+}
+
 /// Takes the shares of up to eight steps to the gradient of a function from their first node on: the node behind
 /// them has its share of the step behind, the others have none yet.
 #[inline(always)]
 fn set<A: Arithmetic>(
     arithmetic: A,
-    left: &[Row; 2],
-    right: &[Row; 2],
-    ends: [Eight<A>; 2],
+    left: Eight<A>,
+    right: Eight<A>,
     steps: usize,
     gradient: &mut [f64],
 ) {
-    let left =
-        Eight::load(arithmetic, &left[0]) * ends[0] + Eight::load(arithmetic, &left[1]) * ends[1];
-    let right =
-        Eight::load(arithmetic, &right[0]) * ends[0] + Eight::load(arithmetic, &right[1]) * ends[1];
     let right = right.row();
     // The share of the step before a node.
     let mut before = [0.0; LANES];
