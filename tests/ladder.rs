@@ -186,3 +186,43 @@ fn a_silent_beginning_says_nothing() {
         assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
     }
 }
+
+/// Parts of a record have no reading at every node of the grid, which the continuous gradient needs: the fits of parts have
+/// the discrete one.
+#[test]
+fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
+    let nodes = 401;
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, 20.0, nodes).unwrap(),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    // What no oscillator does.
+    let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();
+    let weighting = Weighting::Integral {
+        spacing: oscillator.grid.step(),
+    };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
+        CoefficientFunction::constant(Quantity::Damping, 0.1, nodes),
+        CoefficientFunction::constant(Quantity::Stiffness, 2.0, nodes),
+    ];
+    let functions = Functions::new(list, nodes, oscillator.grid.step()).unwrap();
+    let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
+    let problem = Problem::new(oscillator, functions, vec![experiment]);
+    assert!(problem.supports_continuous() && !problem.first_part(0.5).supports_continuous());
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Continuous,
+        stopping: Stopping {
+            tolerance: Some(1e-10),
+            ..Stopping::exactly(20)
+        },
+        interrupt: None,
+    };
+    let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+    let names: Vec<&str> = found.rungs.iter().map(|r| r.name).collect();
+    assert!(names.contains(&"growing horizon"), "{names:?}");
+}

@@ -39,7 +39,12 @@ pub fn trapezoid_weights_at(times: &[f64]) -> Vec<f64> {
 /// If there are fewer than two values.
 pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
     let last = f.len() - 1;
-    let mut d = inner(f, Difference::Slope(dt));
+    let mut d = vec![0.0; f.len()];
+    lanes::run(Elementwise(|| {
+        for (d, w) in d[1..].iter_mut().zip(f.windows(3)) {
+            *d = 0.5 * (-w[0] + w[2]) / dt;
+        }
+    }));
     d[0] = (-f[0] + f[1]) / dt;
     d[last] = (f[last] - f[last - 1]) / dt;
     d
@@ -50,17 +55,15 @@ pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
 /// # Panics
 /// If there are fewer than three values.
 pub fn curvature(f: &[f64], dt: f64) -> Vec<f64> {
-    let last = f.len() - 1;
-    let mut d = inner(f, Difference::Curvature(dt));
-    d[0] = second(f[0], f[1], f[2], dt);
-    d[last] = second(f[last], f[last - 1], f[last - 2], dt);
+    let mut d = vec![0.0; f.len()];
+    curvature_into(f, dt, 0, &mut d);
     d
 }
 
 /// [`curvature`] at the nodes from `first` on, as many as `out` has.
 ///
 /// # Panics
-/// If there are fewer than three values, or too few.
+/// If there are fewer than three values, or `out` reaches beyond them.
 pub fn curvature_into(f: &[f64], dt: f64, first: usize, out: &mut [f64]) {
     let (last, end) = (f.len() - 1, first + out.len());
     let inner = first.max(1)..end.min(last);
@@ -93,28 +96,6 @@ pub fn midpoints(f: &[f64]) -> Vec<f64> {
 #[inline(always)]
 fn second(a: f64, b: f64, c: f64, dt: f64) -> f64 {
     (a - 2.0 * b + c) / dt / dt
-}
-
-/// A difference of neighbours.
-#[derive(Clone, Copy)]
-enum Difference {
-    Slope(f64),
-    Curvature(f64),
-}
-
-/// A difference at all nodes but the ends.
-fn inner(f: &[f64], difference: Difference) -> Vec<f64> {
-    let mut d = vec![0.0; f.len()];
-    lanes::run(Elementwise(|| {
-        let inner = d[1..].iter_mut().zip(f.windows(3));
-        match difference {
-            Difference::Slope(dt) => inner.for_each(|(d, w)| *d = 0.5 * (-w[0] + w[2]) / dt),
-            Difference::Curvature(dt) => {
-                inner.for_each(|(d, w)| *d = second(w[0], w[1], w[2], dt));
-            }
-        }
-    }));
-    d
 }
 
 /// Mean of the nodes `i` and `i + 1`.

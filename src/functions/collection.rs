@@ -39,7 +39,7 @@ impl Functions {
     /// [`Functions::new`] with several devices: each is a list of indices into `list`, mass first.
     ///
     /// # Panics
-    /// If there is no device, or one names a function that is not there.
+    /// If there is no device, or one names a function that is not there, or one twice.
     pub fn with_devices(
         list: Vec<CoefficientFunction>,
         devices: Vec<Vec<usize>>,
@@ -51,6 +51,11 @@ impl Functions {
             devices.iter().flatten().all(|f| *f < list.len()),
             "devices of the functions in the list"
         );
+        let is_once = |device: &Vec<usize>| {
+            let first = |f: &usize| device.iter().position(|g| g == f);
+            device.iter().enumerate().all(|(i, f)| first(f) == Some(i))
+        };
+        assert!(devices.iter().all(is_once), "each function once a device");
         let weights = trapezoid_weights(nodes, step);
         let grams: Option<Vec<Gram>> = list
             .iter()

@@ -16,7 +16,7 @@ impl Channel {
     /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
     /// nothing.
     #[inline(always)]
-    pub(super) fn around_eight(&self, excitation: Option<&Excitation>, i: usize) -> [Row; 2] {
+    fn around_eight(&self, excitation: Option<&Excitation>, i: usize) -> [Row; 2] {
         let mut rows = [[0.0; LANES]; 2];
         if let Some([forces, bases]) = self.surroundings() {
             rows = [window::row(forces, i), window::row(bases, i)];

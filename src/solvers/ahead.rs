@@ -2,8 +2,9 @@
 //!
 //! A Gauss–Newton search needs at each of its points the gradient, to be told and tested, and the linearised readings,
 //! for the step from there. Neither waits for the other. Where a processor is to spare, a second thread does
-//! the adjoint solve, while this one goes along the tangents and reduces the rows of the Jacobian; the first to be
-//! done with its own, the second thread goes on with reducing. Who does what changes no bit.
+//! the adjoint solve, while this one goes along the tangents and reduces the rows of the Jacobian. After that the
+//! second thread goes on with reducing or, where there are so few columns that handing rows over takes as long as
+//! reducing them, finds the natural sizes. Who does what changes no bit.
 
 use super::gauss_newton::{FEW_PARAMETERS, Reduced, is_wide};
 use super::{FitSettings, Point, Solver, Timings};
@@ -13,10 +14,12 @@ use crate::problem::Problem;
 use crate::threads::{self, Companion};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TryRecvError};
 use std::thread::Scope;
 use std::time::{Duration, Instant};
 
+/// Pieces that wait to be reduced, at most.
+const WAITING: usize = 16;
 /// Entries of a Jacobian from which on two threads are quicker than one: it takes microseconds to hand over.
 const WORTH_SHARING: usize = 4000;
 
@@ -32,7 +35,7 @@ pub(crate) struct Ahead<'s, 'p> {
 struct Input {
     parameters: Vec<f64>,
     evaluation: Evaluation,
-    /// Whether the second thread waits for rows to reduce.
+    /// Whether the second thread reduces what is still to come.
     is_free: AtomicBool,
 }
 
@@ -69,13 +72,15 @@ impl Job<'_> {
         self.adjoint = clock.elapsed();
         if !is_wide(parameters.len()) {
             self.sizes = Some(self.problem.natural_sizes(evaluation));
+            return;
         }
         input.is_free.store(true, Ordering::Release);
+        let mut all = None;
         loop {
             match handed.try_recv() {
-                Ok(Handed::Reduced(reduced)) => self.reduced = Some(reduced),
+                Ok(Handed::Reduced(reduced)) => all = Some(reduced),
                 Ok(Handed::Rows(mut piece)) => {
-                    if let Some(reduced) = &mut self.reduced {
+                    if let Some(reduced) = &mut all {
                         reduced.add(&mut piece);
                     }
                     if let Some(empty) = &self.empty {
@@ -84,9 +89,11 @@ impl Job<'_> {
                     }
                 }
                 Err(TryRecvError::Empty) => std::hint::spin_loop(),
-                Err(TryRecvError::Disconnected) => return,
+                Err(TryRecvError::Disconnected) => break,
             }
         }
+        // Only now it is whole.
+        self.reduced = all;
     }
 }
 
@@ -148,7 +155,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
             is_free: AtomicBool::new(false),
         });
         let its = Arc::clone(&input);
-        let (hand, handed) = mpsc::channel();
+        let (hand, handed) = mpsc::sync_channel(WAITING);
         let (empty, again) = mpsc::channel();
         let found = self.companion.with(
             |job| {
@@ -190,12 +197,12 @@ impl<'s, 'p> Ahead<'s, 'p> {
     }
 }
 
-/// Goes along the tangents and reduces the rows, until the second thread is free to go on with that. With many columns
-/// that is at the end busy with the last rows: meanwhile the sizes are found here.
+/// Goes along the tangents and reduces the rows, with many columns until the second thread is free to go on with that.
+/// That is then busy with the last rows: meanwhile the sizes are found here.
 fn along(
     problem: &Problem,
     input: &Input,
-    hand: Sender<Handed>,
+    hand: SyncSender<Handed>,
     again: &Receiver<Piece>,
 ) -> (Option<Reduced>, Option<Vec<f64>>) {
     let order = problem.places();
@@ -228,19 +235,21 @@ mod tests {
     use crate::problem::Experiment;
     use crate::solvers::{Fit, fit};
 
-    /// A decaying oscillator on knots, with more readings than a piece holds.
-    fn problem() -> Problem {
+    /// A decaying oscillator with so many knots for damping and stiffness each, and more readings than a piece holds.
+    fn problem(knots: u32) -> Problem {
         let grid = Grid::new(0.0, 20.0, 601).expect("a grid");
         let oscillator = Oscillator {
             grid,
             method: Method::Midpoint,
             terms: vec![Term::Damping, Term::Stiffness],
         };
-        let knots = Basis::PiecewiseLinear {
-            knots: (0..6).map(|i| 4.0 * f64::from(i)).collect(),
+        let spacing = grid.duration() / f64::from(knots - 1);
+        let basis = Basis::PiecewiseLinear {
+            knots: (0..knots).map(|i| spacing * f64::from(i)).collect(),
         };
         let on_knots = |quantity, start: f64| {
-            CoefficientFunction::free(quantity, knots.clone(), &grid, vec![start; 6])
+            let start = vec![start; basis.parameters(&grid)];
+            CoefficientFunction::free(quantity, basis.clone(), &grid, start)
         };
         let list = vec![
             CoefficientFunction::constant(Quantity::Mass, 1.3, grid.nodes()),
@@ -265,29 +274,32 @@ mod tests {
         fit(problem, &problem.start(), &settings, &mut |_| {}).expect("a motion")
     }
 
-    /// Two threads and one go the same way, to the last bit.
+    /// Two threads and one go the same way, to the last bit: with columns enough to hand rows over, and with few.
     #[test]
     fn who_does_what_changes_nothing() {
-        let problem = problem();
-        let alone = threads::sharing(|| fitted(&problem));
-        let settings = FitSettings::default();
-        std::thread::scope(|scope| {
-            let mut ahead = Ahead::with(scope, &problem, &settings).expect("a thread");
-            let evaluation = problem.evaluate(&problem.start()).expect("a motion");
-            let gradient = problem.gradient(&problem.start(), &evaluation, settings.gradient);
-            let mut timings = Timings::default();
-            let found = ahead.point(problem.start(), evaluation.clone(), &mut timings);
-            let found = found.expect("the second thread has done its part");
-            assert!(found.parameters == problem.start() && found.evaluation == evaluation);
-            assert!(found.gradient == gradient);
-            let alone = Point::new(problem.start(), evaluation, gradient);
-            assert!(found.relative_metric(&problem) == alone.relative_metric(&problem));
-            assert!(ahead.linearised(&[0.0]).is_none());
-        });
-        let together = fitted(&problem);
-        assert!(together.history.len() > 3);
-        assert!(together.history == alone.history);
-        assert_eq!(together.counts, alone.counts);
-        assert!(together.best.parameters == alone.best.parameters);
+        for knots in [6, 3] {
+            let problem = problem(knots);
+            assert_eq!(is_wide(problem.parameters()), knots == 6);
+            let alone = threads::sharing(|| fitted(&problem));
+            let settings = FitSettings::default();
+            std::thread::scope(|scope| {
+                let mut ahead = Ahead::with(scope, &problem, &settings).expect("a thread");
+                let evaluation = problem.evaluate(&problem.start()).expect("a motion");
+                let gradient = problem.gradient(&problem.start(), &evaluation, settings.gradient);
+                let mut timings = Timings::default();
+                let found = ahead.point(problem.start(), evaluation.clone(), &mut timings);
+                let found = found.expect("the second thread has done its part");
+                assert!(found.parameters == problem.start() && found.evaluation == evaluation);
+                assert!(found.gradient == gradient);
+                let alone = Point::new(problem.start(), evaluation, gradient);
+                assert!(found.relative_metric(&problem) == alone.relative_metric(&problem));
+                assert!(ahead.linearised(&[0.0]).is_none());
+            });
+            let together = fitted(&problem);
+            assert!(together.history.len() > 3);
+            assert!(together.history == alone.history);
+            assert_eq!(together.counts, alone.counts);
+            assert!(together.best.parameters == alone.best.parameters);
+        }
     }
 }

@@ -14,7 +14,7 @@ use crate::functions::{Basis, CoefficientFunction, Functions};
 use crate::objective::{Channel, Evaluation};
 use crate::problem::{Drive, Experiment, Problem};
 use crate::threads;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Steps of the beginning: a power of two, so that its grid has the same step to the last bit.
 const STEPS: usize = 1 << 12;
@@ -31,12 +31,14 @@ const TOLERANCE: f64 = 1e-6;
 pub(super) struct Begun {
     pub reference: Option<Reference>,
     pub start: Option<BetterStart>,
+    /// What the fit of the beginning took, interrupts left out.
+    pub elapsed: Duration,
 }
 
-/// What the beginning of the record says, and what the whole problem says of that.
+/// What the beginning of the record says, and what the whole problem says of that, if it has a motion there.
 pub(super) struct BetterStart {
     pub parameters: Vec<f64>,
-    pub evaluation: Evaluation,
+    pub evaluation: Option<Evaluation>,
 }
 
 /// Whether the records of a problem are long, all functions constants, and the beginning has readings enough.
@@ -136,10 +138,9 @@ pub(super) fn begin(
         let fit = found.ok()?;
         let clock = Instant::now();
         let parameters = fit.best.parameters.clone();
-        let evaluation = (parameters != start).then(|| problem.evaluate(&parameters).ok());
-        let better = evaluation.flatten().map(|evaluation| BetterStart {
+        let better = (parameters != start).then(|| BetterStart {
+            evaluation: problem.evaluate(&parameters).ok(),
             parameters,
-            evaluation,
         });
         Some((fit, better, clock.elapsed()))
     };
@@ -158,13 +159,14 @@ pub(super) fn begin(
     };
     before.counts.forward += 1;
     before.counts.adjoint += u64::from(reference.is_some());
-    let mut better = None;
+    let (mut better, mut elapsed) = (None, Duration::ZERO);
     if let Some((fit, start, evaluating)) = found {
+        elapsed = fit.elapsed + evaluating;
         before.counts += fit.counts;
         before.timings += fit.timings;
         before.timings.forward += evaluating;
         // What was done at once is told once.
-        let rest = clock.elapsed().saturating_sub(fit.elapsed + evaluating);
+        let rest = clock.elapsed().saturating_sub(elapsed);
         timings.forward = timings.forward.min(rest);
         timings.adjoint = timings.adjoint.min(rest - timings.forward);
         better = start;
@@ -173,6 +175,7 @@ pub(super) fn begin(
     Begun {
         reference,
         start: better,
+        elapsed,
     }
 }
 

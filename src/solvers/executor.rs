@@ -11,7 +11,7 @@ use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step, Timings, equation_error};
 use crate::dynamics::{Breakdown, Cause};
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
@@ -82,6 +82,12 @@ pub(super) fn search_evaluated(
     if settings.solver == Solver::EquationError {
         return Ok(equation_error::fit(problem, start, watch.observe()));
     }
+    // A part of a record has not a reading at every node of the grid.
+    let mut settings = settings.clone();
+    if !problem.supports_continuous() {
+        settings.gradient = GradientKind::Discrete;
+    }
+    let settings = &settings;
     let kept = watch.begin_search();
     std::thread::scope(|scope| {
         let run = Run {
@@ -401,6 +407,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> 
         let mut work = Work::new(problem, self.ahead.take(), self.settings);
         match self.recalled(&work) {
             Some(progress) => {
+                self.at_start = None;
                 self.progress = Ok(progress);
                 self.ahead = work.ahead;
             }

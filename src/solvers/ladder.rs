@@ -15,6 +15,7 @@ use super::{
     Counts, Fit, FitSettings, Outcome, Row, Solver, Status, Timings, Watch, equation_error,
 };
 use crate::dynamics::Breakdown;
+use crate::objective::GradientKind;
 use crate::problem::Problem;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -127,24 +128,26 @@ pub fn fit_watched(
     let mut before = Before::default();
     let clock = Instant::now();
     let climbs = settings.solver == Solver::GaussNewton;
-    let can_begin = climbs && settings.stopping.has_test();
+    let is_discrete = settings.gradient == GradientKind::Discrete;
+    let can_begin = climbs && is_discrete && settings.stopping.has_test();
     // To cost and gradient at the start values all rungs are compared; if the first one begins there, it finds out
     // for itself.
-    let (mut reference, begun) = match settings.initial {
+    let (mut reference, begun, begun_in) = match settings.initial {
         Initial::Functions if can_begin && has_beginning(problem) => {
             let begun = begin(problem, start, settings, &mut before, watch);
-            (begun.reference, begun.start)
+            (begun.reference, begun.start, begun.elapsed)
         }
-        Initial::Functions => (None, None),
+        Initial::Functions => (None, None, Duration::ZERO),
         Initial::Data => {
             let (reference, timings) = reference(problem, start, settings);
             before.counts.forward += 1;
             before.counts.adjoint += u64::from(reference.is_some());
             before.timings += timings;
-            (reference, None)
+            (reference, None, Duration::ZERO)
         }
     };
-    let lead = clock.elapsed();
+    // What was done before an interrupt is part of it.
+    let lead = clock.elapsed().max(begun_in);
     let attempts = begun.map(Attempt::Beginning).into_iter().chain(attempts);
     // A rung that gets stuck in a false valley creeps: the others are tried before it goes on.
     let mut probing = settings.clone();
@@ -334,8 +337,7 @@ fn run(
             parameters,
             evaluation,
         }) => {
-            let known = Some(evaluation);
-            return search_evaluated(problem, &parameters, known, settings, reference, watch);
+            return search_evaluated(problem, &parameters, evaluation, settings, reference, watch);
         }
         Attempt::Functions => start.to_vec(),
         Attempt::Data => from_data(problem, start, clock),

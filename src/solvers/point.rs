@@ -19,8 +19,18 @@ pub struct Point {
     pub evaluation: Evaluation,
     /// Gradient of the cost.
     pub gradient: Gradient,
-    /// Once somebody has asked for them.
-    sizes: OnceLock<Vec<f64>>,
+    sizes: Sizes,
+}
+
+/// The natural sizes at a point, once somebody has asked for them.
+#[derive(Clone, Default)]
+struct Sizes(OnceLock<Vec<f64>>);
+
+impl std::fmt::Debug for Sizes {
+    /// Whether somebody has asked is no part of a point.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("…")
+    }
 }
 
 impl Point {
@@ -29,19 +39,19 @@ impl Point {
             parameters,
             evaluation,
             gradient,
-            sizes: OnceLock::new(),
+            sizes: Sizes::default(),
         }
     }
 
     /// With [`Problem::natural_sizes`] here.
     pub(crate) fn with_sizes(self, sizes: Vec<f64>) -> Self {
-        let sizes = OnceLock::from(sizes);
+        let sizes = Sizes(OnceLock::from(sizes));
         Self { sizes, ..self }
     }
 
     /// [`Problem::natural_sizes`] here.
     fn natural_sizes(&self, problem: &Problem) -> &[f64] {
-        (self.sizes).get_or_init(|| problem.natural_sizes(&self.evaluation))
+        (self.sizes.0).get_or_init(|| problem.natural_sizes(&self.evaluation))
     }
 
     /// [`Functions::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the

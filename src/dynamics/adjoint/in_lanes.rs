@@ -86,7 +86,7 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[0]),
                 Eight::load(arithmetic, &ends[1]),
             ];
-            for f in 0..=rhs.terms.len() {
+            for (f, sum) in sums.iter_mut().enumerate().take(1 + rhs.terms.len()) {
                 let [left, right] = shares(arithmetic, &maps.left[f], &maps.right[f], ends);
                 match &mut gradient {
                     Slopes::AtNodes(device) => {
@@ -94,8 +94,7 @@ impl Kernel for Back<'_> {
                         set(arithmetic, left, right, to - from, values);
                     }
                     Slopes::Summed(_) => {
-                        let sum = Eight::load(arithmetic, &sums[f]);
-                        sums[f] = (sum + (left + right)).row();
+                        *sum = (Eight::load(arithmetic, sum) + (left + right)).row();
                     }
                 }
             }
@@ -127,8 +126,8 @@ fn shares<A: Arithmetic>(
     ]
 }
 
-/// Takes the shares of up to eight steps to the gradient of a function from their first node on: the node behind
-/// them has its share of the step behind, the others have none yet.
+/// Writes the shares of up to eight steps to the gradient of a function, from their first node on. It is called from
+/// the last steps to the first: the node after these has the share of the step that follows, the others have none yet.
 #[inline(always)]
 fn set<A: Arithmetic>(
     arithmetic: A,

@@ -176,3 +176,104 @@ fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
+    use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+    use crate::objective::{GradientKind, Weighting};
+
+    const NODES: usize = 70;
+
+    /// Two records of two devices that differ in their stiffness, the second over the first `nodes` nodes of the grid,
+    /// each with a displacement at every third node and `count` accelerations from the first node on.
+    fn problem(with_knots: bool, nodes: usize, count: usize) -> Problem {
+        let grid = Grid::new(0.0, 7.0, NODES).expect("a grid");
+        let function = |quantity, knots: u32, start: f64| match with_knots {
+            false => CoefficientFunction::constant(quantity, start, NODES),
+            true => {
+                let spacing = grid.duration() / f64::from(knots - 1);
+                let knots = (0..knots).map(|i| f64::from(i) * spacing).collect();
+                let basis = Basis::PiecewiseLinear { knots };
+                let start = vec![start; basis.parameters(&grid)];
+                CoefficientFunction::free(quantity, basis, &grid, start)
+            }
+        };
+        let list = vec![
+            CoefficientFunction::constant(Quantity::Mass, 1.3, NODES),
+            function(Quantity::Damping, 5, 0.2),
+            function(Quantity::Stiffness, 20, 2.0),
+            function(Quantity::Stiffness, 20, 3.0),
+        ];
+        let devices = vec![vec![0, 1, 2], vec![0, 1, 3]];
+        let functions = Functions::with_devices(list, devices, NODES, grid.step());
+        let force: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin()).collect();
+        let record = |device: usize, nodes: usize| {
+            let channel = |kind, at: Vec<usize>| {
+                let times: Vec<f64> = at.iter().map(|i| grid.time(*i)).collect();
+                let values = times.iter().map(|t| (2.0 * t).cos()).collect();
+                let weighting = Weighting::Sigma(0.1);
+                Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+            };
+            let accelerations = (0..count.min(nodes)).collect();
+            let thirds = (0..nodes).step_by(3).collect();
+            Experiment {
+                device,
+                ..Experiment::free("driven", State::default(), nodes)
+                    .with_excitation(Excitation::force_at_nodes(&force))
+                    .with_channel(channel(ChannelKind::Acceleration, accelerations))
+                    .with_channel(channel(ChannelKind::Displacement, thirds))
+            }
+        };
+        let oscillator = Oscillator {
+            grid,
+            method: Method::Rk4,
+            terms: vec![Term::Damping, Term::Stiffness],
+        };
+        let records = vec![record(0, NODES), record(1, nodes)];
+        Problem::new(oscillator, functions.expect("functions"), records)
+    }
+
+    /// Ends of tiles, of lanes and of records; pieces that come back with nothing but rubbish in them.
+    #[test]
+    fn pieces_are_the_jacobian_and_it_is_the_gradient_s() {
+        let lengths = [1, 7, 8, 9, 64, 65, 66, NODES];
+        for (with_knots, nodes) in [(true, 5), (true, 65), (false, 9), (false, NODES)] {
+            for count in lengths {
+                let problem = problem(with_knots, nodes, count);
+                let theta = problem.start();
+                let evaluation = problem.evaluate(&theta).expect("a motion");
+                let expected = problem.jacobian_by_columns(&evaluation);
+                let order = problem.places();
+                let mut found = DMatrix::zeros(expected.nrows(), expected.ncols());
+                problem.each_piece(&evaluation, &order, |mut piece| {
+                    for (place, j) in order.iter().enumerate() {
+                        if place < piece.begun() {
+                            let rows = piece.first..piece.first + piece.count;
+                            let column = &mut found.column_mut(*j);
+                            column.as_mut_slice()[rows].copy_from_slice(piece.column(place));
+                        }
+                        piece.column_mut(place).fill(f64::NAN);
+                    }
+                    piece
+                });
+                for (found, expected) in found.column_iter().zip(expected.column_iter()) {
+                    let size = expected.amax();
+                    assert!((found - expected).amax() <= 1e-12 * size, "{nodes} {count}");
+                }
+                let slopes: Vec<f64> = (problem.experiments.iter().zip(&evaluation.predictions))
+                    .flat_map(|(e, predicted)| e.channels.iter().zip(predicted))
+                    .flat_map(|(channel, predicted)| channel.slopes(predicted))
+                    .collect();
+                let gradient = problem.gradient(&theta, &evaluation, GradientKind::Discrete);
+                for (column, slope) in expected.column_iter().zip(&gradient.euclidean) {
+                    let parts = column.iter().zip(&slopes).map(|(a, s)| a * s);
+                    let (sum, size) =
+                        parts.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()));
+                    assert!((slope - sum).abs() <= 1e-12 * size, "{nodes} {count}");
+                }
+            }
+        }
+    }
+}

@@ -44,7 +44,8 @@ impl Residuals {
     }
 }
 
-/// Whether the reduction of rows with so many columns takes much longer than a look at the clock.
+/// Whether the reduction of rows with so many columns takes much longer than a look at the clock, and than to hand
+/// them to another thread.
 pub(crate) fn is_wide(columns: usize) -> bool {
     columns > LANES
 }

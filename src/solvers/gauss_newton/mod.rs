@@ -51,6 +51,7 @@ const SMALLEST_CHANGE: f64 = 1e-9;
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
+    /// Storage for the next trial.
     spare: Option<Evaluation>,
 }
 
