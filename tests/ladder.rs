@@ -98,7 +98,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     );
 }
 
-/// A hardening spring under two sines that set in at node `first`, in a record ten times as long as the beginning
+/// A hardening spring under two sines that set in at node `first`, in a record twenty times as long as the beginning
 /// that is looked at, seen every fourth step.
 fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let nodes = 40_001;

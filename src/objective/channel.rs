@@ -236,8 +236,13 @@ impl Channel {
     /// The readings within the first `steps` steps, if there are any; what stands on the node behind them
     /// belongs to the next.
     pub(crate) fn within(&self, steps: usize) -> Option<Self> {
-        let count = self.places.partition_point(|p| p.step < steps);
+        let count = self.count_within(steps);
         (count > 0).then(|| self.first(count))
+    }
+
+    /// How many readings [`Channel::within`] takes.
+    pub(crate) fn count_within(&self, steps: usize) -> usize {
+        self.places.partition_point(|p| p.step < steps)
     }
 
     /// The same readings on another grid over the same time; `None` if they are not all on it.

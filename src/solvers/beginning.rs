@@ -11,15 +11,16 @@ use super::timings::timed;
 use super::{FitSettings, Timings, Watch};
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
-use crate::objective::{Channel, Evaluation};
+use crate::objective::Evaluation;
 use crate::problem::{Drive, Experiment, Problem};
 use crate::threads;
 use std::time::{Duration, Instant};
 
-/// Steps of the beginning: a power of two, so that its grid has the same step to the last bit.
-const STEPS: usize = 1 << 12;
-/// How many times as long a record must be.
-const LONG: usize = 8;
+/// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
+/// the same step to the last bit.
+const STEPS: [usize; 2] = [1 << 11, 1 << 12];
+/// How many steps a record must have.
+const LONG: usize = 1 << 15;
 /// How many readings there must be for each parameter.
 const READINGS: usize = 20;
 /// Most iterations on the beginning.
@@ -41,29 +42,30 @@ pub(super) struct BetterStart {
     pub evaluation: Option<Evaluation>,
 }
 
-/// Whether the records of a problem are long, all functions constants, and the beginning has readings enough.
-pub(super) fn has_beginning(problem: &Problem) -> bool {
+/// How many steps the beginning of a problem's records has; `None` unless they are long, all functions constants, and
+/// there are readings enough in it.
+pub(super) fn beginning(problem: &Problem) -> Option<usize> {
     let is_constant = |f: &CoefficientFunction| {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
     };
-    let within = |channel: &Channel| {
-        let places = channel.places();
-        places.partition_point(|p| p.step < STEPS)
-    };
     let parameters = problem.parameters();
-    problem.oscillator.grid.nodes() > LONG * STEPS
+    let suits = problem.oscillator.grid.nodes() > LONG
         && problem.penalties.is_empty()
         && problem.variations.is_empty()
         && problem.comes_in_pieces()
         && problem.functions.iter().all(is_constant)
-        && parameters > 0
-        && problem.channels().map(within).sum::<usize>() >= READINGS * parameters
+        && parameters > 0;
+    let has_readings = |steps: &usize| {
+        let count: usize = problem.channels().map(|c| c.count_within(*steps)).sum();
+        count >= READINGS * parameters
+    };
+    (STEPS.into_iter().find(has_readings)).filter(|_| suits)
 }
 
-/// The beginning of a problem's records, with the same parameters.
-fn beginning(problem: &Problem) -> Option<Problem> {
+/// The first steps of a problem's records, with the same parameters.
+fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let grid = problem.oscillator.grid;
-    let grid = Grid::new(grid.start(), grid.step() * STEPS as f64, STEPS + 1)?;
+    let grid = Grid::new(grid.start(), grid.step() * steps as f64, steps + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
     let devices = functions.assemblies().to_vec();
@@ -71,7 +73,11 @@ fn beginning(problem: &Problem) -> Option<Problem> {
         problem.oscillator.clone(),
         Functions::with_devices(list?, devices, grid.nodes(), grid.step())?
             .with_scalars(functions.scalars().to_vec()),
-        problem.experiments.iter().map(first_steps).collect(),
+        problem
+            .experiments
+            .iter()
+            .map(|e| first_steps_of(e, steps))
+            .collect(),
     );
     part.oscillator.grid = grid;
     part.constraints = problem.constraints.clone();
@@ -97,10 +103,10 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
     })
 }
 
-fn first_steps(experiment: &Experiment) -> Experiment {
+fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     let short = |part: &Option<Stepwise>| {
-        let steps = |all: &Stepwise| all.values()[..STEPS.min(all.steps())].to_vec();
-        part.as_ref().map(|all| Stepwise::new(steps(all)))
+        let first = |all: &Stepwise| all.values()[..steps.min(all.steps())].to_vec();
+        part.as_ref().map(|all| Stepwise::new(first(all)))
     };
     let excitation = experiment.excitation.as_ref().map(|all| Excitation {
         force: short(&all.force),
@@ -113,16 +119,17 @@ fn first_steps(experiment: &Experiment) -> Experiment {
         sought: experiment.sought,
         excitation,
         drive: Drive::default(),
-        nodes: experiment.nodes.min(STEPS + 1),
+        nodes: experiment.nodes.min(steps + 1),
         device: experiment.device,
-        channels: channels.filter_map(|c| c.within(STEPS)).collect(),
+        channels: channels.filter_map(|c| c.within(steps)).collect(),
     }
 }
 
-/// Fits the beginning from `start` and evaluates the whole problem at what it finds; beside that, where a
+/// Fits the beginning, so many `steps`, from `start` and evaluates the whole problem at what it finds; beside that, where a
 /// processor is to spare, finds cost and gradient of the whole problem at `start`.
 pub(super) fn begin(
     problem: &Problem,
+    steps: usize,
     start: &[f64],
     settings: &FitSettings,
     before: &mut Before,
@@ -133,7 +140,7 @@ pub(super) fn begin(
     short.stopping.tolerance = Some(TOLERANCE);
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
     let fit_part = |watch: &mut Watch| {
-        let part = beginning(problem)?;
+        let part = first_steps(problem, steps)?;
         let found = watch.unseen(|watch| search(&part, start, &short, None, watch));
         let fit = found.ok()?;
         let clock = Instant::now();

@@ -7,7 +7,7 @@
 //! functions together, from a motion near the readings.
 
 use super::all_at_once::all_at_once;
-use super::beginning::{BetterStart, begin, has_beginning, reference};
+use super::beginning::{BetterStart, begin, beginning, reference};
 use super::executor::{search, search_evaluated};
 use super::recorder::Reference;
 use super::timings::timed;
@@ -132,13 +132,14 @@ pub fn fit_watched(
     let can_begin = climbs && is_discrete && settings.stopping.has_test();
     // To cost and gradient at the start values all rungs are compared; if the first one begins there, it finds out
     // for itself.
-    let (mut reference, begun, begun_in) = match settings.initial {
-        Initial::Functions if can_begin && has_beginning(problem) => {
-            let begun = begin(problem, start, settings, &mut before, watch);
+    let steps = can_begin.then(|| beginning(problem)).flatten();
+    let (mut reference, begun, begun_in) = match (settings.initial, steps) {
+        (Initial::Functions, Some(steps)) => {
+            let begun = begin(problem, steps, start, settings, &mut before, watch);
             (begun.reference, begun.start, begun.elapsed)
         }
-        Initial::Functions => (None, None, Duration::ZERO),
-        Initial::Data => {
+        (Initial::Functions, None) => (None, None, Duration::ZERO),
+        (Initial::Data, _) => {
             let (reference, timings) = reference(problem, start, settings);
             before.counts.forward += 1;
             before.counts.adjoint += u64::from(reference.is_some());
