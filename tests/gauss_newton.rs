@@ -69,10 +69,9 @@ fn problem(units: Units) -> Problem {
     let channel = problem.experiments[0].channels.remove(0);
     assert_eq!(*channel.weighting(), Weighting::Sigma(sigma));
     let sensor = Sensor {
+        gain: Value::Known(units.length),
         offset: Value::Sought(0),
         drift: Value::Sought(1),
-        gain: Value::Known(units.length),
-        ..Sensor::default()
     };
     let channel = channel.with_sensor(sensor);
     problem.experiments[0].channels.push(channel);
