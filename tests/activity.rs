@@ -7,7 +7,9 @@ use kmcfit::dynamics::{Device, Method};
 use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit::objective::GradientKind;
 use kmcfit::problem::Problem;
-use kmcfit::solvers::{FitSettings, Initial, Solver, Status, Stopping, active_constraints, fit};
+use kmcfit::solvers::{
+    ActiveGroup, FitSettings, Initial, Solver, Status, Stopping, active_constraints, fit, fit_from,
+};
 
 const NODES: usize = 101;
 
@@ -124,6 +126,100 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     }
 }
 
+/// m = 1 known, c and k sought from readings of sigma `sigma`, by a fit that stays where it starts.
+fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup> {
+    let plain = capped(0.2);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Damping, c, NODES),
+        CoefficientFunction::constant(Quantity::Stiffness, k, NODES),
+    ];
+    let observed = plain.experiments[0].channels[0].observed().to_vec();
+    let mut problem = common::problem_of(plain.oscillator, list, observed, Some(sigma));
+    problem.constraints.groups = groups;
+    let settings = FitSettings {
+        stopping: Stopping::exactly(0),
+        ..settings()
+    };
+    let found = fit_from(&problem, &problem.start(), &settings).unwrap();
+    assert_eq!(found.best.parameters, [c, k]);
+    active_constraints(&problem, &found.best)
+}
+
+/// Multipliers of bounds on single parameters, against those of the program that rows of several
+/// parameters need: with a row that is far away, which changes nothing else. J falls with c below 0.8, and with
+/// k above 1. The point lies as near to its bounds as a program comes, and J is told in any unit.
+#[test]
+fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
+    let (c, k) = (0.4, 1.3);
+    let all = f64::INFINITY;
+    let row = |name: &str, entries: &[(usize, f64)], bounds: [f64; 2]| {
+        let mut group = RowGroup::new(name);
+        group.push(entries.iter().copied(), bounds, [0.0, common::DURATION]);
+        group
+    };
+    let near = 5e-7;
+    let mut groups = vec![
+        row(
+            "-2 c from below",
+            &[(0, -2.0)],
+            [-2.0 * c * (1.0 + near), all],
+        ),
+        row(
+            "c from above, less near",
+            &[(0, 1.0)],
+            [-all, c * (1.0 + 1.8 * near)],
+        ),
+        row(
+            "3 k from below",
+            &[(1, 3.0)],
+            [3.0 * k * (1.0 - near), 100.0],
+        ),
+        row("-k far below", &[(1, -1.0)], [-100.0, -0.1]),
+    ];
+    let apart = row("sum", &[(0, 1.0), (1, 1.0)], [-all, 100.0]);
+    for sigma in [1e-3, 1.0, 1e3, 1e6] {
+        for _ in 0..2 {
+            let simple = resting(c, k, sigma, groups.clone());
+            let others = groups.iter().chain([&apart]).cloned().collect();
+            let program = resting(c, k, sigma, others);
+            assert_eq!(simple.len(), 3, "{simple:?}");
+            assert_eq!(program.len(), 3, "{program:?}");
+            let most = program.iter().fold(0.0f64, |m, g| m.max(g.multiplier));
+            assert!(most > 0.0);
+            for (one, other) in simple.iter().zip(&program) {
+                // The accuracy of the program.
+                let off = (one.multiplier - other.multiplier).abs();
+                assert!(off < 1e-4 * most, "{sigma}: {one:?} {other:?}");
+                assert_eq!((&one.name, &one.spans), (&other.name, &other.spans));
+                assert_eq!(one.pushed, other.pushed, "{sigma}: {one:?} {other:?}");
+                let is_nearest = !one.name.contains("less near");
+                assert_eq!(!one.pushed.is_empty(), is_nearest, "{one:?}");
+            }
+            groups.reverse();
+        }
+    }
+}
+
+/// J falls away from the bound that is near, towards one on the same row that is not.
+#[test]
+fn a_bound_that_the_data_pull_away_from_is_not_pushed() {
+    for a in [1.0, -2.0] {
+        let mut group = RowGroup::new("c");
+        let mut bounds = [0.4 * a, 0.5 * a];
+        bounds.sort_by(f64::total_cmp);
+        group.push([(0, a)], bounds, [0.0, common::DURATION]);
+        for sigma in [1e-6, 1.0] {
+            let active = resting(0.4, 1.0, sigma, vec![group.clone()]);
+            let [touched] = active.as_slice() else {
+                panic!("{active:?}");
+            };
+            assert_eq!((touched.rows, touched.multiplier), (1, 0.0), "{touched:?}");
+            assert!(touched.pushed.is_empty());
+        }
+    }
+}
+
 /// m = 1 known, c = 0.8 and k = 1 sought, their sum at most `cap`.
 fn with_sum_below(cap: f64) -> Problem {
     let mut problem = capped(0.2);
@@ -211,6 +307,43 @@ fn whether_a_push_counts_is_no_matter_of_units() {
             assert_eq!(!cap.pushed.is_empty(), counts, "{share} {unit} {cap:?}");
         }
     }
+}
+
+/// The bound m + k of a cone is part known and part sought. A push counts if where it gives way by one per
+/// cent J would fall by more than a millionth, to first order.
+#[test]
+fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
+    let mut problem = capped_in_units(1.0, 10.0);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Damping, 0.5, NODES),
+        CoefficientFunction::constant(Quantity::Stiffness, 0.9, NODES),
+    ];
+    let (grid, observed) = (problem.oscillator.grid, &problem.experiments[0].channels[0]);
+    let observed = observed.observed().to_vec();
+    problem = common::problem_of(problem.oscillator, list, observed, None);
+    let best = |problem: &Problem| {
+        let start = problem.functions.start();
+        fit(problem, &start, &settings(), &mut |_| {}).unwrap().best
+    };
+    let free = best(&problem).parameters;
+    let ratio = free[0] / (2.0 * free[1].sqrt());
+    let mut seen = [0; 2];
+    for exponent in 6..18 {
+        let max = ratio * (1.0 - 0.5f64.powi(exponent));
+        let statement = Statement::DampingRatio { max };
+        problem.constraints = statement.build(&grid, &problem.functions).unwrap();
+        let at = best(&problem);
+        let active = active_constraints(&problem, &at);
+        let [cap] = active.as_slice() else {
+            panic!("{active:?}");
+        };
+        let gain = 0.01 * (1.0 + at.parameters[1]) * cap.multiplier;
+        let counts = gain > 1e-6 * at.evaluation.cost;
+        assert_eq!(!cap.pushed.is_empty(), counts, "{max} {gain} {cap:?}");
+        seen[usize::from(counts)] += 1;
+    }
+    assert!(seen.iter().all(|n| *n > 2), "{seen:?}");
 }
 
 /// Where the bound stops the step altogether, the start is the minimum.

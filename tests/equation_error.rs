@@ -190,3 +190,38 @@ fn the_start_knows_no_unit_of_mass_or_length() {
         assert!(most(&other, &smoothed) < 1e-6, "{other:?} {smoothed:?}");
     }
 }
+
+/// How much a penalty smooths is told by the spring's force and the mass's at the start, whatever a
+/// damping that is sought begins with.
+#[test]
+fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
+    let plain = problem(Some(0.0), false);
+    let observed = plain.experiments[0].channels[0].observed().to_vec();
+    let observed = common::synthetic::with_noise(&observed, 0.05, 4);
+    let start = |damping: f64, weight: f64| {
+        let grid = plain.oscillator.grid;
+        let basis = Basis::PiecewiseLinear {
+            knots: uniform_knots(&grid, 6),
+        };
+        let rows = basis.roughness(&grid, 1);
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+            CoefficientFunction::constant(Quantity::Damping, damping, NODES),
+            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, vec![1.0; 6]),
+        ];
+        let observed = observed.clone();
+        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        equation_error(&problem, &problem.functions.start()).unwrap()
+    };
+    let most = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        pairs.fold(0.0, f64::max)
+    };
+    let smoothed = start(0.01, 1e2);
+    let free = start(0.01, 1e-6);
+    assert!(most(&smoothed, &free) > 1e-3, "{smoothed:?} {free:?}");
+    let other = start(10.0, 1e2);
+    // The pull towards the start, which is 1e-9 of the equation.
+    assert!(most(&other, &smoothed) < 1e-5, "{other:?} {smoothed:?}");
+}

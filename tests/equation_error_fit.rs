@@ -648,6 +648,21 @@ fn the_cost_is_the_integral_of_the_squared_error() {
     }
 }
 
+/// How many readings at either end stand for themselves.
+fn left_out(problem: &Problem) -> [usize; 2] {
+    let found = run(problem);
+    let predicted = &found.best.evaluation.predictions[0][0];
+    let residuals: Vec<f64> = problem.experiments[0].channels[0]
+        .residuals(predicted)
+        .collect();
+    // What is left out stands for itself.
+    let zeros = |r: &mut dyn Iterator<Item = &f64>| r.take_while(|r| **r == 0.0).count();
+    [
+        zeros(&mut residuals.iter()),
+        zeros(&mut residuals.iter().rev()),
+    ]
+}
+
 /// The device swings with sqrt(k/m) = 12.2 rad/s. Where a force is known, two periods are left out at
 /// either end; without one, only one reading is.
 #[test]
@@ -657,19 +672,6 @@ fn two_periods_are_left_out_beside_a_known_force() {
         base: None,
     };
     let mut problem = driven(ChannelKind::Acceleration, excitation, None);
-    let left_out = |problem: &Problem| {
-        let found = run(problem);
-        let predicted = &found.best.evaluation.predictions[0][0];
-        let residuals: Vec<f64> = problem.experiments[0].channels[0]
-            .residuals(predicted)
-            .collect();
-        // What is left out stands for itself.
-        let zeros = |r: &mut dyn Iterator<Item = &f64>| r.take_while(|r| **r == 0.0).count();
-        [
-            zeros(&mut residuals.iter()),
-            zeros(&mut residuals.iter().rev()),
-        ]
-    };
     let period = TAU / (300.0_f64 / 2.0).sqrt();
     let expected = 2.0 * period / problem.oscillator.grid.step();
     for count in left_out(&problem) {
@@ -679,4 +681,26 @@ fn two_periods_are_left_out_beside_a_known_force() {
     }
     problem.experiments[0].excitation = None;
     assert_eq!(left_out(&problem), [1, 1]);
+}
+
+/// No more than a quarter at either end, which of three periods is less than two.
+#[test]
+fn half_of_a_short_record_is_left() {
+    let excitation = Excitation {
+        force: Some(random_function(&oscillator().grid, 1)),
+        base: None,
+    };
+    let mut problem = driven(ChannelKind::Acceleration, excitation, None);
+    let grid = problem.oscillator.grid;
+    let period = TAU / (300.0_f64 / 2.0).sqrt();
+    let readings = (3.0 * period / grid.step()) as usize;
+    let channel = &problem.experiments[0].channels[0];
+    let (times, values) = (channel.times()[..readings].to_vec(), channel.observed());
+    let values = values[..readings].to_vec();
+    let weighting = Weighting::Integral {
+        spacing: grid.step(),
+    };
+    let short = Channel::new(channel.kind(), times, values, weighting, &grid, NODES).unwrap();
+    problem.experiments[0].channels = vec![short];
+    assert_eq!(left_out(&problem), [readings / 4; 2]);
 }

@@ -500,3 +500,20 @@ fn readings_that_are_fitted_exactly_have_a_sigma() {
     let sigma = sigma_of(&with_sigma) / (f64::EPSILON * rms(&exact));
     assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
 }
+
+/// Readings that are all zero, of what is at rest, have no scale: the sigma stays as it was.
+#[test]
+fn readings_of_nothing_keep_their_sigma() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start = vec![None; 3];
+    let mut problem = with_an_offset(vec![0.0; NODES], &setup);
+    problem.experiments[0].initial = State {
+        displacement: 0.0,
+        velocity: 0.0,
+    };
+    let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
+    let (with_sigma, fit) = found.unwrap();
+    assert_eq!(sigma_of(&with_sigma), sigma_of(&problem));
+    assert_eq!(fit.best.evaluation.cost, 0.0);
+    assert_eq!(fit.best.parameters, [0.0]);
+}

@@ -156,11 +156,11 @@ struct Multipliers {
 
 /// The multipliers at `point`; `None` if the quadratic program fails.
 fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
+    if problem.constraints.are_simple() {
+        return Some(simple_multipliers(problem, point));
+    }
     let metric = point.relative_metric(problem);
     let gradient = &point.gradient.euclidean;
-    if problem.constraints.are_simple() {
-        return Some(simple_multipliers(problem, point, &metric));
-    }
     // Scaled so that the largest entry of the right-hand side is near 1.
     let steepest = gradient
         .iter()
@@ -188,36 +188,35 @@ fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
     })
 }
 
-/// [`multipliers`] where every row bounds one parameter: then the step of steepest descent is stopped
-/// in each parameter by itself, by the nearest of its bounds.
-fn simple_multipliers(problem: &Problem, point: &Point, metric: &[f64]) -> Multipliers {
+/// [`multipliers`] where every row bounds one parameter: then J falls into each parameter's bounds by
+/// itself, and the nearest bound that it falls into, if it is near, takes all of the derivative.
+fn simple_multipliers(problem: &Problem, point: &Point) -> Multipliers {
     let groups = &problem.constraints.groups;
     let gradient = &point.gradient.euclidean;
-    let step = |j: usize| -gradient[j] / metric[j];
-    // The bound that stops each parameter: how far it lies along the step, and its row.
-    let mut stops: Vec<Option<(f64, [usize; 2], f64)>> = vec![None; metric.len()];
+    // How far each parameter's nearest bound lies in the direction in which J falls, and its row.
+    let mut stops: Vec<Option<(f64, [usize; 2], f64)>> = vec![None; gradient.len()];
     for (g, group) in groups.iter().enumerate() {
         for i in 0..group.rows.len() {
             let Some((j, a)) = group.single(i) else {
                 continue;
             };
-            let [lower, upper] = group.bounds(i).map(|bound| bound / a);
-            let bound = match (step(j) > 0.0) == (a > 0.0) {
-                true => upper,
-                false => lower,
+            let [lower, upper] = group.bounds(i);
+            let value = a * point.parameters[j];
+            let room = match (gradient[j] < 0.0) == (a > 0.0) {
+                true => upper - value,
+                false => value - lower,
             };
-            let room = ((bound - point.parameters[j]) * step(j).signum()).max(0.0);
-            let nearer = stops[j].is_none_or(|(nearest, ..)| room < nearest);
-            if room < step(j).abs() && nearer {
+            let is_near = room <= NEAR * group.scale(i, &point.parameters);
+            let room = room / a.abs();
+            if is_near && stops[j].is_none_or(|(nearest, ..)| room < nearest) {
                 stops[j] = Some((room, [g, i], a));
             }
         }
     }
     let mut rows: Vec<Vec<f64>> = groups.iter().map(|g| vec![0.0; g.rows.len()]).collect();
-    for (j, stop) in stops.iter().enumerate() {
-        if let Some((room, [g, i], a)) = *stop {
-            let moved = room * step(j).signum();
-            rows[g][i] = -(metric[j] * moved + gradient[j]) / a;
+    for (stop, slope) in stops.iter().zip(gradient) {
+        if let Some((_, [g, i], a)) = *stop {
+            rows[g][i] = -slope / a;
         }
     }
     Multipliers {

@@ -58,24 +58,7 @@ pub fn fit_with_noise_watched(
             Status::Interrupted | Status::TimeLimit
         );
         let next = search(&problem, &found.best.parameters, settings, None, watch)?;
-        found = Fit {
-            counts: found.counts + next.counts,
-            timings: found.timings + next.timings,
-            elapsed: found.elapsed + next.elapsed,
-            rungs: found.rungs,
-            history: match next.history.is_empty() {
-                true => found.history,
-                false => next.history,
-            },
-            snapshots: found.snapshots,
-            initial_cost: next.initial_cost,
-            // Rounds that were ended from outside are not at their end, wherever the last one came to.
-            outcome: match ended {
-                true => found.outcome,
-                false => next.outcome,
-            },
-            ..next
-        };
+        found = with_round(found, next, ended);
         if ended || change < SETTLED {
             break;
         }
@@ -85,6 +68,27 @@ pub fn fit_with_noise_watched(
         found.initial_cost = evaluation.cost;
     }
     Ok((problem, found))
+}
+
+/// The fit `found`, gone on with by another round, `next`: the last place, with the work of both. Rounds
+/// that were `ended` from outside are not at their end, wherever the last one came to.
+fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
+    Fit {
+        counts: found.counts + next.counts,
+        timings: found.timings + next.timings,
+        elapsed: found.elapsed + next.elapsed,
+        rungs: found.rungs,
+        history: match next.history.is_empty() {
+            true => found.history,
+            false => next.history,
+        },
+        snapshots: found.snapshots,
+        outcome: match ended {
+            true => found.outcome,
+            false => next.outcome,
+        },
+        ..next
+    }
 }
 
 /// Puts the sigmas of the residuals into the problem; the largest relative change.
@@ -124,6 +128,50 @@ fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
             residuals.iter_mut().for_each(|r| *r = r.abs());
             residuals.sort_by(f64::total_cmp);
             MEDIAN_TO_SIGMA * residuals[residuals.len() / 2]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+    use crate::solvers::{Solver, Stopping, fit_from};
+    use std::time::Duration;
+
+    /// Work and time of both, the motions of the first, and the place of the second.
+    #[test]
+    fn a_fit_with_another_round_has_the_work_of_both() {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("free decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let parts = [Part::fixed(1.0), Part::constant(0.5), Part::constant(2.0)];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let settings = FitSettings {
+            solver: Solver::SteepestDescent,
+            stopping: Stopping::exactly(2),
+            ..FitSettings::default()
+        };
+        let mut first = fit_from(&problem, &problem.start(), &settings).unwrap();
+        let next = fit_from(&problem, &first.best.parameters, &settings).unwrap();
+        first.timings.start = Duration::from_secs(3600);
+        first.elapsed = Duration::from_secs(7200);
+        assert_ne!(first.snapshots, next.snapshots);
+        assert!(!next.elapsed.is_zero() && next.timings.adjoint > Duration::ZERO);
+        for ended in [false, true] {
+            let whole = with_round(first.clone(), next.clone(), ended);
+            assert_eq!(whole.counts, first.counts + next.counts);
+            assert_eq!(whole.elapsed, first.elapsed + next.elapsed);
+            assert_eq!(
+                whole.timings.sum(),
+                first.timings.sum() + next.timings.sum()
+            );
+            assert_eq!(whole.snapshots, first.snapshots);
+            assert_eq!(whole.best.parameters, next.best.parameters);
+            assert_eq!(whole.initial_cost, next.initial_cost);
         }
     }
 }
