@@ -109,6 +109,21 @@ fn starters_can_be_fitted() {
     assert_eq!(schema["title"], "kmcfit model file");
 }
 
+/// Readings of one value move no oscillator: steps as long as a period stand still as well, and match them.
+#[test]
+fn what_only_long_steps_can_do_is_not_called_sure() {
+    let bench = Workbench::empty();
+    let rows: String = (0..12).map(|i| format!("{i},1\n")).collect();
+    bench.write("constant.csv", &format!("t,y\n{rows}"));
+    bench.run_to(0, &["init", "constant.csv"]);
+    let summary = bench.run(&["fit", "constant.yaml", "--no-report"]).1;
+    assert!(
+        summary.contains("open      all of it: on half the step"),
+        "{summary}"
+    );
+    assert!(!summary.contains("identified"), "{summary}");
+}
+
 #[test]
 fn a_starter_says_what_was_found() {
     let bench = Workbench::empty();
