@@ -10,33 +10,17 @@ const POOR: f64 = 90.0;
 const PATTERN: f64 = 0.05;
 /// Half the step may change the model's readings by this share of the largest one.
 const COARSE: f64 = 1e-3;
-/// A change by more than this: what was fitted is the stepper, and not the device.
-const MEANINGLESS: f64 = 0.1;
 /// So many things to try next are enough.
 const MOST: usize = 3;
 
-/// What the readings settle, in sentences; nothing where the steps are far too coarse.
+/// What the readings settle, in sentences.
 pub fn settled(document: &ResultDocument) -> Vec<&str> {
-    match changes_by(document, MEANINGLESS) {
-        true => Vec::new(),
-        false => sentences(document, true),
-    }
+    sentences(document, true)
 }
 
 /// What they leave open, in sentences.
 pub fn open(document: &ResultDocument) -> Vec<&str> {
-    match changes_by(document, MEANINGLESS) {
-        true => vec![
-            "all of it: on half the step the model's readings change by more than a tenth of the largest one",
-        ],
-        false => sentences(document, false),
-    }
-}
-
-/// Whether half the step changes the model's readings by more than this share of the largest one.
-fn changes_by(document: &ResultDocument, share: f64) -> bool {
-    let half = document.half_step.as_ref();
-    half.is_some_and(|half| half.change_per_reading > share)
+    sentences(document, false)
 }
 
 fn sentences(document: &ResultDocument, is_settled: bool) -> Vec<&str> {
@@ -82,7 +66,7 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
                 .into(),
         );
     }
-    if changes_by(document, COARSE) {
+    if (document.half_step.as_ref()).is_some_and(|half| half.change_per_reading > COARSE) {
         steps.push("the steps are coarse: grid.nodes=auto".into());
     }
     let known = &document.identifiability;

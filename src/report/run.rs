@@ -9,7 +9,7 @@ use super::document::{
 };
 use super::files::Stage;
 use super::knowledge::knowledge;
-use super::measured::{self, ChannelSummary, StatisticsSummary};
+use super::measured::{self, ChannelSummary, RefinedSummary, StatisticsSummary};
 use super::page::fit_page;
 use super::render;
 use super::timings::TimingsSummary;
@@ -30,6 +30,9 @@ use std::time::Duration;
 
 /// Up to so many free values the bands are computed with every fit: some milliseconds.
 const FEW_PARAMETERS: usize = 64;
+/// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
+/// the stepper, and not the device.
+const MEANINGLESS: f64 = 0.1;
 
 /// A fitted model and what it predicts.
 #[derive(Debug, Clone, Copy)]
@@ -118,6 +121,10 @@ impl FittedModel<'_> {
     /// The result document.
     pub fn document(&self) -> ResultDocument {
         let (model, fit) = (self.model, self.fit);
+        let half_step = match self.is_simulated() {
+            true => measured::refined(&model.problem, &fit.best.evaluation),
+            false => None,
+        };
         ResultDocument {
             format: FORMAT,
             title: model.title.clone(),
@@ -149,7 +156,7 @@ impl FittedModel<'_> {
             timings: TimingsSummary::new(fit, Duration::ZERO, fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
-            identifiability: self.identifiability(),
+            identifiability: self.identifiability(half_step.as_ref()),
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
@@ -165,10 +172,7 @@ impl FittedModel<'_> {
                 true => measured::statistics(&model.problem, &fit.best.evaluation),
                 false => StatisticsSummary::default(),
             },
-            half_step: match self.is_simulated() {
-                true => measured::refined(&model.problem, &fit.best.evaluation),
-                false => None,
-            },
+            half_step,
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -185,8 +189,9 @@ impl FittedModel<'_> {
         self.known.bands.as_ref()
     }
 
-    /// What was known before the fit; the equation error has no simulated motion to count about.
-    fn identifiability(&self) -> IdentifiabilitySummary {
+    /// What was known before the fit, and what its optimum tells, unless half the step tells another story; the equation
+    /// error has no simulated motion to count about.
+    fn identifiability(&self, half_step: Option<&RefinedSummary>) -> IdentifiabilitySummary {
         let problem = &self.model.problem;
         let knowledge = knowledge(problem);
         if !self.is_simulated() {
@@ -197,6 +202,17 @@ impl FittedModel<'_> {
             };
         }
         let count = count(problem);
+        if half_step.is_some_and(|half| half.change_per_reading > MEANINGLESS) {
+            let sentence = "the device is not identified: on half the step the model's readings change by more than a \
+                            tenth of the largest one";
+            return IdentifiabilitySummary {
+                seen: count.seen_at_most,
+                of: count.of,
+                verdicts: vec![sentence.into()],
+                knowledge,
+                ..IdentifiabilitySummary::default()
+            };
+        }
         IdentifiabilitySummary {
             seen: count.seen_at_most,
             of: count.of,
