@@ -3,48 +3,10 @@
 //! New here? [`guide`] is a short course: a tutorial, how to choose and what goes wrong, the theory. [`builder`]
 //! states a problem in a few lines of Rust.
 //!
-//! # Equations
+#![cfg_attr(doc, doc = include_str!("guide/equations.md"))]
 //!
-//! **Motion.** A device with mass `m(t) > 0` (kg), damping `c(t)` (N s/m), stiffness `k(t)` (N/m) and
-//! further terms ([`dynamics::Term`]) moves from a state `y(0)`, `y'(0)`, known or sought, by
-//!
-//! ```text
-//! m (y'' + b'') + c y' + k y + sum_j p_j phi_j(y, y') = f
-//! ```
-//!
-//! under a force `f` and on a base `b`, relative to which `y` counts; stepped by an explicit Runge–Kutta method on equally spaced nodes. Each function is a basis times
-//! parameters, and `theta` are the parameters of all.
-//!
-//! **Cost.** The fit minimises, without a factor 1/2,
-//!
-//! ```text
-//! J(theta) = sum over records     of  integral (y - y_obs)^2 dt             (no sigma given)
-//!                                 or  sum over readings rho((z - z_obs)/sigma)
-//!          + sum over penalties   of  weight * integral (d^q p/dt^q - ref)^2 dt    (ref: q = 0 only)
-//!          + sum over variations  of  weight * total variation of p
-//!          + sum over soft groups of  weight * mean over rows of excess^2
-//!          + sum over priors      of  ((x - mean)/sigma)^2
-//! ```
-//!
-//! where `z = gain * (y, y' or y'') + offset + drift * t` is the model of a reading
-//! ([`objective::Channel`]) and `rho(u) = u^2` or a robust loss ([`objective::Loss`]),
-//!
-//! subject to linear rows and second-order cones in `theta`. [`problem::Problem::evaluate`] computes
-//! it; the integral over the readings is the trapezoid rule.
-//!
-//! **Adjoint.** One backward solve gives the gradient with respect to all functions. For functions of
-//! time and the cost without sigma it is Eq. 13 of the paper, with `z = z' = 0` at the end:
-//!
-//! ```text
-//! m z'' + (2 m' - c) z' + (m'' - c' + k) z = 2 (y - y_obs)
-//! dJ/dm = -z y'',   dJ/dc = -z y',   dJ/dk = -z y
-//! ```
-//!
-//! ([`dynamics::adjoint::continuous`]). The default is the exact transpose of the time stepper instead
-//! ([`dynamics::adjoint::discrete`]): the gradient of the discretised cost, right to rounding.
-//!
-//! Free motion stays as it is when `m`, `c` and `k` are multiplied by one positive `s(t)`: at best it
-//! shows `k/m` and `c/m`. Constraints and penalties say the rest.
+//! In the library: [`dynamics::Term`] has the terms, [`objective::Channel`] the sensors and [`objective::Loss`] the
+//! losses; [`problem::Problem::evaluate`] computes `J`, [`dynamics::adjoint`] the adjoints.
 //!
 //! # Modules, in the order in which data flow
 //!

@@ -10,7 +10,8 @@ use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
 
-const PAGES: [&str; 3] = ["tutorial", "choosing", "theory"];
+/// The last is on the front page.
+const PAGES: [&str; 4] = ["tutorial", "choosing", "theory", "equations"];
 
 #[test]
 fn the_guide_is_that_of_the_docs() {

@@ -49,12 +49,19 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     ModelFile::parse(&out, starter.text.as_str())?;
     write_whole(&out, &starter.text).map_err(|error| unwritable(&out, &error))?;
     let schema = folder.join(SCHEMA);
-    if !schema.exists() {
+    let is_new = !schema.exists();
+    if is_new {
         write_whole(&schema, &schema::text()).map_err(|error| unwritable(&schema, &error))?;
     }
     let mut text = format!("{}\n", arguments.data.display());
     for sentence in &starter.found {
         text += &format!("  {sentence}\n");
+    }
+    if is_new {
+        text += &format!(
+            "  {} is for editors: it completes and checks keys while you type\n",
+            schema.display()
+        );
     }
     let place = out.display();
     let argument = shell_quoted(&place.to_string());

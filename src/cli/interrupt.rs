@@ -10,6 +10,9 @@ pub fn flag() -> Arc<AtomicBool> {
     let seen = Arc::clone(&flag);
     let handler = move || {
         if seen.swap(true, Ordering::Relaxed) {
+            eprintln!(
+                "stopped at once; `kmcfit resume FOLDER` goes on from what was kept on the way, if anything was"
+            );
             std::process::exit(INTERRUPTED.into());
         }
     };

@@ -52,9 +52,12 @@ impl Progress {
         }
         self.bar.set_position(row.iteration);
         let message = message(moment, self.searches.get());
-        let left = HumanDuration(self.left());
-        self.bar
-            .set_message(format!("{message}  {left} left at most"));
+        // Of the first iterations nobody knows what the others will take.
+        let left = self.left();
+        self.bar.set_message(match left >= Duration::from_secs(1) {
+            true => format!("{message}  {} left at most", HumanDuration(left)),
+            false => message,
+        });
     }
 
     /// What the iterations or the wall clock leave, whichever ends first.

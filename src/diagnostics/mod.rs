@@ -7,6 +7,7 @@ mod autocorrelation;
 mod information;
 #[cfg(test)]
 mod noise;
+mod pattern;
 mod quantiles;
 mod record;
 mod residuals;
@@ -15,6 +16,7 @@ mod words;
 
 pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
 pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+pub use pattern::{far_off, offset_and_drift};
 pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, reduced_chi_square, rms};

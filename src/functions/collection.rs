@@ -1,6 +1,6 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
-use super::{CoefficientFunction, Design, Gram, Scalar};
+use super::{CoefficientFunction, Design, Gram, Runs, Scalar};
 use crate::dynamics::Device;
 use crate::dynamics::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
@@ -26,6 +26,8 @@ pub struct Functions {
     constant: Vec<bool>,
     /// The fixed part and the only entry of the design of each function that has the same value at every node.
     flat: Vec<Option<[f64; 2]>>,
+    /// Of each function whose design has them.
+    runs: Vec<Option<Runs>>,
 }
 
 impl Functions {
@@ -80,6 +82,7 @@ impl Functions {
         Some(Self {
             constant: list.iter().map(|f| f.design.is_constant()).collect(),
             flat: list.iter().map(CoefficientFunction::flat).collect(),
+            runs: list.iter().map(|f| Runs::of(&f.design)).collect(),
             first_nodes,
             list,
             ranges,
@@ -163,6 +166,20 @@ impl Functions {
         self.constant[index]
     }
 
+    /// The rows of the design of function `index` that see the same parameters, if there are long runs of them.
+    pub(crate) fn runs(&self, index: usize) -> Option<&Runs> {
+        self.runs[index].as_ref()
+    }
+
+    /// The largest size that a change `delta` of the parameters of function `index` has at any node.
+    pub(crate) fn largest_change(&self, index: usize, delta: &[f64]) -> f64 {
+        match (self.flat[index], delta, &self.runs[index]) {
+            (Some([_, entry]), [delta], _) => (entry * delta).abs(),
+            (_, _, Some(runs)) => runs.largest(delta, self.nodes),
+            _ => self.list[index].design.largest(delta, self.nodes),
+        }
+    }
+
     /// Whether function `index` of the list is constant, or has no parameters.
     pub fn is_constant_or_known(&self, index: usize) -> bool {
         self.constant[index] || matches!(self.list[index].design, Design::Empty)
@@ -211,17 +228,28 @@ impl Functions {
             let theta = &theta[self.ranges[f].clone()];
             match (self.flat[f], theta) {
                 (Some([offset, entry]), [theta]) => values.fill(offset + entry * theta),
-                _ => self.list[f].values_into(theta, values),
+                _ => self.values_into(f, theta, values),
             }
+        }
+    }
+
+    /// Values of function `index` at the nodes.
+    fn values_into(&self, index: usize, theta: &[f64], values: &mut [f64]) {
+        let function = &self.list[index];
+        match &self.runs[index] {
+            Some(runs) => {
+                values.copy_from_slice(&function.offset);
+                runs.multiply_add(theta, values);
+            }
+            None => function.values_into(theta, values),
         }
     }
 
     /// Every function of the list at the nodes, for the parameters `theta`.
     pub fn values(&self, theta: &[f64]) -> Vec<Vec<f64>> {
-        let parts = self.list.iter().zip(&self.ranges);
-        let each = parts.map(|(function, range)| {
+        let each = self.ranges.iter().enumerate().map(|(index, range)| {
             let mut values = vec![0.0; self.nodes];
-            function.values_into(&theta[range.clone()], &mut values);
+            self.values_into(index, &theta[range.clone()], &mut values);
             values
         });
         each.collect()
@@ -241,10 +269,11 @@ impl Functions {
     /// values to Euclidean gradient in parameters.
     pub fn add_transpose(&self, nodal: &Device, which: usize, out: &mut [f64]) {
         for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
-            let range = self.ranges[f].clone();
-            self.list[f]
-                .design
-                .transpose_multiply_add(values, &mut out[range]);
+            let out = &mut out[self.ranges[f].clone()];
+            match &self.runs[f] {
+                Some(runs) => runs.transpose_multiply_add(values, out),
+                None => self.list[f].design.transpose_multiply_add(values, out),
+            }
         }
     }
 

@@ -97,32 +97,11 @@ impl Design {
                 out[0] = pairs.fold(out[0], |sum, (b, value)| sum + b * value);
             }
             Design::Sparse(matrix) => {
-                let (offsets, columns, entries) = matrix.csr_data();
-                // The sums of two columns, as on knots, which the next row mostly goes on with.
-                let (mut held, mut sums) = ([0, 0], [0.0; 2]);
-                let put_back = |held: [usize; 2], sums: [f64; 2], out: &mut [f64]| {
-                    if held[0] != held[1] {
-                        (out[held[0]], out[held[1]]) = (sums[0], sums[1]);
-                    }
-                };
-                for (ends, value) in offsets.windows(2).zip(nodal) {
-                    let range = ends[0]..ends[1];
-                    if let (&[j, k], &[b, c]) = (&columns[range.clone()], &entries[range.clone()]) {
-                        if held != [j, k] {
-                            put_back(held, sums, out);
-                            (held, sums) = ([j, k], [out[j], out[k]]);
-                        }
-                        sums[0] += b * value;
-                        sums[1] += c * value;
-                        continue;
-                    }
-                    put_back(held, sums, out);
-                    held = [0, 0];
-                    for (&j, b) in columns[range.clone()].iter().zip(&entries[range]) {
+                for (row, value) in matrix.row_iter().zip(nodal) {
+                    for (&j, b) in row.col_indices().iter().zip(row.values()) {
                         out[j] += b * value;
                     }
                 }
-                put_back(held, sums, out);
             }
         }
     }

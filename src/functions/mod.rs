@@ -11,6 +11,7 @@ mod gram;
 mod penalty;
 mod quantity;
 mod ratios;
+mod runs;
 mod scalar;
 mod variation;
 
@@ -22,6 +23,7 @@ pub use gram::Gram;
 pub use penalty::Penalty;
 pub use quantity::Quantity;
 pub use ratios::Ratios;
+pub(crate) use runs::Runs;
 pub use scalar::{Prior, Scalar, Value};
 pub use variation::Variation;
 

@@ -46,7 +46,8 @@ pub struct Judgement {
 }
 
 /// By how much a number is known: as a share of its own largest value, or where that is within the
-/// band, as a number beside which the value cannot be told from zero.
+/// band, as a number beside which the value cannot be told from zero. In between it is small beside the natural
+/// size of such a number, and that is what is known of it.
 fn identified(name: &str, band: &Band) -> String {
     let half = band.standard_error.iter().filter(|e| e.is_finite());
     let half = NORMAL_975 * half.fold(0.0f64, |most, e| most.max(*e));
@@ -55,6 +56,12 @@ fn identified(name: &str, band: &Band) -> String {
     if half >= own {
         let unit = &band.unit;
         return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
+    }
+    if half > IDENTIFIED * own {
+        let (unit, share) = (&band.unit, 100.0 * half / own);
+        return format!(
+            "{name} is small, and known to within {half:.1e} {unit}: {share:.0} % of its largest value (95 %)"
+        );
     }
     let share = match half / own {
         share if share < 1e-4 => format!("{share:.0e}"),

@@ -53,15 +53,10 @@ impl Problem {
     /// [`Problem::relative_change`] with the natural sizes at hand.
     pub(crate) fn change_in_sizes(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
-        let parts = self.functions.iter().zip(self.functions.ranges());
-        let functions = parts.zip(sizes);
+        let ranges = self.functions.ranges().iter().zip(sizes);
         let mut most = 0.0f64;
-        for (index, ((function, range), size)) in functions.enumerate() {
-            let delta = &delta[range.clone()];
-            let change = match self.functions.is_constant(index) {
-                true => (function.design.row(0)).fold(0.0, |_, (j, b)| (b * delta[j]).abs()),
-                false => function.design.largest(delta, self.functions.nodes()),
-            };
+        for (index, (range, size)) in ranges.enumerate() {
+            let change = (self.functions).largest_change(index, &delta[range.clone()]);
             if change != 0.0 {
                 most = most.max(change / size);
             }

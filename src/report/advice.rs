@@ -2,7 +2,9 @@
 //! the terminal and the page say the same.
 
 use super::document::ResultDocument;
-use crate::solvers::{Solver, Status};
+use super::measured::{ChannelSummary, PatternSummary};
+use crate::dynamics::Method;
+use crate::solvers::{Initial, Solver, Status};
 
 /// Below this share of the readings the fit does not explain the record, per cent.
 const POOR: f64 = 90.0;
@@ -34,7 +36,13 @@ fn sentences(document: &ResultDocument, is_settled: bool) -> Vec<&str> {
 
 /// Whether a sentence of the counting or of a verdict says that something can be known.
 fn says_settled(sentence: &str) -> bool {
-    let open = [" is free", " not identified", " only on ", " is not seen"];
+    let open = [
+        " is free",
+        " not identified",
+        " only on ",
+        " is not seen",
+        " is not known",
+    ];
     !open.iter().any(|words| sentence.contains(words))
 }
 
@@ -51,24 +59,8 @@ pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
 pub fn next(document: &ResultDocument) -> Vec<String> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    let pattern =
-        channels().any(|c| c.sigma.is_some() && c.whiteness_p_value.is_some_and(|p| p < PATTERN));
-    if let Some(worst) = worst_fit(document).filter(|worst| *worst < POOR) {
-        steps.push(format!(
-            "the readings are matched to {worst:.0} % only: start from the readings (fit.initial=data), or let a \
-             function change more (basis: piecewise-linear, more knots)"
-        ));
-    } else if pattern {
-        steps.push(
-            "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, \
-             quadratic_damping, coulomb_friction)"
-                .into(),
-        );
-    }
-    if (document.half_step.as_ref()).is_some_and(|half| half.change_per_reading > COARSE) {
-        steps.push("the steps are coarse: grid.nodes=auto".into());
-    }
+    steps.extend(about_steps(document));
+    steps.extend(about_residuals(document));
     let known = &document.identifiability;
     let is_simulated = document.model.method != Solver::EquationError.name();
     if is_simulated && document.model.parameters > 0 {
@@ -84,6 +76,81 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     }
     steps.truncate(MOST);
     steps
+}
+
+/// Steps that are too long, with as many nodes as would do by the order of the stepper.
+fn about_steps(document: &ResultDocument) -> Option<String> {
+    let change = document.half_step.as_ref()?.change_per_reading;
+    if change <= COARSE {
+        return None;
+    }
+    let stepper = match document.model.stepper == Method::Midpoint.name() {
+        true => Method::Midpoint,
+        false => Method::Rk4,
+    };
+    // By more than 16 it is not the order that rules any more.
+    let finer = (change / COARSE)
+        .powf(1.0 / f64::from(stepper.order()))
+        .clamp(2.0, 16.0)
+        .ceil();
+    let nodes = (document.model.nodes - 1) as f64 * finer + 1.0;
+    Some(format!("the steps are coarse: grid.nodes={nodes}"))
+}
+
+/// What the residuals ask for.
+fn about_residuals(document: &ResultDocument) -> Option<String> {
+    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    let patterns = channels().filter_map(|c| Some((c, c.pattern.as_ref()?)));
+    if let Some((channel, pattern)) = patterns.into_iter().next() {
+        return Some(about_pattern(channel, pattern));
+    }
+    if let Some(worst) = worst_fit(document).filter(|worst| *worst < POOR) {
+        let tried = document
+            .rungs
+            .iter()
+            .any(|r| r.start == Initial::Data.name());
+        let elsewhere = match tried {
+            true => "",
+            false => "start from the readings (fit.initial=data), or ",
+        };
+        return Some(format!(
+            "the readings are matched to {worst:.0} % only: {elsewhere}let a function change more (basis: \
+             piecewise-linear, more knots)"
+        ));
+    }
+    let coloured =
+        channels().any(|c| c.sigma.is_some() && c.whiteness_p_value.is_some_and(|p| p < PATTERN));
+    coloured.then(|| {
+        "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, quadratic_damping, \
+         coulomb_friction)"
+            .into()
+    })
+}
+
+fn about_pattern(channel: &ChannelSummary, pattern: &PatternSummary) -> String {
+    let kind = &channel.kind;
+    match pattern {
+        PatternSummary::FarOff { readings, first } => {
+            let lie = match readings {
+                1 => format!("one reading of the {kind} lies far off, at {first} s"),
+                _ => {
+                    format!("{readings} readings of the {kind} lie far off, the first at {first} s")
+                }
+            };
+            let sigma = match channel.sigma {
+                Some(_) => "",
+                None => ", with `sigma`",
+            };
+            format!("{lie}: a robust loss (loss: {{{kind}: huber}}{sigma}) in the experiment")
+        }
+        PatternSummary::Offset => format!(
+            "the residuals of the {kind} have an offset: sensors: {{{kind}: {{offset: estimate}}}} in the experiment"
+        ),
+        PatternSummary::Drift => format!(
+            "the residuals of the {kind} drift: sensors: {{{kind}: {{offset: estimate, drift: estimate}}}} in the \
+             experiment"
+        ),
+    }
 }
 
 fn about_ending(document: &ResultDocument) -> Option<String> {

@@ -3,15 +3,21 @@
 use super::document::number_or_null;
 use crate::config::{ChannelNote, HoldOut, Model};
 use crate::diagnostics::{
-    InformationCriteria, ResidualDiagnostics, ResidualRecord, with_estimated_sigma,
-    with_known_sigma,
+    InformationCriteria, ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift,
+    with_estimated_sigma, with_known_sigma,
 };
+use crate::dynamics::Breakdown;
 use crate::functions::CoefficientFunction;
-use crate::objective::{Channel, Evaluation, Refined, Weighting};
+use crate::objective::{Channel, Evaluation, Loss, Refined, Weighting};
 use crate::problem::Problem;
 use crate::solvers::{Fit, predict_held_out};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+
+/// Residuals below this share of the largest reading are rounding.
+const ROUNDING: f64 = 1e-6;
+/// A pattern that holds more than this share of the squares is the first thing to mend.
+const HALF: f64 = 0.5;
 
 /// One channel of an experiment at the best point, in its own unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,6 +43,9 @@ pub struct ChannelSummary {
     /// Whether that was estimated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sigma_estimated: bool,
+    /// What the residuals have that is neither noise nor motion, if there is anything of the kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern: Option<PatternSummary>,
     /// What the channel adds to J.
     #[serde(deserialize_with = "number_or_null")]
     pub cost: f64,
@@ -49,6 +58,23 @@ pub struct ChannelSummary {
     /// That of white noise lies below this in 95 of 100 lags.
     #[serde(deserialize_with = "number_or_null")]
     pub autocorrelation_band: f64,
+}
+
+/// What residuals have that is neither noise nor motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PatternSummary {
+    /// Single readings far off ([`crate::diagnostics::far_off`]), under least squares.
+    FarOff {
+        /// How many.
+        readings: usize,
+        /// Time of the first, s.
+        first: f64,
+    },
+    /// Their mean holds more than half of their squares.
+    Offset,
+    /// The straight line through what their mean leaves holds more than half of their squares.
+    Drift,
 }
 
 /// Readings that are not used, and why.
@@ -148,12 +174,39 @@ pub fn channel(channel: &Channel, note: Option<&ChannelNote>, predicted: &[f64])
         fit_percent: diagnostics.fit_percent,
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
+        pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
         whiteness: diagnostics.whiteness.to_string(),
         whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
             .then_some(diagnostics.whiteness.p_value),
         autocorrelation_band: diagnostics.band,
         autocorrelation: diagnostics.autocorrelation,
+    }
+}
+
+/// What the residuals of a channel have that a robust loss or a sensor's offset or drift may explain.
+fn pattern(channel: &Channel, predicted: &[f64]) -> Option<PatternSummary> {
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let largest =
+        |values: &mut dyn Iterator<Item = &f64>| values.fold(0.0f64, |m, v| m.max(v.abs()));
+    // Rounding may have any pattern.
+    let missed = channel.observed().iter().zip(predicted).map(|(o, p)| o - p);
+    let missed: Vec<f64> = missed.collect();
+    if largest(&mut missed.iter()) <= ROUNDING * largest(&mut channel.observed().iter()) {
+        return None;
+    }
+    let far = far_off(&residuals);
+    if let (Some(first), Loss::Squares) = (far.first(), channel.loss()) {
+        return Some(PatternSummary::FarOff {
+            readings: far.len(),
+            first: channel.times()[*first],
+        });
+    }
+    let [offset, drift] = offset_and_drift(channel.times(), &residuals);
+    match () {
+        () if offset > HALF => Some(PatternSummary::Offset),
+        () if drift > HALF => Some(PatternSummary::Drift),
+        () => None,
     }
 }
 
@@ -184,9 +237,7 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> StatisticsSumma
     };
     // Penalties take away degrees of freedom that nobody has counted here.
     let plain = problem.penalties.is_empty() && problem.variations.is_empty();
-    let squares = problem
-        .channels()
-        .all(|c| c.loss() == crate::objective::Loss::Squares);
+    let squares = problem.channels().all(|c| c.loss() == Loss::Squares);
     if !(plain && squares) || readings <= parameters {
         return summary;
     }
@@ -234,15 +285,19 @@ pub fn scalars(
         .collect()
 }
 
+/// The optimum on half the step: `None` where the readings do not lie on that grid, an error where there is no
+/// motion on it.
+pub type HalfStep = Result<Option<RefinedSummary>, Breakdown>;
+
 /// The optimum on half the step.
-pub fn refined(problem: &Problem, evaluation: &Evaluation) -> Option<RefinedSummary> {
-    let Ok(Some(Refined {
+pub fn refined(problem: &Problem, evaluation: &Evaluation) -> HalfStep {
+    let Some(Refined {
         step,
         misfit,
         changes,
-    })) = problem.on_half_step(evaluation)
+    }) = problem.on_half_step(evaluation)?
     else {
-        return None;
+        return Ok(None);
     };
     let mut summary = RefinedSummary {
         step,
@@ -264,7 +319,7 @@ pub fn refined(problem: &Problem, evaluation: &Evaluation) -> Option<RefinedSumm
         summary.change_per_residual = summary.change_per_residual.max(share(rms));
         summary.change_per_reading = summary.change_per_reading.max(share(largest));
     }
-    Some(summary)
+    Ok(Some(summary))
 }
 
 /// The experiments of a model that took no part in the fit.

@@ -36,6 +36,7 @@ mod layout;
 mod legend;
 mod lock;
 pub mod mark;
+mod meaning;
 mod measured;
 mod page;
 mod panel;

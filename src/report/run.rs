@@ -9,7 +9,8 @@ use super::document::{
 };
 use super::files::Stage;
 use super::knowledge::knowledge;
-use super::measured::{self, ChannelSummary, RefinedSummary, StatisticsSummary};
+use super::meaning::{aliased, meaningless, unexplained};
+use super::measured::{self, ChannelSummary, HalfStep, StatisticsSummary};
 use super::page::fit_page;
 use super::render;
 use super::timings::TimingsSummary;
@@ -30,9 +31,6 @@ use std::time::Duration;
 
 /// Up to so many free values the bands are computed with every fit: some milliseconds.
 const FEW_PARAMETERS: usize = 64;
-/// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
-/// the stepper, and not the device.
-const MEANINGLESS: f64 = 0.1;
 
 /// A fitted model and what it predicts.
 #[derive(Debug, Clone, Copy)]
@@ -123,7 +121,11 @@ impl FittedModel<'_> {
         let (model, fit) = (self.model, self.fit);
         let half_step = match self.is_simulated() {
             true => measured::refined(&model.problem, &fit.best.evaluation),
-            false => None,
+            false => Ok(None),
+        };
+        let statistics = match self.is_simulated() {
+            true => measured::statistics(&model.problem, &fit.best.evaluation),
+            false => StatisticsSummary::default(),
         };
         ResultDocument {
             format: FORMAT,
@@ -156,7 +158,7 @@ impl FittedModel<'_> {
             timings: TimingsSummary::new(fit, Duration::ZERO, fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
-            identifiability: self.identifiability(half_step.as_ref()),
+            identifiability: self.identifiability(&half_step, &statistics),
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
@@ -168,11 +170,8 @@ impl FittedModel<'_> {
                 }
                 false => Vec::new(),
             },
-            statistics: match self.is_simulated() {
-                true => measured::statistics(&model.problem, &fit.best.evaluation),
-                false => StatisticsSummary::default(),
-            },
-            half_step,
+            statistics,
+            half_step: half_step.unwrap_or_default(),
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -189,9 +188,13 @@ impl FittedModel<'_> {
         self.known.bands.as_ref()
     }
 
-    /// What was known before the fit, and what its optimum tells, unless half the step tells another story; the equation
-    /// error has no simulated motion to count about.
-    fn identifiability(&self, half_step: Option<&RefinedSummary>) -> IdentifiabilitySummary {
+    /// What was known before the fit, and what its optimum tells, if that is a device at all; the equation error has no
+    /// simulated motion to count about.
+    fn identifiability(
+        &self,
+        half_step: &HalfStep,
+        statistics: &StatisticsSummary,
+    ) -> IdentifiabilitySummary {
         let problem = &self.model.problem;
         let knowledge = knowledge(problem);
         if !self.is_simulated() {
@@ -202,26 +205,26 @@ impl FittedModel<'_> {
             };
         }
         let count = count(problem);
-        if half_step.is_some_and(|half| half.change_per_reading > MEANINGLESS) {
-            let sentence = "the device is not identified: on half the step the model's readings change by more than a \
-                            tenth of the largest one";
+        if let Some(why) = meaningless(problem, &self.fit.best.evaluation, half_step) {
             return IdentifiabilitySummary {
                 seen: count.seen_at_most,
                 of: count.of,
-                verdicts: vec![sentence.into()],
+                verdicts: vec![format!("the device is not identified: {why}")],
                 knowledge,
                 ..IdentifiabilitySummary::default()
             };
         }
+        let evaluation = &self.fit.best.evaluation;
+        let unexplained = unexplained(statistics);
+        let bands = self.known.bands.as_ref().filter(|_| unexplained.is_none());
+        let judged = bands.map_or(Vec::new(), |bands| verdicts(problem, evaluation, bands));
+        let doubts = unexplained.into_iter().chain(aliased(problem, evaluation));
         IdentifiabilitySummary {
             seen: count.seen_at_most,
             of: count.of,
-            verdicts: count.sentences,
+            verdicts: count.sentences.into_iter().chain(doubts).collect(),
             knowledge,
-            functions: self.known.bands.as_ref().map_or(Vec::new(), |bands| {
-                let judged = verdicts(problem, &self.fit.best.evaluation, bands);
-                judged.into_iter().map(|j| j.sentence).collect()
-            }),
+            functions: judged.into_iter().map(|j| j.sentence).collect(),
         }
     }
 

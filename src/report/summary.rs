@@ -120,11 +120,11 @@ pub(super) fn write_channel(
 ) -> std::fmt::Result {
     write!(
         text,
-        "{name}: {} within {:.4e} {} rms, fit {:.2} %, {}",
+        "{name}: {} within {:.4e} {} rms, {}, {}",
         channel.kind,
         channel.rms_residual,
         channel.unit,
-        channel.fit_percent,
+        fit_in_words(channel.fit_percent),
         count(channel.readings, "reading")
     )?;
     for ignored in &channel.ignored {
@@ -139,6 +139,14 @@ pub(super) fn write_channel(
         writeln!(text, "  {}", channel.whiteness)?;
     }
     Ok(())
+}
+
+/// The fit of a channel; readings that are all the same have none.
+pub(super) fn fit_in_words(percent: f64) -> String {
+    match percent.is_finite() {
+        true => format!("fit {percent:.2} %"),
+        false => "no fit in per cent".into(),
+    }
 }
 
 /// All readings together, and what half the step changes.

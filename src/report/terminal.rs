@@ -144,6 +144,11 @@ impl Chart {
         let mut text = String::new();
         for row in 0..self.height {
             let label = match row {
+                // A constant lies in the middle.
+                _ if self.values[0] == self.values[1] => match row == self.height / 2 {
+                    true => number(self.values[0]),
+                    false => String::new(),
+                },
                 0 => number(self.values[1]),
                 _ if row + 1 == self.height => number(self.values[0]),
                 _ => String::new(),
@@ -216,12 +221,12 @@ mod tests {
         chart.scale(&[&[2.0, 2.0]]);
         chart.line(&[0.0, 25.0], &[2.0, 2.0]);
         assert_snapshot!(chart.text(), @"
-        2 │
-          │
-          │⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒
-          │
-        2 │
-          0                        25 s
+           │
+           │
+         2 │⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒
+           │
+           │
+           0                        25 s
         ");
         let mut empty = Chart::new(40, 5, &[]);
         empty.scale(&[&[f64::NAN]]);

@@ -93,6 +93,20 @@ pub(super) fn escape(text: &str) -> String {
         .replace('\'', "&apos;")
 }
 
+/// [`escape`] for a sentence in a page: what stands between backquotes is code.
+pub(super) fn prose(text: &str) -> String {
+    let escaped = escape(text);
+    let parts: Vec<&str> = escaped.split('`').collect();
+    if parts.len() % 2 == 0 {
+        return escaped;
+    }
+    let parts = parts.iter().enumerate().map(|(i, part)| match i % 2 {
+        0 => (*part).to_owned(),
+        _ => format!("<code>{part}</code>"),
+    });
+    parts.collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,6 +128,15 @@ mod tests {
         assert_eq!(tick(0.0, 1e6, 5e6), "0");
         assert_eq!(tick(1.5e6, 5e5, 2e6), "1.5×10⁶");
         assert_eq!(tick(-2e-5, 1e-5, 3e-5), "−2×10⁻⁵");
+    }
+
+    #[test]
+    fn what_is_quoted_is_code() {
+        assert_eq!(
+            prose("add `smooth`; a<b"),
+            "add <code>smooth</code>; a&lt;b"
+        );
+        assert_eq!(prose("a ` by itself"), "a ` by itself");
     }
 
     #[test]

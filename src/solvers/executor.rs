@@ -347,7 +347,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
     fn ended_from_outside(&self) -> Option<Outcome> {
         let flag = self.settings.interrupt.as_ref();
         if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            let reason = "interrupted; the best point so far is kept";
+            let reason = "asked to stop; the best point so far is kept";
             return Some(Outcome::new(Status::Interrupted, reason));
         }
         let limit = self.settings.stopping.limit?;

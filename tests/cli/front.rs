@@ -109,19 +109,122 @@ fn starters_can_be_fitted() {
     assert_eq!(schema["title"], "kmcfit model file");
 }
 
-/// Readings of one value move no oscillator: steps as long as a period stand still as well, and match them.
+/// A record for a model that leaves its mass alone.
+fn starter(grid: &str, more: &str) -> String {
+    format!(
+        "format: 1
+experiments:
+  - data: record.csv
+    initial: estimate
+{more}grid: {grid}
+functions:
+  mass: {{fixed: 1.0}}
+  damping: {{basis: constant, start: 0.25}}
+  stiffness: {{basis: constant, start: 39}}
+fit: {{method: gauss-newton}}
+"
+    )
+}
+
+/// Readings of one value move no oscillator: no starter is made of them, and steps as long as a period, which stand still
+/// as well and match them, show no device.
 #[test]
-fn what_only_long_steps_can_do_is_not_called_sure() {
+fn what_stands_still_shows_no_device() {
     let bench = Workbench::empty();
     let rows: String = (0..12).map(|i| format!("{i},1\n")).collect();
-    bench.write("constant.csv", &format!("t,y\n{rows}"));
-    bench.run_to(0, &["init", "constant.csv"]);
-    let summary = bench.run(&["fit", "constant.yaml", "--no-report"]).1;
-    assert!(
-        summary.contains("open      the device is not identified: on half the step"),
-        "{summary}"
-    );
-    assert!(!summary.contains("is identified"), "{summary}");
+    bench.write("record.csv", &format!("t,y\n{rows}"));
+    let (code, _, stderr) = bench.run(&["init", "record.csv"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr, @"
+    error: record.csv: the readings do not move
+      found: 12 readings, all of them 1
+      expected: the motion of a device: nothing can be learnt from one that stands still
+    ");
+    for grid in ["{nodes: 9}", "{nodes: auto}", "{}", "{nodes: 200}"] {
+        bench.write(
+            "model.yaml",
+            &starter(grid, "    columns: {time: t, displacement: y}\n"),
+        );
+        let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        let open = [
+            "the device is not identified: ",
+            "stiffness is not seen by the readings",
+        ];
+        let says = |words: &&str| summary.contains(words);
+        assert!(open.iter().any(says), "{grid}: {summary}{stderr}");
+        assert!(!summary.contains("is identified"), "{grid}: {summary}");
+        assert!(!summary.contains("inf"), "{grid}: {summary}");
+    }
+}
+
+/// Two readings a period, and so few: the frequency is an alias of others, if it is one at all.
+#[test]
+fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
+    let bench = Workbench::empty();
+    let rows: String = (0..8).map(|i| format!("{i},{}\n", 1 - i % 2 * 2)).collect();
+    bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
+    bench.run_to(0, &["init", "record.csv"]);
+    let summary = bench.run(&["fit", "record.yaml", "--no-report"]).1;
+    let said = "which of several frequencies it is, is not identified: with 2.0 readings in a period of 0.500 Hz";
+    assert!(summary.contains(said), "{summary}");
+}
+
+/// What is advised for single readings far off, an offset and a drift names a cure that is one.
+#[test]
+fn what_to_try_next_helps() {
+    let bench = Workbench::empty();
+    let ring_down = |spoilt: fn(usize, f64) -> f64| {
+        let rows = (0..401).map(|i| {
+            let t = 0.05 * i as f64;
+            let noise = 1e-3 * (12.9898 * i as f64).sin();
+            let y = (-0.05 * t).exp() * (2.0 * t).cos() + noise;
+            format!("{t},{}\n", y + spoilt(i, t))
+        });
+        format!("t_s,y_m\n{}", rows.collect::<String>())
+    };
+    let error = || {
+        let printed = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--json"]);
+        let result: Value = serde_json::from_str(&printed).expect("JSON");
+        let of = |f: &str| result["functions"][f]["max"].as_f64().expect("a number");
+        let stiffness = (of("stiffness") / 4.0025 - 1.0).abs();
+        stiffness.max((of("damping") / 0.1 - 1.0).abs())
+    };
+    let spoilers: [(fn(usize, f64) -> f64, &str, &str); 3] = [
+        (
+            |i, _| if [60, 61, 200].contains(&i) { 9.0 } else { 0.0 },
+            "3 readings of the displacement lie far off, the first at 3 s: a robust loss (loss: {displacement: huber}) in \
+             the experiment",
+            "    loss: {displacement: huber}\n",
+        ),
+        (
+            |_, _| 0.1,
+            "the residuals of the displacement have an offset: sensors: {displacement: {offset: estimate}} in the \
+             experiment",
+            "    sensors: {displacement: {offset: estimate}}\n",
+        ),
+        (
+            |_, t| 0.01 * (t - 10.0),
+            "the residuals of the displacement drift: sensors: {displacement: {offset: estimate, drift: estimate}} in \
+             the experiment",
+            "    sensors: {displacement: {offset: estimate, drift: estimate}}\n",
+        ),
+    ];
+    for (spoilt, advice, cure) in spoilers {
+        bench.write("record.csv", &ring_down(spoilt));
+        let sigma = "    sigma: {displacement: 0.001}\n";
+        let spoilt = starter("{nodes: 801}", sigma).replace("start: 39", "start: 3.8");
+        bench.write("model.yaml", &spoilt);
+        let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        assert!(
+            summary.contains(&format!("try next  {advice}\n")),
+            "{summary}"
+        );
+        bench.write(
+            "model.yaml",
+            &spoilt.replace(sigma, &format!("{sigma}{cure}")),
+        );
+        assert!(error() < 0.01, "{advice}: {}", error());
+    }
 }
 
 #[test]
@@ -135,6 +238,7 @@ fn a_starter_says_what_was_found() {
       column `Time [ms]`: time, ms
       column `Weg_mm`: displacement, mm
       dominant frequency 159.6 Hz: 3 periods in the record
+      run 1/kmcfit.schema.json is for editors: it completes and checks keys while you type
     the model is run 1/my data.yaml; look at it, then
       kmcfit check 'run 1/my data.yaml' --no-gradient
       kmcfit fit 'run 1/my data.yaml'

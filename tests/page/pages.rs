@@ -20,7 +20,7 @@ experiments:
 grid: {nodes: 201}
 functions:
   mass: {basis: polynomial, degree: 1, start: [1.5, 0.0]}
-  damping: {basis: constant, start: 0.3, min: 0.15}
+  damping: {basis: constant, start: 0.3, min: 0.11}
   stiffness: {fixed: 1.0}
 truth: {data: truth.csv}
 predict:

@@ -104,8 +104,10 @@ fn a_report_is_complete() {
     let sentences = |pointer: &str| -> Vec<String> {
         let list = result.pointer(pointer).and_then(Value::as_array);
         let list = list.unwrap_or_else(|| panic!("{pointer}"));
+        // What is quoted is code in the page.
         list.iter()
-            .filter_map(|v| v.as_str().or(v["sentence"].as_str()).map(String::from))
+            .filter_map(|v| v.as_str().or(v["sentence"].as_str()))
+            .map(|sentence| sentence.replace('`', ""))
             .collect()
     };
     for pointer in [

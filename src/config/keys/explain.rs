@@ -96,7 +96,13 @@ fn entry(found: &Found, wanted: &str) -> String {
         text.push('\n');
         list(&mut text, words.iter().copied());
     }
+    let mut told: Vec<&str> = Vec::new();
     for group in key.kind.groups() {
+        // A map, or a list of such maps.
+        if told.contains(&group.name) {
+            continue;
+        }
+        told.push(group.name);
         let _ = write!(text, "\n  {}\n", group.text);
         list(&mut text, group.keys.iter().map(|key| (key.name, key.text)));
     }

@@ -60,6 +60,16 @@ impl Motion {
                 .found(pairs.len())
                 .expected(format!("{FEWEST} or more")));
         }
+        if let Some((_, still)) = pairs
+            .first()
+            .filter(|(_, first)| pairs.iter().all(|(_, x)| x == first))
+        {
+            return Err(InputError::file(table.path(), "the readings do not move")
+                .found(format!("{} readings, all of them {still}", pairs.len()))
+                .expected(
+                    "the motion of a device: nothing can be learnt from one that stands still",
+                ));
+        }
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let spacing = median(&spacings);
         let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;

@@ -8,7 +8,7 @@ use super::{CLOSE, Comparison, MATCHED, RECOVERED};
 use crate::report::mark::Style;
 use crate::report::page as shell;
 use crate::report::svg::sample;
-use crate::report::text::escape;
+use crate::report::text::{escape, prose};
 
 pub(super) fn page(comparison: &Comparison) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
@@ -17,11 +17,11 @@ pub(super) fn page(comparison: &Comparison) -> String {
         (None, 1) => "One run".to_string(),
         (None, count) => format!("Comparison of {count} runs"),
     };
-    let mut body = format!("<p>{}</p>\n", escape(&lead(comparison)));
+    let mut body = format!("<p>{}</p>\n", prose(&lead(comparison)));
     if comparison.story.is_some() {
         body += "<h2>What it comes to</h2>\n<ul>\n";
         for conclusion in conclusions(&comparison.measures) {
-            body += &format!("<li>{}</li>\n", escape(&conclusion));
+            body += &format!("<li>{}</li>\n", prose(&conclusion));
         }
         body += "</ul>\n";
     }
@@ -33,12 +33,12 @@ pub(super) fn page(comparison: &Comparison) -> String {
         body += &format!(
             "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">left out: {}</p>\n</section>\n",
             escape(&left_out.name),
-            escape(&left_out.reason)
+            prose(&left_out.reason)
         );
     }
     body += "<h2>In numbers</h2>\n";
     body += &table(&comparison.measures);
-    body += &format!("<p class=\"soft\">{}</p>\n", escape(&notes()));
+    body += &format!("<p class=\"soft\">{}</p>\n", prose(&notes()));
     body += "<h2>In pictures</h2>\n";
     body += &shell::help();
     body += &shell::figures(&figures::all(comparison));
@@ -89,19 +89,19 @@ fn card(run: &Measures, look: Style) -> String {
         sample(&look),
         escape(&run.name),
         escape(&run.title),
-        escape(&capital(&run.verdict)),
+        prose(&capital(&run.verdict)),
         escape(&run.status),
-        escape(&run.reason),
+        prose(&run.reason),
     );
     if !run.knowledge.is_empty() {
-        let known = escape(&run.knowledge.join("; "));
+        let known = prose(&run.knowledge.join("; "));
         text += &format!("<p>What it was told: {known}.</p>\n");
     }
     for open in &run.open {
-        text += &format!("<p>{}</p>\n", escape(&capital(open)));
+        text += &format!("<p>{}</p>\n", prose(&capital(open)));
     }
     for warning in &run.warnings {
-        text += &format!("<p class=\"soft\">warning: {}</p>\n", escape(warning));
+        text += &format!("<p class=\"soft\">warning: {}</p>\n", prose(warning));
     }
     text + "</section>\n"
 }

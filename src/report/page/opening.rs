@@ -5,7 +5,7 @@ use crate::report::advice;
 use crate::report::document::{FunctionSummary, ResultDocument};
 use crate::report::measured::ChannelSummary;
 use crate::report::summary::{count, iterations};
-use crate::report::text::escape;
+use crate::report::text::{escape, prose};
 use crate::solvers::Status;
 
 /// Everything above the contents.
@@ -43,7 +43,7 @@ fn state(document: &ResultDocument) -> String {
     format!(
         "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
         escape(&outcome.status),
-        escape(&outcome.reason)
+        prose(&outcome.reason)
     )
 }
 
@@ -75,7 +75,7 @@ fn facts(document: &ResultDocument) -> String {
         format!(
             "<div><dt>{}</dt><dd>{}</dd></div>\n",
             escape(name),
-            escape(value)
+            prose(value)
         )
     };
     let facts: String = facts.iter().map(fact).collect();
@@ -164,7 +164,10 @@ fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
     vec![
         name.into(),
         channel.kind.clone(),
-        format!("{:.2} %", channel.fit_percent),
+        match channel.fit_percent.is_finite() {
+            true => format!("{:.2} %", channel.fit_percent),
+            false => "–".into(),
+        },
         with_unit(channel.rms_residual),
         sigma,
         channel.readings.to_string(),

@@ -1,6 +1,6 @@
 //! Tables, lists and facts as HTML; every text is escaped here.
 
-use crate::report::text::{decade, escape};
+use crate::report::text::{decade, escape, prose};
 
 /// A table with a heading for each column; the first cell of a row is its heading.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
@@ -44,13 +44,13 @@ pub(super) fn list(sentences: &[String]) -> String {
     if sentences.is_empty() {
         return String::new();
     }
-    let item = |s: &String| format!("<li>{}</li>\n", escape(s.trim()));
+    let item = |s: &String| format!("<li>{}</li>\n", prose(s.trim()));
     let items: String = sentences.iter().map(item).collect();
     format!("<ul>\n{items}</ul>\n")
 }
 
 pub(super) fn paragraph(text: &str) -> String {
-    format!("<p>{}</p>\n", escape(text))
+    format!("<p>{}</p>\n", prose(text))
 }
 
 /// A number with five significant digits and a true minus sign.

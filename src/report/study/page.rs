@@ -4,7 +4,7 @@ use super::StudyDocument;
 use super::figures;
 use super::text::sections;
 use crate::report::page as shell;
-use crate::report::text::escape;
+use crate::report::text::{escape, prose};
 
 /// One file, nothing to load.
 pub fn page(study: &StudyDocument) -> String {
@@ -12,7 +12,7 @@ pub fn page(study: &StudyDocument) -> String {
     for (heading, sentences) in sections(study) {
         body += &format!("<h2>{}</h2>\n<ul>\n", escape(heading));
         for sentence in sentences {
-            body += &format!("<li>{}</li>\n", escape(&sentence));
+            body += &format!("<li>{}</li>\n", prose(&sentence));
         }
         body += "</ul>\n";
     }

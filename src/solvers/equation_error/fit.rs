@@ -12,6 +12,10 @@ use crate::solvers::timings::timed;
 use crate::solvers::{Counts, Fit, Outcome, Point, Row, Status, Timings};
 use std::time::Instant;
 
+/// A function that is smaller than its start by this factor is solved for again, up to so many times.
+const FAR: f64 = 1e4;
+const AGAIN: usize = 3;
+
 /// Minimises over the readings of all experiments
 ///
 /// ```text
@@ -157,7 +161,28 @@ impl<'a> Cost<'a> {
         pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
     }
 
+    /// The minimum; where it is far below the start in the size of a function, once more from there: what is solved for
+    /// is the step, and beside a step of 1e12 the digits of a 1 are rounding.
     fn minimise(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+        let mut minimum = self.minimise_from(start, timings)?;
+        let mut from = self.measurements.sizes(self.problem, start);
+        for _ in 0..AGAIN {
+            let sizes = self.measurements.sizes(self.problem, &minimum.parameters);
+            let far = |(from, size): (&f64, &f64)| *from > FAR * size;
+            if !from.iter().zip(&sizes).any(far) {
+                break;
+            }
+            let next = self.minimise_from(&minimum.parameters, timings)?;
+            minimum = Minimum {
+                program: next.program.or(minimum.program),
+                ..next
+            };
+            from = sizes;
+        }
+        Ok(minimum)
+    }
+
+    fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
         let problem = self.problem;
         let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
         let sizes = self.measurements.sizes(problem, start);

@@ -4,7 +4,8 @@
 //! length costs: over a time `T` the motion of angular frequency `w` arrives with a phase error of
 //! about `w T (w h)^p / C`, `C` = 6 for the midpoint rule (p = 2) and 120 for the classical
 //! Runge-Kutta method (p = 4). The step is chosen for the frequency below which nearly all energy
-//! lies, then shortened so that samples of the force fall on nodes.
+//! lies, then shortened so that samples of the force fall on nodes. Readings without a spectrum (too few, or
+//! all the same) say nothing of a frequency: no step is then longer than from one to the next.
 
 use crate::config::build::experiments::Record;
 use crate::dynamics::Method;
@@ -36,18 +37,20 @@ pub fn nodes(
     let mut readings = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
         readings = readings.max(channel.times.len());
-        let Some(spectrum) = Spectrum::of(&channel.values, channel.median_spacing) else {
+        let spectrum = Spectrum::of(&channel.values, channel.median_spacing);
+        let frequency = spectrum.as_ref().map(|s| s.energy_quantile(ENERGY));
+        let (Some(spectrum), Some(frequency)) = (spectrum, frequency.filter(|f| *f > 0.0)) else {
+            if channel.median_spacing > 0.0 {
+                longest = longest.min(channel.median_spacing);
+            }
             continue;
         };
-        let frequency = spectrum.energy_quantile(ENERGY);
         fastest = fastest.max(frequency);
         let omega = TAU * frequency;
         let (order, constant) = error_constant(method);
-        if omega > 0.0 {
-            longest = longest
-                .min((ACCURACY * constant / (omega * duration)).powf(1.0 / order) / omega)
-                .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
-        }
+        longest = longest
+            .min((ACCURACY * constant / (omega * duration)).powf(1.0 / order) / omega)
+            .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
     let shortest = duration / (most.min(MOST_PER_READING * readings) - 1) as f64;
     let mut step = longest.clamp(shortest, duration / 8.0);
@@ -60,6 +63,13 @@ pub fn nodes(
     let step = duration / (nodes - 1) as f64;
     let (order, constant) = error_constant(method);
     let omega = TAU * fastest;
+    if fastest == 0.0 {
+        remarks.push(format!(
+            "grid: {nodes} nodes were chosen: the readings show no frequency, so no step is longer than from one \
+             to the next"
+        ));
+        return nodes;
+    }
     remarks.push(format!(
         "grid: {nodes} nodes were chosen: {:.0} steps in a period of {fastest:.4} Hz, below which \
          {:.0} % of the readings' energy lies, for a phase error of about {:.0e} rad at the end of \
