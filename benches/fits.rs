@@ -7,11 +7,12 @@ use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit::study::multistart::multistart;
 use std::hint::black_box;
 use std::path::Path;
+use std::process::Command;
 
 /// Iterations of the paper's run that are timed; the run has 1000, each costs the same.
 const PAPER_ITERATIONS: usize = 20;
 /// Nodes of the smooth fit beyond the paper's 2000.
-const LONG: [usize; 2] = [8000, 40_000];
+const LONG: [usize; 3] = [8000, 40_000, 200_000];
 /// Knots per function.
 const KNOTS: [usize; 3] = [4, 11, 64];
 /// Starts of a study.
@@ -75,5 +76,17 @@ fn reading(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, fits, reading);
+/// The program, from its start to its end.
+fn start_up(criterion: &mut Criterion) {
+    criterion.bench_function("kmcfit --help", |b| {
+        b.iter(|| {
+            let program = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+                .arg("--help")
+                .output();
+            assert!(program.expect("the program").status.success());
+        });
+    });
+}
+
+criterion_group!(benches, fits, reading, start_up);
 criterion_main!(benches);

@@ -169,11 +169,14 @@ fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
     assert!(summary.contains(said), "{summary}");
 }
 
+/// What is added to the reading of this number at this time.
+type Spoiler = fn(usize, f64) -> f64;
+
 /// What is advised for single readings far off, an offset and a drift names a cure that is one.
 #[test]
 fn what_to_try_next_helps() {
     let bench = Workbench::empty();
-    let ring_down = |spoilt: fn(usize, f64) -> f64| {
+    let ring_down = |spoilt: Spoiler| {
         let rows = (0..401).map(|i| {
             let t = 0.05 * i as f64;
             let noise = 1e-3 * (12.9898 * i as f64).sin();
@@ -189,7 +192,7 @@ fn what_to_try_next_helps() {
         let stiffness = (of("stiffness") / 4.0025 - 1.0).abs();
         stiffness.max((of("damping") / 0.1 - 1.0).abs())
     };
-    let spoilers: [(fn(usize, f64) -> f64, &str, &str); 3] = [
+    let spoilers: [(Spoiler, &str, &str); 3] = [
         (
             |i, _| if [60, 61, 200].contains(&i) { 9.0 } else { 0.0 },
             "3 readings of the displacement lie far off, the first at 3 s: a robust loss (loss: {displacement: huber}) in \
