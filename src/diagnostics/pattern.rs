@@ -8,12 +8,15 @@ const OF_MEDIAN: f64 = 1.482_602_218_505_602;
 /// this share of all readings.
 const SQUARES: f64 = 0.5;
 const AT_MOST: f64 = 0.05;
+/// Most that follow one another.
+const TOGETHER: usize = 3;
 /// Fewest residuals that a pattern is looked for in.
 const FEWEST: usize = 16;
 
 /// The numbers of the residuals that lie far off by themselves: both their size and their distance from the mean of
 /// their neighbours is more than six robust standard deviations of these (1.4826 times the median of the absolute
-/// values), together they hold half of all squares, and they are at most one in twenty. Empty where that is not so.
+/// values), together they hold half of all squares, and they are at most one in twenty, and no more than three follow
+/// one another. Empty where that is not so.
 ///
 /// ```
 /// use kmcfit::diagnostics::far_off;
@@ -44,7 +47,10 @@ pub fn far_off(residuals: &[f64]) -> Vec<usize> {
     let square = |r: f64| (r / largest) * (r / largest);
     let held: f64 = far.iter().map(|i| square(residuals[*i])).sum();
     let all: f64 = residuals.iter().map(|r| square(*r)).sum();
-    match held >= SQUARES * all && far.len() as f64 <= AT_MOST * residuals.len() as f64 {
+    let few = far.len() as f64 <= AT_MOST * residuals.len() as f64;
+    // More in a row are a part of a motion.
+    let alone = (far.windows(TOGETHER + 1)).all(|run| run[TOGETHER] - run[0] > TOGETHER);
+    match held >= SQUARES * all && few && alone {
         true => far,
         false => Vec::new(),
     }

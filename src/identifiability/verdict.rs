@@ -4,7 +4,7 @@ use super::bands::{Band, Bands};
 use super::linear::{span_words, spans};
 use crate::diagnostics::NORMAL_975;
 use crate::dynamics::Term;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, median_size};
 use crate::problem::Problem;
 
 /// A function is identified where the half-width of its 95 % band is at most this share of its
@@ -45,51 +45,55 @@ pub struct Judgement {
     pub sentence: String,
 }
 
-/// By how much a number is known: as a share of its own largest value, or where that is within the
-/// band, as a number beside which the value cannot be told from zero. In between it is small beside the natural
-/// size of such a number, and that is what is known of it.
-fn identified(name: &str, band: &Band) -> String {
-    let half = band.standard_error.iter().filter(|e| e.is_finite());
-    let half = NORMAL_975 * half.fold(0.0f64, |most, e| most.max(*e));
-    let own = band.values.iter().filter(|v| v.is_finite());
-    let own = own.fold(0.0f64, |most, v| most.max(v.abs()));
+/// By how much a number of this natural size is known where it is known at all: as a share of its own largest value
+/// there, or where that is within the band, as a number beside which the value cannot be told from zero. In between it
+/// is small beside the natural size, and that is what is known of it.
+fn identified(name: &str, band: &Band, size: f64) -> String {
+    let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
+    let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
+    let unit = &band.unit;
     if half >= own {
-        let unit = &band.unit;
         return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
     }
-    if half > IDENTIFIED * own {
-        let (unit, share) = (&band.unit, 100.0 * half / own);
+    let share = half / own;
+    if share > IDENTIFIED {
         return format!(
-            "{name} is small, and known to within {half:.1e} {unit}: {share:.0} % of its largest value (95 %)"
+            "{name} is small, and known to within {half:.1e} {unit}: {:.0} % of its largest value (95 %)",
+            100.0 * share
         );
     }
-    let share = match half / own {
-        share if share < 1e-4 => format!("{share:.0e}"),
-        share => format!("{:.2} %", 100.0 * share),
+    let share = match share < 1e-4 {
+        true => format!("{share:.0e}"),
+        false => format!("{:.2} %", 100.0 * share),
     };
     format!("{name} is identified, to {share} of its largest value (95 %)")
 }
 
+/// Whether a function of this natural size is known at a node.
+fn is_known(band: &Band, size: f64, i: usize) -> bool {
+    band.values[i].is_finite() && NORMAL_975 * band.standard_error[i] / size <= IDENTIFIED
+}
+
 /// Verdicts on every function of the list, then on `k/m` and `c/m`.
 pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
-    let sizes = problem.natural_sizes(evaluation);
+    let sizes = problem.middle_sizes(evaluation);
     let assembly = problem.functions.assembly(0);
-    let heaviest = evaluation.device.mass.iter().copied().fold(0.0, f64::max);
+    let mass = median_size(&evaluation.device.mass);
     let of = |term: Term| {
         let place = problem.oscillator.terms.iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
     let named = [("k/m", of(Term::Stiffness)), ("c/m", of(Term::Damping))];
-    let ratios: Vec<(&str, usize, Verdict)> = (named.into_iter())
+    let ratios: Vec<(&str, usize, f64, Verdict)> = (named.into_iter())
         .filter_map(|(name, function)| {
             let (band, f) = (bands.ratio(name)?, function?);
-            let own = band.values.iter().fold(0.0f64, |most, r| most.max(r.abs()));
-            let size = own.max(sizes[f] / heaviest);
-            Some((name, f, judge(&bands.times, band, size)))
+            let size = median_size(&band.values).max(sizes[f] / mass);
+            Some((name, f, size, judge(&bands.times, band, size)))
         })
         .collect();
     let known = |f: usize| {
-        let with = |(_, function, verdict): &&(&str, usize, Verdict)| {
+        let with = |(_, function, _, verdict): &&(&str, usize, f64, Verdict)| {
             (*function == f || f == assembly[0]) && matches!(verdict, Verdict::Identified { .. })
         };
         ratios
@@ -105,20 +109,20 @@ pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Ve
                 other => known(f).map_or(other, Verdict::OnlyRatio),
             },
         };
-        judgement(&band.name, verdict, band)
+        judgement(&band.name, verdict, band, sizes[f])
     });
     let functions: Vec<Judgement> = functions.collect();
     let ratios = (ratios.into_iter())
-        .filter_map(|(name, _, v)| Some(judgement(name, v, bands.ratio(name)?)));
+        .filter_map(|(name, _, size, v)| Some(judgement(name, v, bands.ratio(name)?, size)));
     functions.into_iter().chain(ratios).collect()
 }
 
 fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
-    let relative = |i: usize| NORMAL_975 * band.standard_error[i] / size;
-    let known = |i: usize| band.values[i].is_finite() && relative(i) <= IDENTIFIED;
+    let known = |i: usize| is_known(band, size, i);
     let count = (0..times.len()).filter(|i| known(*i)).count();
     let share = count as f64 / times.len() as f64;
     if share >= MOST {
+        let relative = |i: usize| NORMAL_975 * band.standard_error[i] / size;
         let known = (0..times.len()).filter(|i| known(*i));
         return Verdict::Identified {
             relative: known.map(relative).fold(0.0, f64::max),
@@ -130,9 +134,9 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
     }
 }
 
-fn judgement(name: &str, verdict: Verdict, band: &Band) -> Judgement {
+fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement {
     let sentence = match &verdict {
-        Verdict::Identified { .. } => identified(name, band),
+        Verdict::Identified { .. } => identified(name, band, size),
         Verdict::OnlyRatio(ratio) => {
             format!("{name} is not identified by itself, only the ratio {ratio} is")
         }

@@ -14,6 +14,16 @@ impl Problem {
     /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
     /// of a damping that matters.
     pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+        self.sizes(evaluation, largest)
+    }
+
+    /// [`Problem::natural_sizes`] with the median of the sizes of a function's own values in place of the largest one: what
+    /// a function is like at most times, whatever it does where nothing is seen of it.
+    pub(crate) fn middle_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+        self.sizes(evaluation, median_size)
+    }
+
+    fn sizes(&self, evaluation: &Evaluation, size_of: fn(&[f64]) -> f64) -> Vec<f64> {
         let terms = &self.oscillator.terms;
         let step = self.oscillator.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
@@ -29,14 +39,14 @@ impl Problem {
                 let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = largest(&device.mass);
+            let mass = size_of(&device.mass);
             let inertia = mass * root(0);
             let natural = |j: usize| match root(j + 1) {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
             let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
-            let own = device.functions().map(largest);
+            let own = device.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
@@ -64,6 +74,13 @@ impl Problem {
         let scalars = self.functions.scalars().iter().zip(self.scalars(&delta));
         scalars.fold(most, |most, (scalar, x)| most.max(x.abs() / scalar.size))
     }
+}
+
+/// The median of the sizes of some values, 0 of none.
+pub(crate) fn median_size(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).copied().unwrap_or_default()
 }
 
 /// The sums over the nodes of `y''^2` and of `phi^2` of each term.

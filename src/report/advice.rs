@@ -2,16 +2,21 @@
 //! the terminal and the page say the same.
 
 use super::document::ResultDocument;
+use super::meaning::BEYOND_SIGMA;
 use super::measured::{ChannelSummary, PatternSummary};
 use crate::dynamics::Method;
-use crate::solvers::{Initial, Solver, Status};
+use crate::solvers::{Solver, Status};
 
 /// Below this share of the readings the fit does not explain the record, per cent.
-const POOR: f64 = 90.0;
+pub(super) const POOR: f64 = 90.0;
 /// Residuals with a lower probability under white noise have a pattern.
-const PATTERN: f64 = 0.05;
+const PATTERN: f64 = 1e-3;
+/// Such a fit leaves the rounding of the readings, per cent.
+const EXACT: f64 = 99.99;
 /// Half the step may change the model's readings by this share of the largest one.
 const COARSE: f64 = 1e-3;
+/// Name of the rung that starts from the model's start values.
+const FROM_START_VALUES: &str = "start values";
 /// So many things to try next are enough.
 const MOST: usize = 3;
 
@@ -42,6 +47,7 @@ fn says_settled(sentence: &str) -> bool {
         " only on ",
         " is not seen",
         " is not known",
+        " may match as well",
     ];
     !open.iter().any(|words| sentence.contains(words))
 }
@@ -70,7 +76,8 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
                  which are seen",
                 known.of, known.seen
             ),
-            false => "`kmcfit study` tells how sure each function is, and which experiment would show most"
+            false => "`kmcfit study` tells how sure each function is, and with `study.candidates` which experiment would \
+                      show most"
                 .into(),
         });
     }
@@ -104,27 +111,54 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
     if let Some((channel, pattern)) = patterns.into_iter().next() {
         return Some(about_pattern(channel, pattern));
     }
-    if let Some(worst) = worst_fit(document).filter(|worst| *worst < POOR) {
-        let tried = document
-            .rungs
-            .iter()
-            .any(|r| r.start == Initial::Data.name());
-        let elsewhere = match tried {
-            true => "",
-            false => "start from the readings (fit.initial=data), or ",
-        };
+    let squares = document.statistics.reduced_chi_square;
+    let worst = worst_fit(document).unwrap_or(100.0);
+    if let Some(squares) = squares.filter(|squares| squares.sqrt() > BEYOND_SIGMA && worst > POOR) {
         return Some(format!(
-            "the readings are matched to {worst:.0} % only: {elsewhere}let a function change more (basis: \
-             piecewise-linear, more knots)"
+            "the residuals are {:.1} times sigma, and the readings are matched to {}: sigma is too small (sigma: estimate)",
+            squares.sqrt(),
+            percent(worst, 2)
         ));
     }
-    let coloured =
-        channels().any(|c| c.sigma.is_some() && c.whiteness_p_value.is_some_and(|p| p < PATTERN));
-    coloured.then(|| {
-        "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, quadratic_damping, \
-         coulomb_friction)"
-            .into()
-    })
+    let is_coloured = |c: &&ChannelSummary| {
+        c.sigma.is_some()
+            && c.fit_percent < EXACT
+            && c.whiteness_p_value.is_some_and(|p| p < PATTERN)
+    };
+    let tried = document.rungs.iter().any(|r| r.start != FROM_START_VALUES);
+    let is_simulated = document.model.method != Solver::EquationError.name();
+    let elsewhere = match tried || !is_simulated {
+        true => "",
+        false => "start from the readings (fit.initial=data), or ",
+    };
+    // Outliers that a robust loss leaves aside are none of the fit's business.
+    let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR && !c.robust;
+    let told = |c: &ChannelSummary| c.sigma.is_some() && c.whiteness_p_value.is_some();
+    match channels().find(poor) {
+        Some(channel) if told(channel) && !is_coloured(&channel) => Some(format!(
+            "the {} is matched to {} only, but what is left looks like noise: no other device would do much better",
+            channel.kind,
+            percent(channel.fit_percent, 0)
+        )),
+        Some(channel) => Some(format!(
+            "the readings are matched to {} only: {elsewhere}let a function change more (basis: piecewise-linear, more \
+             knots), or add a term",
+            percent(channel.fit_percent, 0)
+        )),
+        None => channels().any(|c| is_coloured(&c)).then(|| {
+            "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, \
+             quadratic_damping, coulomb_friction with its width)"
+                .into()
+        }),
+    }
+}
+
+/// A share in per cent; one far below zero in powers of ten.
+pub(super) fn percent(share: f64, digits: usize) -> String {
+    match share > -1000.0 {
+        true => format!("{share:.digits$} %"),
+        false => format!("{share:.0e} %"),
+    }
 }
 
 fn about_pattern(channel: &ChannelSummary, pattern: &PatternSummary) -> String {

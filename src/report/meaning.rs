@@ -1,6 +1,7 @@
 //! Whether what a fit came to is a device to speak of, and the only one of its kind.
 
-use super::measured::{HalfStep, StatisticsSummary};
+use super::advice::POOR;
+use super::measured::{HalfStep, StatisticsSummary, diagnostics};
 use crate::diagnostics::fit_percent;
 use crate::dynamics::{Excitation, Term};
 use crate::objective::{Channel, Evaluation};
@@ -14,18 +15,75 @@ const STEPPER: f64 = 0.1;
 /// a robust loss leaves aside cannot bring it below -42 %.
 const ABSURD: f64 = -100.0;
 /// Residuals may be this many times sigma before nothing is made of sigma any more.
-const BEYOND_SIGMA: f64 = 3.0;
+pub(super) const BEYOND_SIGMA: f64 = 3.0;
+/// The probability of such residuals under white noise below which they are certainly none.
+const CERTAIN: f64 = 1e-6;
+/// What such a fit leaves is the rounding of the readings, per cent.
+const EXACT: f64 = 99.99;
 /// Two and a half readings a period: from there on the frequency is near to that of its first alias.
 const PERIODS_PER_READING: f64 = 0.4;
 /// Equally spaced readings are no further from their places than this part of the spacing.
 const EVEN: f64 = 0.01;
 
+/// What is to be doubted of a fit.
+pub(super) struct Doubts {
+    /// Why no statement on the device means anything, if that is so.
+    pub no_device: Option<String>,
+    /// What is open, in sentences.
+    pub open: Vec<String>,
+    /// Whether what the linearised fit says of the errors of the functions means anything.
+    pub errors_hold: bool,
+}
+
+impl Doubts {
+    /// Of the optimum `evaluation`, with what half the step changes and the statistics of the readings.
+    pub fn of(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        half_step: &HalfStep,
+        statistics: &StatisticsSummary,
+    ) -> Self {
+        let no_device = meaningless(problem, evaluation, half_step)
+            .map(|why| format!("the device is not identified: {why}"));
+        let (coloured, poor) = residuals(problem, evaluation);
+        let unexplained = unexplained(statistics).or_else(|| {
+            poor.then(|| {
+                "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
+                    .to_owned()
+            })
+        });
+        let errors_hold = no_device.is_none() && unexplained.is_none();
+        let optimistic = (errors_hold && coloured).then(|| {
+            "by how much the errors are too small is not known: they hold for white residuals, and these are not"
+                .to_owned()
+        });
+        let open = unexplained.into_iter().chain(optimistic);
+        Self {
+            open: open.chain(aliased(problem, evaluation)).collect(),
+            no_device,
+            errors_hold,
+        }
+    }
+}
+
+/// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the readings, too.
+fn residuals(problem: &Problem, evaluation: &Evaluation) -> (bool, bool) {
+    let (mut coloured, mut poor) = (false, false);
+    let predictions = evaluation.predictions.iter().flatten();
+    for (channel, predicted) in problem.channels().zip(predictions) {
+        let found = diagnostics(channel, predicted);
+        // Without a sigma no error is told.
+        let is_weighted = channel.weighting().sigma(0).is_some();
+        if is_weighted && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {
+            coloured = true;
+            poor |= found.fit_percent < POOR;
+        }
+    }
+    (coloured, poor)
+}
+
 /// Why no statement on the functions means anything; `None` where they may.
-pub(super) fn meaningless(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    half_step: &HalfStep,
-) -> Option<String> {
+fn meaningless(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep) -> Option<String> {
     match half_step {
         Err(breakdown) => return Some(format!("on half the step there is no motion: {breakdown}")),
         Ok(Some(half)) if half.change_per_reading > STEPPER => {
@@ -46,7 +104,7 @@ pub(super) fn meaningless(
 
 /// What is said where the residuals are larger than the readings' sigma allows: the errors of all functions are then
 /// too small. `None` where they are not, or nobody gave a sigma.
-pub(super) fn unexplained(statistics: &StatisticsSummary) -> Option<String> {
+fn unexplained(statistics: &StatisticsSummary) -> Option<String> {
     let times = statistics.reduced_chi_square?.sqrt();
     (times > BEYOND_SIGMA).then(|| {
         format!(
@@ -57,14 +115,14 @@ pub(super) fn unexplained(statistics: &StatisticsSummary) -> Option<String> {
 }
 
 /// What is said of a device that swings so fast that its readings are those of other devices as well; `None` where they
-/// are not. Equally spaced readings of one kind of a free motion of frequency `f` are those of one of `1/spacing - f`;
-/// uneven ones, a force, or a second kind of reading tell them apart.
-pub(super) fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<String> {
+/// are not. Readings of one kind on a raster, of a free motion of frequency `f`, are those of one of `1/spacing - f`;
+/// times off the raster, a force, or a second kind of reading tell them apart.
+fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<String> {
     let mut channels = problem.channels();
     let first = channels.next()?;
-    let spacing = spacing(first)?;
+    let spacing = raster(first)?;
     let alike = |c: &Channel| {
-        let same = self::spacing(c).is_some_and(|s| (s - spacing).abs() <= EVEN * spacing);
+        let same = raster(c).is_some_and(|s| (s - spacing).abs() <= EVEN * spacing);
         c.kind() == first.kind() && same
     };
     let driven =
@@ -73,27 +131,30 @@ pub(super) fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<Stri
     if !channels.all(alike) || experiments.any(|e| driven(&e.excitation)) {
         return None;
     }
-    let place = problem
-        .oscillator
-        .terms
-        .iter()
-        .position(|term| *term == Term::Stiffness)?;
+    let place = (problem.oscillator.terms.iter()).position(|term| *term == Term::Stiffness)?;
     let device = &evaluation.device;
     let pairs = device.mass.iter().zip(&device.coefficients[place]);
-    let fastest = pairs.map(|(m, k)| k / m).fold(0.0, f64::max).sqrt() / TAU;
-    (fastest * spacing > PERIODS_PER_READING).then(|| {
+    let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
+    squares.sort_by(f64::total_cmp);
+    // That of most times: at the ends of a record k/m may be anything.
+    let frequency = squares[squares.len() / 2].sqrt() / TAU;
+    (frequency * spacing > PERIODS_PER_READING).then(|| {
         format!(
-            "which of several frequencies it is, is not identified: with {:.1} readings in a period of {fastest:.3} Hz \
-             its aliases match as well; read more often, or at uneven times",
-            1.0 / (fastest * spacing)
+            "devices of other frequencies may match as well: with {:.1} readings in a period of {frequency:.3} Hz its \
+             aliases do; read more often, or at uneven times",
+            1.0 / (frequency * spacing)
         )
     })
 }
 
-/// The spacing of equally spaced readings, s.
-fn spacing(channel: &Channel) -> Option<f64> {
+/// The shortest distance of readings, if all distances are multiples of it, s.
+fn raster(channel: &Channel) -> Option<f64> {
     let times = channel.times();
-    let spacing = (times.last()? - times.first()?) / (times.len().checked_sub(1)? as f64);
-    let even = |(i, t): (usize, &f64)| (t - times[0] - i as f64 * spacing).abs() <= EVEN * spacing;
-    (spacing > 0.0 && times.iter().enumerate().all(even)).then_some(spacing)
+    let distances = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let spacing = distances.reduce(f64::min).filter(|s| *s > 0.0)?;
+    let on_raster = |t: &f64| {
+        let place = (t - times[0]) / spacing;
+        (place - place.round()).abs() <= EVEN
+    };
+    times.iter().all(on_raster).then_some(spacing)
 }

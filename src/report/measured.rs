@@ -43,6 +43,9 @@ pub struct ChannelSummary {
     /// Whether that was estimated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sigma_estimated: bool,
+    /// Whether a robust loss leaves readings far off aside.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub robust: bool,
     /// What the residuals have that is neither noise nor motion, if there is anything of the kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pattern: Option<PatternSummary>,
@@ -174,6 +177,7 @@ pub fn channel(channel: &Channel, note: Option<&ChannelNote>, predicted: &[f64])
         fit_percent: diagnostics.fit_percent,
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
+        robust: channel.loss() != Loss::Squares,
         pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
         whiteness: diagnostics.whiteness.to_string(),

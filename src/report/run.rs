@@ -9,7 +9,7 @@ use super::document::{
 };
 use super::files::Stage;
 use super::knowledge::knowledge;
-use super::meaning::{aliased, meaningless, unexplained};
+use super::meaning::Doubts;
 use super::measured::{self, ChannelSummary, HalfStep, StatisticsSummary};
 use super::page::fit_page;
 use super::render;
@@ -198,31 +198,31 @@ impl FittedModel<'_> {
         let problem = &self.model.problem;
         let knowledge = knowledge(problem);
         if !self.is_simulated() {
+            let sentence = "how sure the functions are is not known: the equation error simulates no motion, and noise \
+                            biases it; method: gauss-newton, with initial: data, goes on from it";
             return IdentifiabilitySummary {
                 of: problem.parameters(),
+                verdicts: vec![sentence.into()],
                 knowledge,
                 ..IdentifiabilitySummary::default()
             };
         }
         let count = count(problem);
-        if let Some(why) = meaningless(problem, &self.fit.best.evaluation, half_step) {
-            return IdentifiabilitySummary {
-                seen: count.seen_at_most,
-                of: count.of,
-                verdicts: vec![format!("the device is not identified: {why}")],
-                knowledge,
-                ..IdentifiabilitySummary::default()
-            };
-        }
         let evaluation = &self.fit.best.evaluation;
-        let unexplained = unexplained(statistics);
-        let bands = self.known.bands.as_ref().filter(|_| unexplained.is_none());
+        let mut doubts = Doubts::of(problem, evaluation, half_step, statistics);
+        if self.fit.outcome.status == Status::Failed {
+            doubts.no_device = Some("the device is not identified: the fit failed".into());
+            doubts.errors_hold = false;
+        }
+        let bands = self.known.bands.as_ref().filter(|_| doubts.errors_hold);
         let judged = bands.map_or(Vec::new(), |bands| verdicts(problem, evaluation, bands));
-        let doubts = unexplained.into_iter().chain(aliased(problem, evaluation));
         IdentifiabilitySummary {
             seen: count.seen_at_most,
             of: count.of,
-            verdicts: count.sentences.into_iter().chain(doubts).collect(),
+            verdicts: match doubts.no_device {
+                Some(why) => vec![why],
+                None => count.sentences.into_iter().chain(doubts.open).collect(),
+            },
             knowledge,
             functions: judged.into_iter().map(|j| j.sentence).collect(),
         }

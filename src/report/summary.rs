@@ -70,7 +70,11 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
             1 => "of the readings",
             _ => "of the worst channel",
         };
-        format!("{worst:.2} % {of}; J/J0 {:.1e}", document.cost.ratio)
+        format!(
+            "{} {of}; J/J0 {:.1e}",
+            advice::percent(worst, 2),
+            document.cost.ratio
+        )
     });
     for (label, sentences) in [
         ("found", vec![found(document)]),
@@ -96,6 +100,7 @@ fn found(document: &ResultDocument) -> String {
         let values = match (f.min == f.max, f.standard_error) {
             (true, Some(error)) => format!("{} +- {error:.1e}", short(f.min)),
             (true, None) => short(f.min),
+            (false, _) if short(f.min) == short(f.max) => short(f.min),
             (false, _) => format!("{} to {}", short(f.min), short(f.max)),
         };
         Some(format!("{name} {values} {}", quantity.unit()))
@@ -144,7 +149,7 @@ pub(super) fn write_channel(
 /// The fit of a channel; readings that are all the same have none.
 pub(super) fn fit_in_words(percent: f64) -> String {
     match percent.is_finite() {
-        true => format!("fit {percent:.2} %"),
+        true => format!("fit {}", advice::percent(percent, 2)),
         false => "no fit in per cent".into(),
     }
 }

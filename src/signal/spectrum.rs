@@ -5,6 +5,10 @@ use std::f64::consts::TAU;
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex;
 
+/// One density of white noise in twenty thousand is so many times the mean of all.
+const ABOVE_NOISE: f64 = 10.0;
+/// A motion stands out of noise with this share of the energy; of noise alone 1 in 2000 parts does.
+const STANDS_OUT: f64 = 0.02;
 /// Fewest values of which a spectrum is made.
 const FEWEST: usize = 4;
 
@@ -115,6 +119,39 @@ impl Spectrum {
             left -= density;
         }
         last as f64 * self.resolution
+    }
+
+    /// The spectrum without white noise: densities below ten times its floor are zero. The floor is the mean of the
+    /// exponential distribution of a density of noise whose median is that of all densities. Where a motion fills half of
+    /// the frequencies, or there is nothing but noise, next to nothing stands out of it: then the spectrum as it is.
+    ///
+    /// ```
+    /// use kmcfit::signal::Spectrum;
+    /// let noise = |i: i64| 1e-2 * ((i * i * 7919) % 1009 - 504) as f64 / 291.0;
+    /// let decay = |i: i64| (-0.01 * i as f64).exp() * (0.3 * i as f64).cos();
+    /// let series: Vec<f64> = (0..2000).map(|i| decay(i) + noise(i)).collect();
+    /// let spectrum = Spectrum::of(&series, 0.01).expect("it varies");
+    /// let frequency = 0.3 / (0.01 * std::f64::consts::TAU);
+    /// assert!(spectrum.energy_quantile(0.9) > 3.0 * frequency);
+    /// assert!(spectrum.without_noise().energy_quantile(0.999) < 1.2 * frequency);
+    /// ```
+    pub fn without_noise(&self) -> Self {
+        let mut sorted = self.density.clone();
+        sorted.sort_by(f64::total_cmp);
+        let floor = sorted[sorted.len() / 2] / std::f64::consts::LN_2;
+        let kept = |density: &f64| {
+            if *density > ABOVE_NOISE * floor {
+                *density
+            } else {
+                0.0
+            }
+        };
+        let density: Vec<f64> = self.density.iter().map(kept).collect();
+        let energy = |density: &[f64]| density.iter().sum::<f64>();
+        match energy(&density) >= STANDS_OUT * energy(&self.density) {
+            true => Self { density, ..*self },
+            false => self.clone(),
+        }
     }
 
     /// How far the top is from the highest value, in resolutions, from -1/2 to 1/2.

@@ -332,6 +332,14 @@ impl<'p> Run<'_, '_, '_, 'p> {
         if problem.is_some_and(|p| p.parameters() == 0) {
             return converged("there is nothing to fit: every function is fixed");
         }
+        let infinite = |p: &Problem| {
+            let sigmas = p.channels().filter_map(|c| c.weighting().sigma(0));
+            !p.misfit_of_silence().is_finite() || sigmas.into_iter().any(|s| !s.is_finite())
+        };
+        if problem.is_some_and(infinite) {
+            let reason = "the squares of the readings leave the range of numbers: give them in a larger unit";
+            return Some(Outcome::new(Status::Failed, reason));
+        }
         if cost == 0.0 {
             // Squares of readings below 1e-154 are zero.
             return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {

@@ -165,7 +165,8 @@ fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
     bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
     bench.run_to(0, &["init", "record.csv"]);
     let summary = bench.run(&["fit", "record.yaml", "--no-report"]).1;
-    let said = "which of several frequencies it is, is not identified: with 2.0 readings in a period of 0.500 Hz";
+    let said =
+        "devices of other frequencies may match as well: with 2.0 readings in a period of 0.500 Hz";
     assert!(summary.contains(said), "{summary}");
 }
 

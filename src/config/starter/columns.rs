@@ -223,6 +223,12 @@ impl Columns {
 fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
     let increases = |i: &&usize| increasing_at(table, **i).is_ok();
     let is_time = |i: &&usize| known(table, **i).is_some_and(|c| c.role == Role::Time);
+    if let Some(index) = numeric.iter().find(is_time)
+        && let Err(error) = increasing_at(table, *index)
+        && !numeric.iter().filter(increases).any(|i| is_time(&i))
+    {
+        return Err(error.hint("without this column: `--sample-rate HZ`"));
+    }
     let named = numeric.iter().filter(increases).find(is_time);
     match named.or_else(|| numeric.iter().find(increases)) {
         Some(index) => Ok(known(table, *index)

@@ -124,6 +124,13 @@ fn text(
             "accelerometers have one; leave it out if yours has none",
         );
     }
+    if columns.has(Role::Displacement) && motion.is_off_centre {
+        line(
+            "    sensors: ",
+            "{displacement: {offset: estimate}}".into(),
+            "the readings swing about another value than zero",
+        );
+    }
     line(
         "    initial: ",
         "estimate".into(),

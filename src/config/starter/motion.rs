@@ -22,6 +22,8 @@ pub struct Motion {
     pub is_regular: bool,
     /// Hz.
     pub frequency: Option<f64>,
+    /// Whether the mean of the readings is larger than their distances from it.
+    pub is_off_centre: bool,
     /// Root-mean-square force, N, and motion with the power of the frequency that makes it an
     /// acceleration.
     force: Option<f64>,
@@ -80,6 +82,7 @@ impl Motion {
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
             frequency: frequency(&pairs, spacing),
+            is_off_centre: off_centre(&pairs),
             force: force.map(|f| spread(f.into_iter().filter(|x| x.is_finite()))),
             motion: spread(pairs.iter().map(|(_, value)| *value)),
             power,
@@ -159,6 +162,11 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[sorted.len() / 2]
+}
+
+fn off_centre(pairs: &[(f64, f64)]) -> bool {
+    let mean = pairs.iter().map(|(_, value)| value).sum::<f64>() / pairs.len() as f64;
+    mean.abs() > spread(pairs.iter().map(|(_, value)| *value))
 }
 
 /// Standard deviation.

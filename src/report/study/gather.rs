@@ -11,6 +11,8 @@ use crate::identifiability::{
 };
 use crate::objective::{Evaluation, Weighting};
 use crate::problem::Problem;
+use crate::report::meaning::Doubts;
+use crate::report::measured;
 use crate::solvers::Fit;
 use crate::study::bootstrap::{Noise, bootstrap};
 use crate::study::equivalent::{Motion, Wish, equivalent};
@@ -134,7 +136,18 @@ pub fn bands(
     };
     let bands = Bands::at(problem, theta, evaluation, &settings);
     let factor = normal_half_width(plan.confidence);
-    let judged = verdicts(problem, evaluation, &bands);
+    let doubts = Doubts::of(
+        problem,
+        evaluation,
+        &measured::refined(problem, evaluation),
+        &measured::statistics(problem, evaluation),
+    );
+    let judged = match doubts.errors_hold {
+        true => verdicts(problem, evaluation, &bands),
+        false => Vec::new(),
+    };
+    let mut notes = bands.notes.clone();
+    notes.extend(doubts.no_device.into_iter().chain(doubts.open));
     let ratios = truth.map(Ratios::of);
     let list = bands.functions.iter().chain(&bands.ratios);
     let records = list.enumerate().map(|(i, band)| {
@@ -180,7 +193,7 @@ pub fn bands(
     BandsPiece {
         times: bands.times.clone(),
         bands: records.collect(),
-        notes: bands.notes.clone(),
+        notes,
         verdicts: (judged.into_iter())
             .map(|j| JudgementRecord {
                 verdict: word(&j.verdict).into(),

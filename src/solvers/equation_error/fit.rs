@@ -172,7 +172,9 @@ impl<'a> Cost<'a> {
             if !from.iter().zip(&sizes).any(far) {
                 break;
             }
-            let next = self.minimise_from(&minimum.parameters, timings)?;
+            let Ok(next) = self.minimise_from(&minimum.parameters, timings) else {
+                break;
+            };
             minimum = Minimum {
                 program: next.program.or(minimum.program),
                 ..next

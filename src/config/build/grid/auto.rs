@@ -21,6 +21,10 @@ const ENERGY: f64 = 0.9;
 const ALL_ENERGY: f64 = 0.999;
 /// Fewest steps in a period of the latter.
 const STEPS_PER_PERIOD: f64 = 10.0;
+/// Readings have come to rest where the later half has this share of the energy of the earlier one.
+const AT_REST: f64 = 0.01;
+/// Fewest readings that are halved.
+const FEWEST_LIVELY: usize = 128;
 /// More nodes than so many per reading only make a coarse record slow.
 const MOST_PER_READING: usize = 64;
 
@@ -37,7 +41,8 @@ pub fn nodes(
     let mut readings = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
         readings = readings.max(channel.times.len());
-        let spectrum = Spectrum::of(&channel.values, channel.median_spacing);
+        let spectrum = Spectrum::of(lively(&channel.values), channel.median_spacing);
+        let spectrum = spectrum.map(|s| s.without_noise());
         let frequency = spectrum.as_ref().map(|s| s.energy_quantile(ENERGY));
         let (Some(spectrum), Some(frequency)) = (spectrum, frequency.filter(|f| *f > 0.0)) else {
             if channel.median_spacing > 0.0 {
@@ -79,6 +84,22 @@ pub fn nodes(
         omega * duration * (omega * step).powf(order) / constant,
     ));
     nodes
+}
+
+/// The beginning of readings that come to rest: halved as long as the later half has next to none of the energy.
+/// What is left of the motion there is noise, and a window would leave little else.
+fn lively(values: &[f64]) -> &[f64] {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let energy = |part: &[f64]| part.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();
+    let mut part = values;
+    while part.len() >= FEWEST_LIVELY {
+        let (earlier, later) = part.split_at(part.len() / 2);
+        if energy(later) > AT_REST * energy(earlier) {
+            break;
+        }
+        part = earlier;
+    }
+    part
 }
 
 /// Order of a method and the constant of its phase error.
