@@ -91,10 +91,11 @@ pub fn offset_and_drift(times: &[f64], residuals: &[f64]) -> [f64; 2] {
     [offset, drift].map(|share| if share.is_finite() { share } else { 0.0 })
 }
 
-fn median_size(values: &[f64]) -> f64 {
+/// The median of the sizes of some values, 0 of none.
+pub(crate) fn median_size(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    sizes[sizes.len() / 2]
+    sizes.get(sizes.len() / 2).copied().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -2,13 +2,14 @@
 
 use super::bands::{Band, Bands};
 use super::linear::{span_words, spans};
-use crate::diagnostics::NORMAL_975;
+use crate::diagnostics::{NORMAL_975, median_size};
 use crate::dynamics::Term;
-use crate::objective::{Evaluation, median_size};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 
 /// A function is identified where the half-width of its 95 % band is at most this share of its
-/// natural size: a quarter tells half of it from the whole.
+/// size at most times ([`Problem::natural_sizes`] with the median of its values in place of the largest): a quarter
+/// tells half of it from the whole.
 pub const IDENTIFIED: f64 = 0.25;
 /// It is identified on the whole if it is so at this share of the nodes: the ends of a record are
 /// always seen less.
@@ -21,7 +22,7 @@ pub const LEAST: f64 = 0.05;
 pub enum Verdict {
     /// Known at (nearly) all times.
     Identified {
-        /// Largest half-width of the 95 % band there, relative to the natural size.
+        /// Largest half-width of the 95 % band there, relative to that size.
         relative: f64,
     },
     /// Not known itself, but this ratio with it is.
@@ -45,9 +46,9 @@ pub struct Judgement {
     pub sentence: String,
 }
 
-/// By how much a number of this natural size is known where it is known at all: as a share of its own largest value
+/// By how much a number of this size is known where it is known at all: as a share of its own largest value
 /// there, or where that is within the band, as a number beside which the value cannot be told from zero. In between it
-/// is small beside the natural size, and that is what is known of it.
+/// is small beside the size at which it would matter, and that is what is known of it.
 fn identified(name: &str, band: &Band, size: f64) -> String {
     let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
     let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
@@ -70,7 +71,7 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
     format!("{name} is identified, to {share} of its largest value (95 %)")
 }
 
-/// Whether a function of this natural size is known at a node.
+/// Whether a function of this size is known at a node.
 fn is_known(band: &Band, size: f64, i: usize) -> bool {
     band.values[i].is_finite() && NORMAL_975 * band.standard_error[i] / size <= IDENTIFIED
 }

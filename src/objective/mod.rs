@@ -17,7 +17,7 @@ pub use gradient::{Gradient, GradientKind};
 pub use loss::Loss;
 pub use refine::Refined;
 pub use sensor::Sensor;
-pub(crate) use sizes::{median_size, state_sizes};
+pub(crate) use sizes::state_sizes;
 pub use verify::GradientError;
 pub use weighting::Weighting;
 

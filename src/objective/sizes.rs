@@ -1,6 +1,7 @@
 //! How large a change of a function is large.
 
 use super::Evaluation;
+use crate::diagnostics::median_size;
 use crate::dynamics::quadrature::curvature_into;
 use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
 use crate::functions::largest;
@@ -74,13 +75,6 @@ impl Problem {
         let scalars = self.functions.scalars().iter().zip(self.scalars(&delta));
         scalars.fold(most, |most, (scalar, x)| most.max(x.abs() / scalar.size))
     }
-}
-
-/// The median of the sizes of some values, 0 of none.
-pub(crate) fn median_size(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).copied().unwrap_or_default()
 }
 
 /// The sums over the nodes of `y''^2` and of `phi^2` of each term.

@@ -2,17 +2,13 @@
 //! the terminal and the page say the same.
 
 use super::document::ResultDocument;
-use super::meaning::BEYOND_SIGMA;
+use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
 use super::measured::{ChannelSummary, PatternSummary};
 use crate::dynamics::Method;
 use crate::solvers::{Solver, Status};
 
-/// Below this share of the readings the fit does not explain the record, per cent.
-pub(super) const POOR: f64 = 90.0;
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;
-/// Such a fit leaves the rounding of the readings, per cent.
-const EXACT: f64 = 99.99;
 /// Half the step may change the model's readings by this share of the largest one.
 const COARSE: f64 = 1e-3;
 /// Name of the rung that starts from the model's start values.

@@ -1,6 +1,5 @@
 //! Whether what a fit came to is a device to speak of, and the only one of its kind.
 
-use super::advice::POOR;
 use super::measured::{HalfStep, StatisticsSummary, diagnostics};
 use crate::diagnostics::fit_percent;
 use crate::dynamics::{Excitation, Term};
@@ -14,12 +13,14 @@ const STEPPER: f64 = 0.1;
 /// A fit is absurd that misses all channels by more than twice what their readings vary, per cent. Outliers that
 /// a robust loss leaves aside cannot bring it below -42 %.
 const ABSURD: f64 = -100.0;
+/// Below this share of the readings the fit does not explain the record, per cent.
+pub(super) const POOR: f64 = 90.0;
 /// Residuals may be this many times sigma before nothing is made of sigma any more.
 pub(super) const BEYOND_SIGMA: f64 = 3.0;
 /// The probability of such residuals under white noise below which they are certainly none.
 const CERTAIN: f64 = 1e-6;
 /// What such a fit leaves is the rounding of the readings, per cent.
-const EXACT: f64 = 99.99;
+pub(super) const EXACT: f64 = 99.99;
 /// Two and a half readings a period: from there on the frequency is near to that of its first alias.
 const PERIODS_PER_READING: f64 = 0.4;
 /// Equally spaced readings are no further from their places than this part of the spacing.

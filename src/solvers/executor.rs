@@ -11,7 +11,7 @@ use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
 use super::{Descend, FitSettings, Rung, Solver, Step, Timings, equation_error};
 use crate::dynamics::{Breakdown, Cause};
-use crate::objective::{Evaluation, GradientKind};
+use crate::objective::{Channel, Evaluation, GradientKind};
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
@@ -332,15 +332,13 @@ impl<'p> Run<'_, '_, '_, 'p> {
         if problem.is_some_and(|p| p.parameters() == 0) {
             return converged("there is nothing to fit: every function is fixed");
         }
-        let infinite = |p: &Problem| {
-            let sigmas = p.channels().filter_map(|c| c.weighting().sigma(0));
-            !p.misfit_of_silence().is_finite() || sigmas.into_iter().any(|s| !s.is_finite())
-        };
-        if problem.is_some_and(infinite) {
-            let reason = "the squares of the readings leave the range of numbers: give them in a larger unit";
-            return Some(Outcome::new(Status::Failed, reason));
-        }
         if cost == 0.0 {
+            // Beside an infinite sigma, which is what squares beyond 1e308 come to, every residual is zero.
+            let infinite = |c: &Channel| c.weighting().sigma(0).is_some_and(|s| !s.is_finite());
+            if problem.is_some_and(|p| p.channels().any(infinite)) {
+                let reason = "the squares of the readings leave the range of numbers: give them in a larger unit";
+                return Some(Outcome::new(Status::Failed, reason));
+            }
             // Squares of readings below 1e-154 are zero.
             return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {
                 true => converged(

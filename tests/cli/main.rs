@@ -5,6 +5,7 @@ mod bad_input;
 mod check;
 mod compare;
 mod data_files;
+mod doubts;
 mod durable;
 mod ending;
 mod front;

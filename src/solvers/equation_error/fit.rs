@@ -42,8 +42,8 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
     let first = cost.point(start.to_vec());
     let mut counts = Counts::default();
     let (outcome, found) = match cost.minimise(start, &mut timings) {
-        Ok(minimum) => {
-            counts.qp = u64::from(minimum.program.is_some());
+        Ok((minimum, programs)) => {
+            counts.qp = programs;
             let point = cost.point(minimum.parameters.clone());
             let device = &point.evaluation.device;
             let has_mass = device.mass.iter().all(|m| *m > 0.0);
@@ -163,8 +163,14 @@ impl<'a> Cost<'a> {
 
     /// The minimum; where it is far below the start in the size of a function, once more from there: what is solved for
     /// is the step, and beside a step of 1e12 the digits of a 1 are rounding.
-    fn minimise(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+    /// Also how many quadratic programs that took.
+    fn minimise(
+        &self,
+        start: &[f64],
+        timings: &mut Timings,
+    ) -> Result<(Minimum, u64), ConicStatus> {
         let mut minimum = self.minimise_from(start, timings)?;
+        let mut programs = u64::from(minimum.program.is_some());
         let mut from = self.measurements.sizes(self.problem, start);
         for _ in 0..AGAIN {
             let sizes = self.measurements.sizes(self.problem, &minimum.parameters);
@@ -175,13 +181,11 @@ impl<'a> Cost<'a> {
             let Ok(next) = self.minimise_from(&minimum.parameters, timings) else {
                 break;
             };
-            minimum = Minimum {
-                program: next.program.or(minimum.program),
-                ..next
-            };
+            programs += u64::from(next.program.is_some());
+            minimum = next;
             from = sizes;
         }
-        Ok(minimum)
+        Ok((minimum, programs))
     }
 
     fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {

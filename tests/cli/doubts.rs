@@ -1,0 +1,297 @@
+//! Where readings do not say what a fit came to, the summary does, and what to try next helps.
+
+use crate::workbench::Workbench;
+use insta::assert_snapshot;
+use serde_json::Value;
+
+/// A record for a model that leaves its mass alone.
+fn starter(grid: &str, more: &str) -> String {
+    format!(
+        "format: 1
+experiments:
+  - data: record.csv
+    initial: estimate
+{more}grid: {grid}
+functions:
+  mass: {{fixed: 1.0}}
+  damping: {{basis: constant, start: 0.25}}
+  stiffness: {{basis: constant, start: 39}}
+fit: {{method: gauss-newton}}
+"
+    )
+}
+
+/// Readings of one value move no oscillator: no starter is made of them, and steps as long as a period, which stand still
+/// as well and match them, show no device.
+#[test]
+fn what_stands_still_shows_no_device() {
+    let bench = Workbench::empty();
+    let rows: String = (0..12).map(|i| format!("{i},1\n")).collect();
+    bench.write("record.csv", &format!("t,y\n{rows}"));
+    let (code, _, stderr) = bench.run(&["init", "record.csv"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr, @"
+    error: record.csv: the readings do not move
+      found: 12 readings, all of them 1
+      expected: the motion of a device: nothing can be learnt from one that stands still
+    ");
+    for grid in ["{nodes: 9}", "{nodes: auto}", "{}", "{nodes: 200}"] {
+        bench.write(
+            "model.yaml",
+            &starter(grid, "    columns: {time: t, displacement: y}\n"),
+        );
+        let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        let open = [
+            "the device is not identified: ",
+            "stiffness is not seen by the readings",
+        ];
+        let says = |words: &&str| summary.contains(words);
+        assert!(open.iter().any(says), "{grid}: {summary}{stderr}");
+        assert!(!summary.contains("is identified"), "{grid}: {summary}");
+        assert!(!summary.contains("inf"), "{grid}: {summary}");
+    }
+}
+
+/// Two readings a period, and so few: the frequency is an alias of others, if it is one at all.
+#[test]
+fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
+    let bench = Workbench::empty();
+    let rows: String = (0..8).map(|i| format!("{i},{}\n", 1 - i % 2 * 2)).collect();
+    bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
+    bench.run_to(0, &["init", "record.csv"]);
+    let summary = bench.run(&["fit", "record.yaml", "--no-report"]).1;
+    let said =
+        "devices of other frequencies may match as well: with 2.0 readings in a period of 0.500 Hz";
+    assert!(summary.contains(said), "{summary}");
+}
+
+/// What is added to the reading of this number at this time.
+type Spoiler = fn(usize, f64) -> f64;
+
+/// What is advised for single readings far off, an offset and a drift names a cure that is one.
+#[test]
+fn what_to_try_next_helps() {
+    let bench = Workbench::empty();
+    let ring_down = |spoilt: Spoiler| {
+        let rows = (0..401).map(|i| {
+            let t = 0.05 * i as f64;
+            let noise = 1e-3 * (12.9898 * i as f64).sin();
+            let y = (-0.05 * t).exp() * (2.0 * t).cos() + noise;
+            format!("{t},{}\n", y + spoilt(i, t))
+        });
+        format!("t_s,y_m\n{}", rows.collect::<String>())
+    };
+    let error = || {
+        let printed = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--json"]);
+        let result: Value = serde_json::from_str(&printed).expect("JSON");
+        let of = |f: &str| result["functions"][f]["max"].as_f64().expect("a number");
+        let stiffness = (of("stiffness") / 4.0025 - 1.0).abs();
+        stiffness.max((of("damping") / 0.1 - 1.0).abs())
+    };
+    let spoilers: [(Spoiler, &str, &str); 3] = [
+        (
+            |i, _| if [60, 61, 200].contains(&i) { 9.0 } else { 0.0 },
+            "3 readings of the displacement lie far off, the first at 3 s: a robust loss (loss: {displacement: huber}) in \
+             the experiment",
+            "    loss: {displacement: huber}\n",
+        ),
+        (
+            |_, _| 0.1,
+            "the residuals of the displacement have an offset: sensors: {displacement: {offset: estimate}} in the \
+             experiment",
+            "    sensors: {displacement: {offset: estimate}}\n",
+        ),
+        (
+            |_, t| 0.01 * (t - 10.0),
+            "the residuals of the displacement drift: sensors: {displacement: {offset: estimate, drift: estimate}} in \
+             the experiment",
+            "    sensors: {displacement: {offset: estimate, drift: estimate}}\n",
+        ),
+    ];
+    for (spoilt, advice, cure) in spoilers {
+        bench.write("record.csv", &ring_down(spoilt));
+        let sigma = "    sigma: {displacement: 0.001}\n";
+        let spoilt = starter("{nodes: 801}", sigma).replace("start: 39", "start: 3.8");
+        bench.write("model.yaml", &spoilt);
+        let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        assert!(
+            summary.contains(&format!("try next  {advice}\n")),
+            "{summary}"
+        );
+        bench.write(
+            "model.yaml",
+            &spoilt.replace(sigma, &format!("{sigma}{cure}")),
+        );
+        assert!(error() < 0.01, "{advice}: {}", error());
+    }
+}
+
+/// A ring-down of m = 1, c = 0.1, k = 4.0025 with pseudo-random errors of up to `size`.
+fn ring_down(seconds: u32, size: f64) -> String {
+    let rows = (0..=20 * seconds).map(|i| {
+        let t = 0.05 * f64::from(i);
+        // A multiplication alone would make a tone of the golden ratio.
+        let mixed = i.wrapping_mul(2_654_435_761);
+        let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(2_246_822_519);
+        let error = f64::from((mixed ^ (mixed >> 13)) >> 8) / f64::from(1 << 24) - 0.5;
+        let y = (-0.05 * t).exp() * (2.0 * t).cos() + 2.0 * size * error;
+        format!("{t},{y}\n")
+    });
+    format!("t_s,y_m\n{}", rows.collect::<String>())
+}
+
+/// Residuals that are a hundred times the sigma that was given say nothing of errors, in a study neither; sigma itself is
+/// what to look at.
+#[test]
+fn a_sigma_that_is_too_small_is_seen() {
+    let bench = Workbench::empty();
+    bench.write("record.csv", &ring_down(20, 1e-2));
+    let model = starter("{nodes: 801}", "    sigma: {displacement: 1e-4}\n").replace("39", "3.8");
+    bench.write("model.yaml", &model);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let said = "how sure the functions are is not known: the residuals are ";
+    assert!(summary.contains(&format!("open      {said}")), "{summary}");
+    assert!(
+        summary.contains("sigma is too small (sigma: estimate)"),
+        "{summary}"
+    );
+    assert!(!summary.contains("is identified"), "{summary}");
+    let study = bench.run_to(0, &["study", "model.yaml"]);
+    assert!(
+        study.contains(said) && !study.contains("is identified"),
+        "{study}"
+    );
+    bench.write("model.yaml", &model.replace("1e-4", "estimate"));
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    assert!(summary.contains("stiffness is identified"), "{summary}");
+}
+
+/// A device that is nearly right leaves a pattern: its errors are said to be too small.
+#[test]
+fn errors_that_are_too_small_are_said_to_be() {
+    let bench = Workbench::empty();
+    let beat = (0..=400).map(|i| {
+        let t = 0.05 * f64::from(i);
+        let y = (-0.05 * t).exp() * ((2.0 * t).cos() + 0.05 * (5.0 * t).sin());
+        format!("{t},{y}\n")
+    });
+    bench.write(
+        "record.csv",
+        &format!("t_s,y_m\n{}", beat.collect::<String>()),
+    );
+    let model = starter("{nodes: 801}", "    sigma: {displacement: estimate}\n");
+    bench.write("model.yaml", &model.replace("39", "3.8"));
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let said = "by how much the errors are too small is not known";
+    assert!(summary.contains(&format!("open      {said}")), "{summary}");
+    assert!(
+        summary.contains("try next  the residuals have a pattern"),
+        "{summary}"
+    );
+}
+
+/// One missing reading leaves the others where aliases match them; uneven times do not.
+#[test]
+fn a_gap_hides_no_alias() {
+    let bench = Workbench::empty();
+    let record = |shift: fn(u32) -> f64| {
+        let rows = (0..40u32).filter(|i| *i != 17).map(|i| {
+            let t = f64::from(i) + shift(i);
+            format!("{t},{}\n", (-0.01 * t).exp() * (2.8 * t).cos())
+        });
+        format!("t_s,y_m\n{}", rows.collect::<String>())
+    };
+    let said = "devices of other frequencies may match as well: with 2.2 readings in a period";
+    for (shift, aliased) in [
+        ((|_| 0.0) as fn(u32) -> f64, true),
+        (|i| 0.3 * f64::from(i % 3), false),
+    ] {
+        bench.write("record.csv", &record(shift));
+        bench.write(
+            "model.yaml",
+            &starter("{nodes: 2001}", "").replace("39", "7.8"),
+        );
+        let summary = bench.run(&["fit", "model.yaml", "--no-report"]).1;
+        assert_eq!(summary.contains(said), aliased, "{summary}");
+    }
+}
+
+/// Squares beyond the range of numbers make an infinite sigma, beside which every device fits.
+#[test]
+fn readings_without_squares_fail_by_name() {
+    let bench = Workbench::empty();
+    let rows: String = (0..40)
+        .map(|i| format!("{i},{}e200\n", (i % 5) - 2))
+        .collect();
+    bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
+    let sigma = "    sigma: {displacement: estimate}\n";
+    bench.write("model.yaml", &starter("{nodes: 401}", sigma));
+    let (code, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    assert_eq!(code, 3, "{summary}");
+    assert!(
+        summary.contains("failed: the squares of the readings leave the range of numbers"),
+        "{summary}"
+    );
+    assert!(!summary.contains("is identified"), "{summary}");
+}
+
+/// Five minutes of a ring-down that is over after one: the nodes are for the motion, not for the noise after it.
+#[test]
+fn nodes_are_not_chosen_for_noise() {
+    let bench = Workbench::empty();
+    bench.write("record.csv", &ring_down(300, 1e-2));
+    bench.run_to(0, &["init", "record.csv"]);
+    let (code, _, notes) = bench.run(&["check", "record.yaml", "--no-gradient"]);
+    assert_eq!(code, 0, "{notes}");
+    let nodes = notes.split_once("grid: ").expect("a remark").1;
+    let nodes: f64 = (nodes.split_once(' ').expect("words").0)
+        .parse()
+        .expect("a number");
+    // By the rule of auto, for 0.32 Hz over 300 s: 300 s / (1.2e-2 / 600)^(1/4) * 2 rad/s = 9000; for noise up to
+    // 10 Hz it would be 64 a reading.
+    assert!((5e3..2e4).contains(&nodes), "{notes}");
+}
+
+/// A laser that stands off: the readings swing about a distance.
+#[test]
+fn a_displacement_that_stands_off_gets_an_offset() {
+    let bench = Workbench::empty();
+    let far = |row: &str| match row.split_once(',') {
+        Some((t, y)) => match y.parse::<f64>() {
+            Ok(y) => format!("{t},{}\n", y + 5.0),
+            Err(_) => format!("{row}\n"),
+        },
+        None => String::new(),
+    };
+    let record: String = ring_down(20, 1e-2).lines().map(far).collect();
+    bench.write("record.csv", &record);
+    bench.run_to(0, &["init", "record.csv"]);
+    let model = bench.read("record.yaml");
+    assert!(
+        model.contains("sensors: {displacement: {offset: estimate}}"),
+        "{model}"
+    );
+    let summary = bench.run_to(0, &["fit", "record.yaml", "--no-report"]);
+    assert!(summary.contains("stiffness is identified"), "{summary}");
+}
+
+/// Times that are called so, and do not increase, are shown where.
+#[test]
+fn a_starter_shows_where_times_do_not_increase() {
+    let bench = Workbench::empty();
+    let rows: String = (0..20)
+        .map(|i| format!("{},{}\n", i - i / 12, i % 4))
+        .collect();
+    bench.write("record.csv", &format!("time_s,y_m\n{rows}"));
+    let (code, _, stderr) = bench.run(&["init", "record.csv"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr, @"
+    error: record.csv:14: row 13, column `time_s`: two rows with the same time
+       |
+    14 | 11,0
+       | ^^^^
+      found: 11 after 11 in line 13
+      expected: a time greater than 11
+      hint: without this column: `--sample-rate HZ`
+    ");
+}
