@@ -148,7 +148,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
             "{words}: {} of {}; {}",
             seen.rank,
             seen.of(),
-            counted.sentences.join("; ")
+            counted.sentences().join("; ")
         );
         assert_eq!((seen.rank, seen.of()), (expected, 600), "{words}");
         assert_eq!(
@@ -188,7 +188,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
     ] {
         let problem = linear_mass(&oscillator, record);
         let counted = count(&problem);
-        println!("{}", counted.sentences.join("; "));
+        println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
         assert_eq!(spectrum(&problem).rank, expected);
         assert_eq!(counted.symmetry, symmetry);
@@ -350,7 +350,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         assert_eq!(found.constant().count(), 0);
         assert_eq!(found.over_time().count(), nodes - 1);
         let counted = count(&held);
-        println!("{}", counted.sentences.join("; "));
+        println!("{}", counted.sentences().join("; "));
         assert_eq!(counted.symmetry, Symmetry::Function);
         let mut smooth = held.clone();
         let rows = Basis::Nodal.roughness(&oscillator.grid, 2);
@@ -917,7 +917,7 @@ fn the_scale_by_bases_and_drives() {
         println!(
             "{}: {}",
             problem.functions.get(0).basis.as_ref().unwrap().name(),
-            counted.sentences.join("; ")
+            counted.sentences().join("; ")
         );
         assert_eq!(
             (counted.seen_at_most, counted.symmetry),

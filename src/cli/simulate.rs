@@ -5,7 +5,7 @@ use crate::config::{ModelFile, Purpose, build};
 use crate::error::{InputError, Place};
 use crate::input::{one_of, quote};
 use crate::problem::Experiment;
-use crate::report::{CsvTable, json, write_whole};
+use crate::report::{CsvTable, json, write_together};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -164,8 +164,7 @@ fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
     }
     let mut beside = path.as_os_str().to_owned();
     beside.push(".json");
-    write_whole(Path::new(&beside), &json(record))?;
-    write_whole(path, table)
+    write_together(&[(Path::new(&beside), &json(record)), (path, table)])
 }
 
 fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {

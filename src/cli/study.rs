@@ -187,7 +187,7 @@ fn study(
             status: "interrupted".into(),
             confidence: model.study.confidence,
             seed: model.study.seed,
-            before: count(&model.problem).sentences,
+            before: count(&model.problem).sentences(),
             ..StudyDocument::default()
         },
     };

@@ -1,6 +1,7 @@
 //! Which functions share one scale, and where it is fixed.
 
 use crate::dynamics::Stepwise;
+use crate::functions::CoefficientFunction;
 use crate::problem::{Experiment, Problem};
 
 /// Functions that one factor multiplies: those of devices that have a function in common.
@@ -81,15 +82,28 @@ impl Component {
     /// The nodes at which a function that is known is not zero.
     pub fn known(&self, problem: &Problem) -> Vec<bool> {
         let mut known = vec![false; problem.functions.nodes()];
-        for &f in &self.functions {
-            let function = problem.functions.get(f);
-            if function.parameters() == 0 {
-                let values = known.iter_mut().zip(&function.offset);
-                values.for_each(|(k, p)| *k |= *p != 0.0);
-            }
+        for function in self.given(problem) {
+            let values = known.iter_mut().zip(&function.offset);
+            values.for_each(|(k, p)| *k |= *p != 0.0);
         }
         known
     }
+
+    /// Its functions that are known, and not zero throughout.
+    pub fn given<'a>(
+        &'a self,
+        problem: &'a Problem,
+    ) -> impl Iterator<Item = &'a CoefficientFunction> + 'a {
+        let functions = self.functions.iter().map(|f| problem.functions.get(*f));
+        functions.filter(|f| f.parameters() == 0 && f.offset.iter().any(|p| *p != 0.0))
+    }
+}
+
+/// Functions in words: `the mass and the stiffness, which are given`.
+pub(super) fn given_words(names: &[String]) -> String {
+    let names: Vec<String> = names.iter().map(|name| format!("the {name}")).collect();
+    let is = if names.len() == 1 { "is" } else { "are" };
+    format!("{}, which {is} given", names.join(" and "))
 }
 
 /// The force of an experiment, where there is one.

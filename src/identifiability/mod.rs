@@ -21,10 +21,11 @@ mod gauge;
 mod linear;
 mod sensitivity;
 mod verdict;
+pub(crate) use verdict::is_rounding;
 
 pub use anchors::{Anchors, anchors};
 pub use bands::{Band, BandSettings, Bands, Side};
-pub use counting::{Count, Symmetry, count};
+pub use counting::{Count, Statement, Symmetry, count};
 pub use directions::Directions;
 pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
 pub use gauge::{Gauge, GaugeDirection, MOSTLY, Named};

@@ -35,6 +35,19 @@ pub enum Verdict {
     Fixed,
 }
 
+impl Verdict {
+    /// Its name in files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Identified { .. } => "identified",
+            Self::OnlyRatio(_) => "only-ratio",
+            Self::OnlyOn(_) => "only-on",
+            Self::NotSeen => "not-seen",
+            Self::Fixed => "fixed",
+        }
+    }
+}
+
 /// A verdict on one function or ratio.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
@@ -44,6 +57,26 @@ pub struct Judgement {
     pub verdict: Verdict,
     /// The same as a sentence.
     pub sentence: String,
+    /// Smallest and largest value at the nodes where it is known; `None` where there is no such node.
+    pub known_range: Option<[f64; 2]>,
+}
+
+impl Judgement {
+    /// Whether it says what stays open, and not what is known or given.
+    pub fn is_open(&self) -> bool {
+        match self.verdict {
+            Verdict::Identified { .. } | Verdict::Fixed => false,
+            Verdict::OnlyRatio(_) | Verdict::OnlyOn(_) | Verdict::NotSeen => true,
+        }
+    }
+}
+
+/// Beside the size at which a function would matter, less than this is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether a value is zero but for rounding, beside the size at which it would matter.
+pub(crate) fn is_rounding(value: f64, size: f64) -> bool {
+    value.abs() <= ROUNDING * size
 }
 
 /// By how much a number of this size is known where it is known at all: as a share of its own largest value
@@ -54,6 +87,9 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
     let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
     let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
     let unit = &band.unit;
+    if is_rounding(half.max(own), size) {
+        return format!("{name} is identified: zero, but for rounding");
+    }
     if half >= own {
         return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
     }
@@ -64,9 +100,10 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
             100.0 * share
         );
     }
-    let share = match share < 1e-4 {
-        true => format!("{share:.0e}"),
-        false => format!("{:.2} %", 100.0 * share),
+    let share = match () {
+        () if is_rounding(share, 1.0) => return format!("{name} is identified, but for rounding"),
+        () if share < 1e-4 => format!("{share:.0e}"),
+        () => format!("{:.2} %", 100.0 * share),
     };
     format!("{name} is identified, to {share} of its largest value (95 %)")
 }
@@ -145,9 +182,12 @@ fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement 
         Verdict::NotSeen => format!("{name} is not seen by the readings"),
         Verdict::Fixed => format!("{name} is given"),
     };
+    let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    let known_range = known.map(|i| [band.values[i]; 2]);
     Judgement {
         name: name.to_owned(),
         verdict,
         sentence,
+        known_range: known_range.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
     }
 }

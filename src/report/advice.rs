@@ -1,5 +1,4 @@
-//! What a run came to, in a few lines: what is sure, what stays open, what to try next. The summary in
-//! the terminal and the page say the same.
+//! What to try next. The summary in the terminal and the page say the same.
 
 use super::document::ResultDocument;
 use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
@@ -16,38 +15,6 @@ const FROM_START_VALUES: &str = "start values";
 /// So many things to try next are enough.
 const MOST: usize = 3;
 
-/// What the readings settle, in sentences.
-pub fn settled(document: &ResultDocument) -> Vec<&str> {
-    sentences(document, true)
-}
-
-/// What they leave open, in sentences.
-pub fn open(document: &ResultDocument) -> Vec<&str> {
-    sentences(document, false)
-}
-
-fn sentences(document: &ResultDocument, is_settled: bool) -> Vec<&str> {
-    let known = &document.identifiability;
-    let all = known.verdicts.iter().chain(&known.functions);
-    let all = all.map(String::as_str);
-    all.filter(|s| !s.ends_with(" is given"))
-        .filter(|s| says_settled(s) == is_settled)
-        .collect()
-}
-
-/// Whether a sentence of the counting or of a verdict says that something can be known.
-fn says_settled(sentence: &str) -> bool {
-    let open = [
-        " is free",
-        " not identified",
-        " only on ",
-        " is not seen",
-        " is not known",
-        " may match as well",
-    ];
-    !open.iter().any(|words| sentence.contains(words))
-}
-
 /// The worst fit of a channel, per cent.
 pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
     let channels = document.experiments.iter().flat_map(|e| &e.channels);
@@ -63,10 +30,14 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
     steps.extend(about_residuals(document));
+    if wanders(document) {
+        steps.rotate_left(1);
+    }
     let known = &document.identifiability;
     let is_simulated = document.model.method != Solver::EquationError.name();
     if is_simulated && document.model.parameters > 0 {
-        steps.push(match known.seen < known.of {
+        // Constraints may hold what the readings do not show.
+        steps.push(match known.seen < known.of && !known.open.is_empty() {
             true => format!(
                 "{} free values, {} of them visible at most: fewer (knots), or add `smooth`; `kmcfit study` tells \
                  which are seen",
@@ -79,6 +50,13 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     }
     steps.truncate(MOST);
     steps
+}
+
+/// Whether the iterations ran out on a model that is wrong: where it is right, steps of Gauss and Newton need few.
+fn wanders(document: &ResultDocument) -> bool {
+    document.outcome.status == Status::MaxIterations.name()
+        && document.model.method == Solver::GaussNewton.name()
+        && worst_fit(document).is_some_and(|worst| worst < POOR)
 }
 
 /// Steps that are too long, with as many nodes as would do by the order of the stepper.
@@ -98,6 +76,20 @@ fn about_steps(document: &ResultDocument) -> Option<String> {
         .ceil();
     let nodes = (document.model.nodes - 1) as f64 * finer + 1.0;
     Some(format!("the steps are coarse: grid.nodes={nodes}"))
+}
+
+/// Whether a force or a motion of the base acts in a record.
+fn is_driven(document: &ResultDocument) -> bool {
+    document.experiments.iter().any(|e| e.driven)
+}
+
+/// Whether the initial state of every record is sought.
+fn starts_are_sought(document: &ResultDocument) -> bool {
+    let sought = |name: &str| {
+        let scalar = format!("initial displacement of {name}");
+        document.scalars.iter().any(|s| s.name == scalar)
+    };
+    document.experiments.iter().all(|e| sought(&e.name))
 }
 
 /// What the residuals ask for.
@@ -130,17 +122,34 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
     // Outliers that a robust loss leaves aside are none of the fit's business.
     let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR && !c.robust;
     let told = |c: &ChannelSummary| c.sigma.is_some() && c.whiteness_p_value.is_some();
-    match channels().find(poor) {
-        Some(channel) if told(channel) && !is_coloured(&channel) => Some(format!(
+    let named = document.experiments.iter();
+    let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (&e.name, c)));
+    match named.find(|(_, channel)| poor(channel)) {
+        Some((_, channel)) if told(channel) && !is_coloured(&channel) => Some(format!(
             "the {} is matched to {} only, but what is left looks like noise: no other device would do much better",
             channel.kind,
             percent(channel.fit_percent, 0)
         )),
-        Some(channel) => Some(format!(
-            "the readings are matched to {} only: {elsewhere}let a function change more (basis: piecewise-linear, more \
-             knots), or add a term",
-            percent(channel.fit_percent, 0)
-        )),
+        Some((name, channel)) => {
+            let matched = percent(channel.fit_percent, 0);
+            let what = match channels().count() {
+                1 => "the readings are".to_owned(),
+                _ => format!("the {} of {name} is", channel.kind),
+            };
+            let more = match (is_driven(document), starts_are_sought(document)) {
+                (true, true) => {
+                    "look whether the force has the right sign (`gain: -1` of a sensor turns it), unit and times"
+                }
+                (true, false) => {
+                    "look whether the force has the right sign (`gain: -1` of a sensor turns it), unit and times, and \
+                     the motion the right start (initial: estimate)"
+                }
+                _ => "let a function change more (basis: piecewise-linear, more knots), or add a term",
+            };
+            Some(format!(
+                "{what} matched to {matched} only: {elsewhere}{more}"
+            ))
+        }
         None => channels().any(|c| is_coloured(&c)).then(|| {
             "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, \
              quadratic_damping, coulomb_friction with its width)"
@@ -152,6 +161,8 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
 /// A share in per cent; one far below zero in powers of ten.
 pub(super) fn percent(share: f64, digits: usize) -> String {
     match share > -1000.0 {
+        // Nothing is matched to less than nothing by rounding.
+        true if share.abs() < 0.5 * 0.1f64.powi(digits as i32) => format!("{:.digits$} %", 0.0),
         true => format!("{share:.digits$} %"),
         false => format!("{share:.0e} %"),
     }

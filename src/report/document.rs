@@ -187,9 +187,21 @@ fn linear_terms() -> Vec<String> {
     vec!["damping".into(), "stiffness".into()]
 }
 
+impl ResultDocument {
+    /// Whether `J/J0` says how much better the optimum is than the start: where the standard deviation of the readings
+    /// is estimated, J is taken with that of the optimum.
+    pub(super) fn has_ratio(&self) -> bool {
+        let mut channels = self.experiments.iter().flat_map(|e| &e.channels);
+        !channels.any(|c| c.sigma_estimated)
+    }
+}
+
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
+    /// SI unit.
+    #[serde(default)]
+    pub unit: String,
     /// Smallest value at a node.
     #[serde(deserialize_with = "number_or_null")]
     pub min: f64,
@@ -200,6 +212,16 @@ pub struct FunctionSummary {
     /// in the unit of the function per s^i.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub powers: Option<Vec<f64>>,
+    /// Whether it is zero but for rounding, beside the size at which it would matter.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_rounding: bool,
+    /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
+    /// whose errors can be believed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<String>,
+    /// Its smallest and largest value at the nodes where it is known, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known_range: Option<[f64; 2]>,
     /// For a constant its standard error from the linearised fit, without constraints, penalties and
     /// priors, where the readings determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -217,6 +239,9 @@ pub struct FunctionSummary {
 pub struct ExperimentSummary {
     /// Name.
     pub name: String,
+    /// Whether a force or a motion of the base acts.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub driven: bool,
     /// Number of readings of all channels.
     pub readings: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.
@@ -234,14 +259,15 @@ pub struct IdentifiabilitySummary {
     pub seen: usize,
     /// Number of parameters.
     pub of: usize,
+    /// What records, optimum and bands settle, in words; the bands are those of models of few free values, of others
+    /// `kmcfit study` tells.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub settled: Vec<String>,
     /// What is left open, and what would settle it, in words.
-    pub verdicts: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub open: Vec<String>,
     /// What the model says besides the readings, in words.
     pub knowledge: Vec<String>,
-    /// What is known of each function and ratio at the optimum, in words; for models of few free
-    /// values, of others `kmcfit study` tells.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub functions: Vec<String>,
 }
 
 /// The motion of the found device from one initial state, against the true device's.

@@ -3,7 +3,6 @@
 use super::FittedModel;
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
-use super::measured;
 use crate::functions::{CoefficientFunction, Ratios};
 use crate::identifiability::{Band, Bands};
 use crate::solvers::Row;
@@ -23,6 +22,7 @@ impl FittedModel<'_> {
             list.iter_mut().for_each(|figure| figure.name += &suffix);
             figures.extend(list);
         }
+        figures.extend(self.held_out_figures());
         figures
     }
 
@@ -62,54 +62,36 @@ impl FittedModel<'_> {
     }
 
     /// The figures of one channel: readings, readings beside the motion, residuals.
-    fn channel_figures(&self, experiment: usize, index: usize) -> Vec<Figure> {
-        let channel = &self.model.problem.experiments[experiment].channels[index];
-        let [beside, residuals] = self.fitted_figures(experiment, index);
-        let shown = self.shown(experiment, index);
-        let label = shown.label.as_str();
+    fn channel_figures(&self, experiment: usize, index: usize) -> [Figure; 3] {
+        let seen = self.seen(experiment, index);
+        let [beside, residuals] = seen.figures();
+        let channel = seen.channel;
         let beside = match channel.stride() {
-            Some(_) if shown.factor == 1.0 => {
+            Some(_) if seen.factor() == 1.0 => {
                 self.motion(experiment, channel.times(), channel.observed())
             }
             _ => beside,
         };
-        let observed = shown.scaled(channel.observed());
-        vec![
-            figures::observation(&[(label, shown.unit, channel.times(), &observed)]),
-            beside,
-            residuals,
-        ]
+        [seen.observation(), beside, residuals]
     }
 
-    /// The readings of a channel with what the model says of them, and the residuals.
-    pub(super) fn fitted_figures(&self, experiment: usize, index: usize) -> [Figure; 2] {
-        let channel = &self.model.problem.experiments[experiment].channels[index];
-        let predicted = &self.fit.best.evaluation.predictions[experiment][index];
-        let shown = self.shown(experiment, index);
-        let label = (shown.label.as_str(), shown.unit);
-        let times = channel.times();
-        let residuals = shown.scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
-        let diagnostics = measured::diagnostics(channel, predicted);
-        [
-            figures::channel(
-                label,
-                times,
-                &shown.scaled(channel.observed()),
-                &shown.scaled(predicted),
-            ),
-            figures::residuals(label, times, &residuals, &diagnostics),
-        ]
-    }
-
-    /// How reports speak of a channel.
-    fn shown(&self, experiment: usize, index: usize) -> Shown<'_> {
-        let channel = &self.model.problem.experiments[experiment].channels[index];
-        let note = self.note(experiment, index);
-        Shown {
-            label: format!("{} {}", channel.kind().name(), channel.kind().symbol()),
-            unit: measured::unit(channel, note),
-            factor: note.map_or(1.0, |n| n.unit.factor()),
+    /// The readings of the records that took no part in the fit with what the model says of them, and the residuals.
+    pub(super) fn held_out_figures(&self) -> Vec<Figure> {
+        let mut figures = Vec::new();
+        for (i, held) in self.known.held_out.iter().enumerate() {
+            for seen in held.channels() {
+                let kind = seen.channel.kind().name();
+                for mut figure in seen.figures() {
+                    figure.name += &format!("-held-out-{}-{kind}", i + 1);
+                    figure.title = format!(
+                        "{}: {} (held out), {kind}",
+                        figure.title, held.out.experiment.name
+                    );
+                    figures.push(figure);
+                }
+            }
         }
+        figures
     }
 
     pub(super) fn convergence(&self) -> Figure {
@@ -180,21 +162,8 @@ impl FittedModel<'_> {
     }
 }
 
-/// A channel in the unit of its file.
-struct Shown<'a> {
-    label: String,
-    unit: &'a str,
-    factor: f64,
-}
-
-impl Shown<'_> {
-    fn scaled(&self, values: &[f64]) -> Vec<f64> {
-        values.iter().map(|v| v / self.factor).collect()
-    }
-}
-
 /// The lower and upper ends of 95 % bands at `times`, by straight lines between those of `bands`.
-fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
+pub(super) fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
     let known = &bands.times;
     if known.is_empty() {
         return Vec::new();

@@ -90,6 +90,14 @@ impl OutputFolder {
         Ok(())
     }
 
+    /// Makes names that came and went durable. A file system that cannot do so keeps what it keeps.
+    fn settle(&self) {
+        for folder in FOLDERS.map(|name| self.path.join(name)) {
+            settle(&folder);
+        }
+        settle(&self.path);
+    }
+
     /// Writes one file, replacing an older one at once: other readers see the old file or the new
     /// one, never a part.
     ///
@@ -142,6 +150,14 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     entries.flatten().map(|entry| entry.path()).collect()
 }
 
+/// Makes the names in a folder durable, where there is such a thing.
+fn settle(folder: &Path) {
+    #[cfg(unix)]
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    #[cfg(not(unix))]
+    let _ = folder;
+}
+
 fn gone(result: io::Result<()>) -> io::Result<()> {
     match result {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -176,8 +192,13 @@ impl Stage<'_> {
         for name in &self.names {
             let path = self.folder.path.join(name);
             make_own_folder(&self.folder.path, &path)?;
+            // What a result speaks of is there before it is, even if the power fails between.
+            if name == RESULT {
+                self.folder.settle();
+            }
             std::fs::rename(self.place.path().join(name), path)?;
         }
+        self.folder.settle();
         Ok(())
     }
 
@@ -191,6 +212,7 @@ impl Stage<'_> {
         batch.write(RESULT, result)?;
         batch.finish()?;
         self.folder.retire()?;
+        self.folder.settle();
         self.commit()
     }
 }
@@ -293,6 +315,24 @@ pub fn write_whole_with(
     drop(buffered);
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
+    settle(folder_of(path));
+    Ok(())
+}
+
+/// Writes files that belong together: none of them appears before all are durable.
+///
+/// # Errors
+/// What the file system says.
+pub fn write_together(files: &[(&Path, &str)]) -> io::Result<()> {
+    let files = files.iter().map(|(path, contents)| {
+        let file = written(path, contents)?;
+        file.as_file().sync_all()?;
+        Ok((file, path))
+    });
+    for (file, path) in files.collect::<io::Result<Vec<_>>>()? {
+        file.persist(path).map_err(|e| e.error)?;
+        settle(folder_of(path));
+    }
     Ok(())
 }
 
@@ -314,12 +354,16 @@ fn written(path: &Path, contents: &str) -> io::Result<NamedTempFile> {
 
 /// A temporary file in the folder of `path`, which is made if need be.
 fn beside(path: &Path) -> io::Result<NamedTempFile> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     make_folder(folder)?;
     whole_file(folder)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
 }
 
 /// Makes a folder and those above it; where a file is in the way, the error says which.

@@ -27,6 +27,7 @@ const PERIODS_PER_READING: f64 = 0.4;
 const EVEN: f64 = 0.01;
 
 /// What is to be doubted of a fit.
+#[derive(Debug, Clone)]
 pub(super) struct Doubts {
     /// Why no statement on the device means anything, if that is so.
     pub no_device: Option<String>,
@@ -37,16 +38,18 @@ pub(super) struct Doubts {
 }
 
 impl Doubts {
-    /// Of the optimum `evaluation`, with what half the step changes and the statistics of the readings.
+    /// Of the optimum `evaluation`, with what half the step changes and the statistics of the readings, and whether
+    /// errors are told also where the readings have no sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
         half_step: &HalfStep,
         statistics: &StatisticsSummary,
+        tells_errors: bool,
     ) -> Self {
         let no_device = meaningless(problem, evaluation, half_step)
             .map(|why| format!("the device is not identified: {why}"));
-        let (coloured, poor) = residuals(problem, evaluation);
+        let (coloured, poor) = residuals(problem, evaluation, tells_errors);
         let unexplained = unexplained(statistics).or_else(|| {
             poor.then(|| {
                 "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
@@ -68,14 +71,13 @@ impl Doubts {
 }
 
 /// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the readings, too.
-fn residuals(problem: &Problem, evaluation: &Evaluation) -> (bool, bool) {
+fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
     let predictions = evaluation.predictions.iter().flatten();
     for (channel, predicted) in problem.channels().zip(predictions) {
         let found = diagnostics(channel, predicted);
-        // Without a sigma no error is told.
-        let is_weighted = channel.weighting().sigma(0).is_some();
-        if is_weighted && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {
+        let is_judged = tells_errors || channel.weighting().sigma(0).is_some();
+        if is_judged && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {
             coloured = true;
             poor |= found.fit_percent < POOR;
         }

@@ -1,7 +1,8 @@
 //! How well the readings are matched: each channel, all together, held-out records, half the step.
 
 use super::document::number_or_null;
-use crate::config::{ChannelNote, HoldOut, Model};
+use super::known::HeldOut;
+use crate::config::ChannelNote;
 use crate::diagnostics::{
     InformationCriteria, ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift,
     with_estimated_sigma, with_known_sigma,
@@ -10,7 +11,6 @@ use crate::dynamics::Breakdown;
 use crate::functions::CoefficientFunction;
 use crate::objective::{Channel, Evaluation, Loss, Refined, Weighting};
 use crate::problem::Problem;
-use crate::solvers::{Fit, predict_held_out};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -326,43 +326,26 @@ pub fn refined(problem: &Problem, evaluation: &Evaluation) -> HalfStep {
     Ok(Some(summary))
 }
 
-/// The experiments of a model that took no part in the fit.
-pub fn held_out(model: &Model, fit: &Fit) -> Vec<HoldOutSummary> {
-    let each = model.held_out.iter().map(|out: &HoldOut| {
-        let name = out.experiment.name.clone();
-        let result = predict_held_out(
-            &model.problem,
-            &fit.best.evaluation,
-            &out.experiment,
-            &out.scalars,
-            &model.settings,
-        );
-        match result {
-            Ok((problem, evaluation)) => {
-                let predictions = evaluation.predictions.iter().flatten();
-                let channels = problem.channels().zip(predictions).enumerate();
-                HoldOutSummary {
-                    name,
-                    channels: channels
-                        .map(|(i, (c, predicted))| channel(c, out.notes.get(i), predicted))
-                        .collect(),
-                    scalars: scalars(
-                        &problem,
-                        &evaluation,
-                        problem.covariance(&evaluation).as_ref(),
-                    ),
-                    failure: None,
-                }
-            }
-            Err(breakdown) => HoldOutSummary {
-                name,
-                channels: Vec::new(),
-                scalars: Vec::new(),
-                failure: Some(breakdown.to_string()),
-            },
+/// A record that took no part in the fit.
+pub(super) fn held_out(held: &HeldOut) -> HoldOutSummary {
+    let channels = held.channels();
+    let summaries = channels
+        .iter()
+        .map(|seen| channel(seen.channel, seen.note, seen.predicted));
+    let mut summary = HoldOutSummary {
+        name: held.out.experiment.name.clone(),
+        channels: summaries.collect(),
+        scalars: Vec::new(),
+        failure: None,
+    };
+    match &held.found {
+        Ok((problem, evaluation)) => {
+            let covariance = problem.covariance(evaluation);
+            summary.scalars = scalars(problem, evaluation, covariance.as_ref());
         }
-    });
-    each.collect()
+        Err(breakdown) => summary.failure = Some(breakdown.to_string()),
+    }
+    summary
 }
 
 /// Standard error of a function that is one number.

@@ -1,7 +1,6 @@
 //! What a fit leaves behind: tables, figures and the result document.
 
 use super::cost::{CostKind, cost_definition};
-use super::csv::CsvTable;
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
     FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary,
@@ -9,28 +8,25 @@ use super::document::{
 };
 use super::files::Stage;
 use super::knowledge::knowledge;
-use super::meaning::Doubts;
-use super::measured::{self, ChannelSummary, HalfStep, StatisticsSummary};
+use super::known::Known;
+use super::measured::{self, ChannelSummary};
 use super::page::fit_page;
 use super::render;
+use super::seen::SeenChannel;
 use super::timings::TimingsSummary;
 use crate::config::{ChannelNote, Model};
 use crate::diagnostics::rms;
 use crate::dynamics::Term;
 use crate::functions::basis::physical_powers;
-use crate::functions::{Basis, CoefficientFunction, Ratios};
-use crate::identifiability::{BandSettings, Bands, count, verdicts};
+use crate::functions::{Basis, CoefficientFunction};
+use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding};
 use crate::solvers::{
-    ActiveGroup, Fit, PathPoint, Row, Rung, Solver, Status, WeightPath, WeightRule,
-    active_constraints, timed,
+    ActiveGroup, Fit, PathPoint, Rung, Solver, Status, WeightPath, WeightRule, active_constraints,
+    timed,
 };
-use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io;
 use std::time::Duration;
-
-/// Up to so many free values the bands are computed with every fit: some milliseconds.
-const FEW_PARAMETERS: usize = 64;
 
 /// A fitted model and what it predicts.
 #[derive(Debug, Clone, Copy)]
@@ -45,39 +41,6 @@ pub struct FittedModel<'a> {
     pub weights: Option<&'a WeightPath>,
     /// How well the readings determine what was found.
     pub known: &'a Known,
-}
-
-/// How well the readings determine what was found, for models of few free values: computed once, told in
-/// several places.
-#[derive(Debug, Clone, Default)]
-pub struct Known {
-    covariance: Option<DMatrix<f64>>,
-    bands: Option<Bands>,
-}
-
-impl Known {
-    /// For a simulated motion and up to 64 free values; nothing for others.
-    pub fn of(model: &Model, fit: &Fit) -> Self {
-        let (problem, best) = (&model.problem, &fit.best);
-        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let is_simulated = model.settings.solver != Solver::EquationError;
-        if !(few && is_simulated && problem.reading_count() > problem.parameters()) {
-            return Self::default();
-        }
-        let settings = BandSettings {
-            draws: 0,
-            ..BandSettings::default()
-        };
-        Self {
-            covariance: problem.covariance(&best.evaluation),
-            bands: Some(Bands::at(
-                problem,
-                &best.parameters,
-                &best.evaluation,
-                &settings,
-            )),
-        }
-    }
 }
 
 impl FittedModel<'_> {
@@ -119,14 +82,6 @@ impl FittedModel<'_> {
     /// The result document.
     pub fn document(&self) -> ResultDocument {
         let (model, fit) = (self.model, self.fit);
-        let half_step = match self.is_simulated() {
-            true => measured::refined(&model.problem, &fit.best.evaluation),
-            false => Ok(None),
-        };
-        let statistics = match self.is_simulated() {
-            true => measured::statistics(&model.problem, &fit.best.evaluation),
-            false => StatisticsSummary::default(),
-        };
         ResultDocument {
             format: FORMAT,
             title: model.title.clone(),
@@ -158,11 +113,11 @@ impl FittedModel<'_> {
             timings: TimingsSummary::new(fit, Duration::ZERO, fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
-            identifiability: self.identifiability(&half_step, &statistics),
+            identifiability: self.identifiability(),
             weights: self.weight_summary(),
             rungs: self.fit.rungs.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
-            held_out: measured::held_out(model, fit),
+            held_out: self.known.held_out.iter().map(measured::held_out).collect(),
             scalars: match self.is_simulated() {
                 true => {
                     let covariance = self.known.covariance.as_ref();
@@ -170,8 +125,8 @@ impl FittedModel<'_> {
                 }
                 false => Vec::new(),
             },
-            statistics,
-            half_step: half_step.unwrap_or_default(),
+            statistics: self.known.statistics.clone(),
+            half_step: self.known.half_step.clone().unwrap_or_default(),
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -190,42 +145,50 @@ impl FittedModel<'_> {
 
     /// What was known before the fit, and what its optimum tells, if that is a device at all; the equation error has no
     /// simulated motion to count about.
-    fn identifiability(
-        &self,
-        half_step: &HalfStep,
-        statistics: &StatisticsSummary,
-    ) -> IdentifiabilitySummary {
+    fn identifiability(&self) -> IdentifiabilitySummary {
         let problem = &self.model.problem;
         let knowledge = knowledge(problem);
-        if !self.is_simulated() {
+        let Some(doubts) = &self.known.doubts else {
             let sentence = "how sure the functions are is not known: the equation error simulates no motion, and noise \
                             biases it; method: gauss-newton, with initial: data, goes on from it";
             return IdentifiabilitySummary {
                 of: problem.parameters(),
-                verdicts: vec![sentence.into()],
+                open: vec![sentence.into()],
                 knowledge,
                 ..IdentifiabilitySummary::default()
             };
-        }
+        };
         let count = count(problem);
-        let evaluation = &self.fit.best.evaluation;
-        let mut doubts = Doubts::of(problem, evaluation, half_step, statistics);
-        if self.fit.outcome.status == Status::Failed {
-            doubts.no_device = Some("the device is not identified: the fit failed".into());
-            doubts.errors_hold = false;
-        }
-        let bands = self.known.bands.as_ref().filter(|_| doubts.errors_hold);
-        let judged = bands.map_or(Vec::new(), |bands| verdicts(problem, evaluation, bands));
-        IdentifiabilitySummary {
+        let mut summary = IdentifiabilitySummary {
             seen: count.seen_at_most,
             of: count.of,
-            verdicts: match doubts.no_device {
-                Some(why) => vec![why],
-                None => count.sentences.into_iter().chain(doubts.open).collect(),
-            },
             knowledge,
-            functions: judged.into_iter().map(|j| j.sentence).collect(),
+            ..IdentifiabilitySummary::default()
+        };
+        if let Some(why) = &doubts.no_device {
+            summary.open.push(why.clone());
+            return summary;
         }
+        let judgements = &self.known.judgements;
+        // Where constraints hold what the readings do not show, nothing of that is open.
+        let all_known = !judgements.is_empty() && !judgements.iter().any(Judgement::is_open);
+        if count.seen_at_most < count.of && !all_known {
+            summary.open.push(count.headline());
+        }
+        let mut say = |is_open: bool, sentence: &String| match is_open {
+            true => summary.open.push(sentence.clone()),
+            false => summary.settled.push(sentence.clone()),
+        };
+        for statement in &count.statements {
+            say(statement.is_open, &statement.sentence);
+        }
+        for judgement in judgements {
+            if judgement.verdict != Verdict::Fixed {
+                say(judgement.is_open(), &judgement.sentence);
+            }
+        }
+        summary.open.extend(doubts.open.iter().cloned());
+        summary
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -326,9 +289,17 @@ impl FittedModel<'_> {
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let problem = &self.model.problem;
         let list = self.named_functions().into_iter().enumerate();
+        let sizes = problem.natural_sizes(&self.fit.best.evaluation);
         list.map(|(i, (function, values))| {
+            let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let index = problem.functions.ranges()[i].start;
+            // The judgements on the functions come first, in their order.
+            let judged = self.known.judgements.get(i);
             let summary = FunctionSummary {
+                unit: self.unit(function).into(),
+                is_rounding: largest > 0.0 && is_rounding(largest, sizes[i]),
+                verdict: judged.map(|j| j.verdict.name().into()),
+                known_range: judged.and_then(|j| j.known_range),
                 powers: self.powers(i),
                 standard_error: measured::standard_error(
                     function,
@@ -367,6 +338,7 @@ impl FittedModel<'_> {
                 let first = experiment.channels.iter().zip(predictions).next();
                 ExperimentSummary {
                     name: experiment.name.clone(),
+                    driven: (experiment.excitation.as_ref()).is_some_and(|e| !e.is_zero()),
                     readings: experiment.reading_count(),
                     rms_residual: first.map_or(f64::NAN, |(c, predicted)| {
                         rms(&c.residuals(predicted).collect::<Vec<f64>>())
@@ -386,124 +358,17 @@ impl FittedModel<'_> {
         }
     }
 
+    /// A channel beside what the fit says of it.
+    pub(super) fn seen(&self, experiment: usize, channel: usize) -> SeenChannel<'_> {
+        SeenChannel {
+            channel: &self.model.problem.experiments[experiment].channels[channel],
+            predicted: &self.fit.best.evaluation.predictions[experiment][channel],
+            note: self.note(experiment, channel),
+        }
+    }
+
     pub(super) fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
         self.model.notes.get(experiment)?.get(channel)
-    }
-
-    fn history(&self) -> CsvTable {
-        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect();
-        CsvTable::new()
-            .column("iteration", column(|r| r.iteration as f64))
-            .column("cost", column(|r| r.cost))
-            .column("cost_ratio", column(|r| r.cost_ratio))
-            .column(
-                "gradient_norm_squared_ratio",
-                column(|r| r.gradient_norm_squared_ratio),
-            )
-            .column("step", column(|r| r.step))
-            .column("relative_change", column(|r| r.relative_change))
-    }
-
-    fn functions_table(&self) -> CsvTable {
-        let device = &self.fit.best.evaluation.device;
-        let times = self.model.problem.oscillator.grid.times();
-        let mut table = CsvTable::new().column("t_s", times);
-        for (function, values) in self.named_functions() {
-            let column = function.quantity.column();
-            let name = match &function.owner {
-                None => column.to_owned(),
-                // A comma would end the header.
-                Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
-            };
-            table = table.column(name, values);
-        }
-        let ratios = Ratios::of(device);
-        table = table
-            .column("k_over_m_per_s2", ratios.k_over_m)
-            .column("c_over_m_per_s", ratios.c_over_m)
-            .column("natural_frequency_Hz", ratios.frequency)
-            .column("damping_ratio", ratios.damping_ratio);
-        if let Some(bands) = &self.known.bands {
-            for band in bands.functions.iter().chain(&bands.ratios) {
-                let name = band.name.replace([' ', '/', ','], "_");
-                let ends = |side: usize| -> Vec<f64> {
-                    (0..band.values.len())
-                        .map(|i| band.pointwise(i)[side])
-                        .collect()
-                };
-                table = table
-                    .column(format!("{name}_low_95"), ends(0))
-                    .column(format!("{name}_high_95"), ends(1));
-            }
-        }
-        if let Some(truth) = &self.model.truth {
-            let functions = self.model.problem.functions.iter();
-            for (function, values) in functions.zip(truth.functions()) {
-                let name = format!("true_{}", function.quantity.column());
-                table = table.column(name, values.to_vec());
-            }
-        }
-        table
-    }
-
-    fn trajectories(&self) -> CsvTable {
-        let problem = &self.model.problem;
-        let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
-        let several = problem.experiments.len() > 1;
-        let motions = problem
-            .experiments
-            .iter()
-            .zip(&self.fit.best.evaluation.trajectories);
-        for (i, (experiment, motion)) in motions.enumerate() {
-            let name = |column: &str| match several {
-                true => format!("{column}_{}", i + 1),
-                false => column.to_string(),
-            };
-            // A record may end before the grid does.
-            let full = |values: &[f64]| {
-                let mut values = values.to_vec();
-                values.resize(problem.oscillator.grid.nodes(), f64::NAN);
-                values
-            };
-            table = table
-                .column(name("y_m"), full(&motion.displacement))
-                .column(name("v_m_per_s"), full(&motion.velocity));
-            if let [channel] = experiment.channels.as_slice()
-                && let Some(stride) = channel.stride()
-            {
-                let mut observed = vec![f64::NAN; problem.oscillator.grid.nodes()];
-                for (i, value) in channel.observed().iter().enumerate() {
-                    observed[i * stride] = *value;
-                }
-                table = table.column(name("observed_y_m"), observed);
-            }
-        }
-        table
-    }
-
-    /// The readings of each channel beside what the model says of them, in the unit of the file, and
-    /// the names of the tables.
-    fn readings(&self) -> Vec<(String, CsvTable)> {
-        let mut tables = Vec::new();
-        let predictions = &self.fit.best.evaluation.predictions;
-        let experiments = self.model.problem.experiments.iter().zip(predictions);
-        for (e, (experiment, predictions)) in experiments.enumerate() {
-            for (c, (channel, predicted)) in experiment.channels.iter().zip(predictions).enumerate()
-            {
-                let factor = self.note(e, c).map_or(1.0, |n| n.unit.factor());
-                let scaled = |values: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
-                    values.map(|v| v / factor).collect()
-                };
-                let table = CsvTable::new()
-                    .column("t_s", channel.times().to_vec())
-                    .column("reading", scaled(&mut channel.observed().iter().copied()))
-                    .column("model", scaled(&mut predicted.iter().copied()))
-                    .column("residual", scaled(&mut channel.residuals(predicted)));
-                let name = format!("readings/{}-{}.csv", e + 1, channel.kind().name());
-                tables.push((name, table));
-            }
-        }
-        tables
     }
 }
 
@@ -543,6 +408,10 @@ fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
         truth_max_error: errors
             .as_ref()
             .map(|e| e.iter().copied().fold(0.0, f64::max)),
+        unit: String::new(),
+        is_rounding: false,
+        verdict: None,
+        known_range: None,
         powers: None,
         standard_error: None,
         truth_rms_error: errors

@@ -4,7 +4,7 @@ use super::advice;
 use super::cost::CostKind;
 use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
-use crate::functions::Quantity;
+use crate::identifiability::Verdict;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.
@@ -24,12 +24,13 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         document.outcome.status, document.outcome.reason
     )?;
     write_findings(text, document)?;
+    write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
+    if document.has_ratio() {
+        write!(text, ", J/J0 {:.4e}", cost.ratio)?;
+    }
     writeln!(
         text,
-        "J {:.6e} -> {:.6e}, J/J0 {:.4e}; {}, {} forward and {} adjoint solves, {:.2} s",
-        cost.initial,
-        cost.r#final,
-        cost.ratio,
+        "; {}, {} forward and {} adjoint solves, {:.2} s",
         iterations(document),
         document.counts.forward,
         document.counts.adjoint,
@@ -62,25 +63,31 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
 
 /// What was found, how well, how sure, what stays open, what to try next: a line each.
 fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let texts = |sentences: Vec<&str>| sentences.into_iter().map(str::to_owned).collect();
-    let settled: Vec<String> = texts(advice::settled(document));
+    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
     let well = advice::worst_fit(document).map(|worst| {
-        let channels: usize = document.experiments.iter().map(|e| e.channels.len()).sum();
-        let of = match channels {
-            1 => "of the readings",
-            _ => "of the worst channel",
+        let what = match channels().count() {
+            1 => "the readings are",
+            _ => "the worst channel is",
+        };
+        let aside = match channels().any(|c| c.robust) {
+            true => ", with outliers that the loss leaves aside",
+            false => "",
+        };
+        let ratio = match document.has_ratio() {
+            true => format!("; J/J0 {:.1e}", document.cost.ratio),
+            false => String::new(),
         };
         format!(
-            "{} {of}; J/J0 {:.1e}",
-            advice::percent(worst, 2),
-            document.cost.ratio
+            "{what} matched to {}{aside}{ratio}",
+            advice::percent(worst, 2)
         )
     });
+    let known = &document.identifiability;
     for (label, sentences) in [
         ("found", vec![found(document)]),
         ("how well", well.into_iter().collect()),
-        ("how sure", settled),
-        ("open", texts(advice::open(document))),
+        ("how sure", known.settled.clone()),
+        ("open", known.open.clone()),
         ("try next", advice::next(document)),
     ] {
         for (i, sentence) in sentences.iter().enumerate() {
@@ -91,26 +98,42 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
     writeln!(text)
 }
 
-/// The functions of the device with their units: `mass 0.6 to 2.3 kg; stiffness 1 N/m`.
+/// The functions of the device with their units: `mass 0.6 to 2.3 kg; stiffness 1 N/m`. What readings do not show has no
+/// value, what they show at times has its values then.
 fn found(document: &ResultDocument) -> String {
     let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
     let function = |name: &str| {
-        let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
         let f = document.functions.get(name)?;
-        let values = match (f.min == f.max, f.standard_error) {
-            (true, Some(error)) => format!("{} +- {error:.1e}", short(f.min)),
-            (true, None) => short(f.min),
-            (false, _) if short(f.min) == short(f.max) => short(f.min),
-            (false, _) => format!("{} to {}", short(f.min), short(f.max)),
+        let is = |verdict: &str| f.verdict.as_deref() == Some(verdict);
+        if f.is_rounding {
+            return Some(format!("{name} 0 {}", f.unit));
+        }
+        if is(Verdict::NotSeen.name()) {
+            return Some(format!("{name} not seen"));
+        }
+        let (range, seen) = match f.known_range {
+            Some(range) if is(Verdict::OnlyOn(Vec::new()).name()) => (range, " where it is seen"),
+            _ => ([f.min, f.max], ""),
         };
-        Some(format!("{name} {values} {}", quantity.unit()))
+        let [low, high] = range.map(short);
+        let values = match f.standard_error {
+            Some(error) if f.min == f.max => format!("{low} +- {error:.1e}"),
+            _ if low == high => low,
+            _ => format!("{low} to {high}"),
+        };
+        Some(format!("{name} {values} {}{seen}", f.unit))
     };
     names.filter_map(function).collect::<Vec<_>>().join("; ")
 }
 
 /// Four significant digits.
 fn short(x: f64) -> String {
-    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    significant(x, 4)
+}
+
+/// So many significant digits, without zeros behind; very small and very large numbers in powers of ten.
+fn significant(x: f64, digits: usize) -> String {
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
     match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
         true => format!("{rounded}"),
         false => format!("{rounded:e}"),
@@ -182,10 +205,10 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
 /// The numbers that were fitted beside the functions.
 pub(super) fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     for scalar in &document.scalars {
-        write!(text, "{} {:.6} {}", scalar.name, scalar.value, scalar.unit)?;
+        write!(text, "{} {}", scalar.name, significant(scalar.value, 6))?;
         match scalar.standard_error {
-            Some(error) => writeln!(text, " +- {error:.2e}")?,
-            None => writeln!(text)?,
+            Some(error) => writeln!(text, " +- {error:.2e} {}", scalar.unit)?,
+            None => writeln!(text, " {}", scalar.unit)?,
         }
     }
     Ok(())
@@ -212,8 +235,17 @@ pub(super) fn count(number: usize, thing: &str) -> String {
     }
 }
 
-/// Five decimals; what rounds to zero has no sign.
-pub(super) fn decimals(x: f64) -> String {
+/// Numbers of one kind with five decimals, or in powers of ten where the largest asks for that; what rounds to zero
+/// has no sign.
+pub(super) fn alike<const N: usize>(numbers: [f64; N]) -> [String; N] {
+    let largest = numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    match largest == 0.0 || (1e-2..1e6).contains(&largest) {
+        true => numbers.map(decimals),
+        false => numbers.map(|x| format!("{x:.5e}")),
+    }
+}
+
+fn decimals(x: f64) -> String {
     let text = format!("{x:.5}");
     match text.strip_prefix('-') {
         Some(zero) if zero.bytes().all(|b| b == b'0' || b == b'.') => zero.into(),
@@ -242,16 +274,15 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         let Some(function) = document.functions.get(name) else {
             continue;
         };
-        write!(
-            text,
-            "{name:<width$} {:>12} {:>12}",
-            decimals(function.min),
-            decimals(function.max)
-        )?;
+        let [min, max] = match function.is_rounding {
+            true => [0.0; 2].map(decimals),
+            false => alike([function.min, function.max]),
+        };
+        write!(text, "{name:<width$} {min:>12} {max:>12}")?;
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        if let Some(error) = function.standard_error {
+        if let Some(error) = function.standard_error.filter(|_| !function.is_rounding) {
             write!(text, "  +- {error:.2e}")?;
         }
         writeln!(text)?;

@@ -10,6 +10,7 @@
 //! assert!((signal.second_derivative(0.25) - 6.0 * 0.25).abs() < 1e-12);
 //! ```
 
+mod clipping;
 mod decimate;
 mod filter;
 mod interpolate;
@@ -17,6 +18,7 @@ mod shape;
 mod spectrum;
 mod spline;
 
+pub use clipping::clipped;
 pub use decimate::{decimate, decimation_filter};
 pub use filter::{
     SecondOrder, apply, band_pass, high_pass, low_pass, zero_phase, zero_phase_padded,

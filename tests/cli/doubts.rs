@@ -295,3 +295,139 @@ fn a_starter_shows_where_times_do_not_increase() {
       hint: without this column: `--sample-rate HZ`
     ");
 }
+
+/// A device of m = 1, c = 0.2, k = 9 from rest under a force whose sign is turned where it was written down.
+#[test]
+fn a_force_of_the_wrong_sign_is_thought_of() {
+    let bench = Workbench::empty();
+    let force = |t: f64| (0.3 * t + 0.05 * t * t).sin();
+    let acceleration = |t: f64, y: f64, v: f64| force(t) - 0.2 * v - 9.0 * y;
+    let (mut y, mut v) = (0.0f64, 0.0f64);
+    let mut rows = [String::new(), String::new()];
+    let step = 0.001;
+    for i in 0..=20_000 {
+        let t = step * f64::from(i);
+        if i % 50 == 0 {
+            rows[0] += &format!("{t},{},{y}\n", force(t));
+            rows[1] += &format!("{t},{},{y}\n", -force(t));
+        }
+        let half = [y + 0.5 * step * v, v + 0.5 * step * acceleration(t, y, v)];
+        y += step * half[1];
+        v += step * acceleration(t + 0.5 * step, half[0], half[1]);
+    }
+    let fitted = |rows: &str, initial: &str| {
+        bench.write("record.csv", &format!("t_s,F_N,y_m\n{rows}"));
+        let model = starter(
+            "{nodes: 801}",
+            "    columns: {time: t_s, force: F_N, displacement: y_m}\n    sigma: {displacement: estimate}\n",
+        );
+        let model = model.replace("{fixed: 1.0}", "{basis: constant, start: 1.2}");
+        let model = model
+            .replace("start: 39", "start: 8")
+            .replace("initial: estimate", initial);
+        bench.write("model.yaml", &model);
+        bench.run(&["fit", "model.yaml", "--no-report"]).1
+    };
+    let right = fitted(&rows[0], "initial: estimate");
+    assert!(right.contains("stiffness is identified"), "{right}");
+    assert!(!right.contains("right sign"), "{right}");
+    let wrong = fitted(&rows[1], "initial: estimate");
+    assert!(
+        wrong.contains("look whether the force has the right sign"),
+        "{wrong}"
+    );
+    assert!(!wrong.contains("initial: estimate"), "{wrong}");
+    let wrong = fitted(&rows[1], "initial: {displacement: 0, velocity: 0}");
+    assert!(
+        wrong.contains("the right start (initial: estimate)"),
+        "{wrong}"
+    );
+}
+
+/// What is seen of a function on a part of the record only is told with its values there, and what is not seen without
+/// any.
+#[test]
+fn values_are_told_where_they_are_seen() {
+    let bench = Workbench::empty();
+    let found = |end: u32, knots: u32| {
+        // A row without a reading: the grid goes on to there.
+        let record = format!("{}{end},\n", ring_down(20, 1e-3));
+        bench.write("record.csv", &record);
+        let sigma = "    sigma: {displacement: estimate}\n";
+        let model = starter(&format!("{{nodes: {}}}", 40 * end + 1), sigma).replace(
+            "{basis: constant, start: 39}",
+            &format!("{{basis: piecewise-constant, knots: {knots}, start: 3.8}}"),
+        );
+        bench.write("model.yaml", &model);
+        let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        let (_, line) = summary.split_once("  found  ").expect(&stderr);
+        let line = line.split_once('\n').expect("its end").0.to_owned();
+        (line, summary)
+    };
+    let (line, summary) = found(40, 4);
+    assert!(
+        summary.contains("stiffness is identified only on [0.000, "),
+        "{summary}"
+    );
+    assert!(line.contains("N/m where it is seen"), "{line}");
+    let (line, summary) = found(600, 49);
+    assert!(
+        summary.contains("stiffness is not seen by the readings"),
+        "{summary}"
+    );
+    assert!(line.ends_with("stiffness not seen"), "{line}");
+}
+
+/// On more nodes than bands are computed at they are drawn between, and belong to the times that they stand beside.
+#[test]
+fn bands_lie_about_functions_on_many_nodes() {
+    let bench = Workbench::empty();
+    bench.write("record.csv", &ring_down(20, 1e-2));
+    let sigma = "    sigma: {displacement: estimate}\n";
+    let model = starter("{nodes: 9001}", sigma).replace(
+        "{basis: constant, start: 39}",
+        "{basis: piecewise-linear, knots: 5, start: 3.8}",
+    );
+    bench.write("model.yaml", &model);
+    bench.run_to(0, &["fit", "model.yaml", "--no-report", "--out", "out"]);
+    let table = bench.read("out/functions.csv");
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let column = |name: &str| header.iter().position(|h| *h == name).expect(name);
+    let [value, low, high] =
+        ["stiffness_N_per_m", "stiffness_low_95", "stiffness_high_95"].map(column);
+    let mut rows = 0;
+    for line in lines {
+        let numbers: Vec<f64> = line.split(',').map(|x| x.parse().expect(line)).collect();
+        // The ends are drawn by straight lines between every third node, the knots lie on some others.
+        let slack = 1e-3 * (numbers[high] - numbers[low]);
+        assert!(
+            numbers[low] - slack <= numbers[value] && numbers[value] <= numbers[high] + slack,
+            "{line}"
+        );
+        rows += 1;
+    }
+    assert_eq!(rows, 9001);
+}
+
+/// A sensor that reads to 0.5 and no further.
+#[test]
+fn readings_at_the_end_of_a_range_are_seen() {
+    let bench = Workbench::empty();
+    let cut = |row: &str| match row.split_once(',') {
+        Some((t, y)) => match y.parse::<f64>() {
+            Ok(y) => format!("{t},{}\n", y.min(0.5)),
+            Err(_) => format!("{row}\n"),
+        },
+        None => String::new(),
+    };
+    let record = ring_down(20, 1e-2);
+    bench.write("record.csv", &record);
+    let check = || {
+        bench.write("model.yaml", &starter("{nodes: 401}", ""));
+        bench.run(&["check", "model.yaml", "--no-gradient"]).2
+    };
+    assert!(!check().contains("the end of its range"));
+    bench.write("record.csv", &record.lines().map(cut).collect::<String>());
+    assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 readings of the displacement lie at 0.5 m, the end of its range: if the sensor reads no further, the motion was cut off there, and these readings are better left out (empty fields)");
+}

@@ -484,7 +484,7 @@ fn scalar(result: &Value, name: &str) -> f64 {
 
 #[test]
 fn a_held_out_record_is_predicted_within_its_noise() {
-    let (_, result) = fitted("hammer-and-shaker", 0);
+    let (bench, result) = fitted("hammer-and-shaker", 0);
     let held = &result["held_out"][0];
     assert_eq!(held["name"], "hammer 3");
     let rms = held["channels"][0]["rms_residual"]
@@ -492,6 +492,13 @@ fn a_held_out_record_is_predicted_within_its_noise() {
         .expect("a number");
     // The noise is 0.02 mm; 301 readings know it to 4 %.
     assert!((rms - 0.02).abs() < 0.0025, "{rms}");
+    let folder = "runs/hammer-and-shaker";
+    let table = bench.read(&format!("{folder}/readings/held-out-1-displacement.csv"));
+    let residuals = column(&table, "residual");
+    let mean = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
+    assert!((mean.sqrt() - rms).abs() < 1e-9 * rms, "{rms}");
+    let page = bench.read(&format!("{folder}/report.html"));
+    assert!(page.contains("Readings and model: hammer 3 (held out), displacement"));
     let experiments = result["experiments"].as_array().expect("experiments");
     assert_eq!(experiments.len(), 3);
 }

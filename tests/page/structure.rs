@@ -111,8 +111,8 @@ fn a_report_is_complete() {
             .collect()
     };
     for pointer in [
-        "/identifiability/verdicts",
-        "/identifiability/functions",
+        "/identifiability/settled",
+        "/identifiability/open",
         "/constraints/active",
     ] {
         let said = sentences(pointer);

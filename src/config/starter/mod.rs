@@ -46,9 +46,12 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
     found.extend(columns.in_words(&table));
     found.push(match motion.frequency {
         Some(frequency) => format!(
-            "dominant frequency {} Hz: {:.0} periods in the record",
+            "dominant frequency {} Hz: {} in the record",
             short(frequency),
-            motion.periods()
+            match motion.periods().round() {
+                1.0 => "1 period".to_owned(),
+                periods => format!("{periods} periods"),
+            }
         ),
         None => "no dominant frequency was found".into(),
     });

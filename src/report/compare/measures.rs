@@ -92,7 +92,7 @@ impl Measures {
             roughness: Roughness::of(device, run.finished.oscillator.grid.step()),
             predictions: document.predictions.clone(),
             knowledge: document.identifiability.knowledge.clone(),
-            open: document.identifiability.verdicts.clone(),
+            open: document.identifiability.open.clone(),
             warnings: document.warnings.clone(),
         }
     }

@@ -78,9 +78,10 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
 fn data_and_fit(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn = Vec::new();
     for (experiment, channel) in run.channels() {
-        let pair = run.fitted_figures(experiment, channel);
+        let pair = run.seen(experiment, channel).figures();
         drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
     }
+    drawn.extend(run.held_out_figures());
     opening::records(document)
         + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn)

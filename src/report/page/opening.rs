@@ -2,6 +2,7 @@
 
 use super::table::{list, number, table};
 use crate::report::advice;
+use crate::report::cost::CostKind;
 use crate::report::document::{FunctionSummary, ResultDocument};
 use crate::report::measured::ChannelSummary;
 use crate::report::summary::{count, iterations};
@@ -12,13 +13,13 @@ use crate::solvers::Status;
 pub(super) fn opening(document: &ResultDocument) -> String {
     let known = &document.identifiability;
     let mut text = state(document) + &facts(document) + &found(document);
-    if !known.functions.is_empty() {
+    if !known.settled.is_empty() {
         text += "<h3>How sure</h3>\n";
-        text += &list(&known.functions);
+        text += &list(&known.settled);
     }
-    if !known.verdicts.is_empty() {
-        text += "<h3>What can be seen, and what stays open</h3>\n";
-        text += &list(&known.verdicts);
+    if !known.open.is_empty() {
+        text += "<h3>What stays open</h3>\n";
+        text += &list(&known.open);
     }
     let next = advice::next(document);
     if !next.is_empty() {
@@ -50,7 +51,10 @@ fn state(document: &ResultDocument) -> String {
 /// The numbers that matter.
 fn facts(document: &ResultDocument) -> String {
     let readings: usize = document.experiments.iter().map(|e| e.readings).sum();
-    let mut facts = vec![("misfit left, J/J0", number(document.cost.ratio))];
+    let mut facts = Vec::new();
+    if document.has_ratio() {
+        facts.push(("misfit left, J/J0", number(document.cost.ratio)));
+    }
     let channels = || document.experiments.iter().flat_map(|e| &e.channels);
     if let Some(worst) = advice::worst_fit(document) {
         let name = match channels().count() {
@@ -65,7 +69,8 @@ fn facts(document: &ResultDocument) -> String {
     facts.push(("readings", readings.to_string()));
     facts.push(("free values", document.model.parameters.to_string()));
     let known = &document.identifiability;
-    if known.seen < known.of && !known.verdicts.is_empty() {
+    let is_simulated = document.model.cost_kind != CostKind::EquationError;
+    if known.seen < known.of && is_simulated {
         facts.push((
             "directions that can be seen",
             format!("{} at most", known.seen),

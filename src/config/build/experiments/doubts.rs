@@ -8,7 +8,7 @@ use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::problem::Problem;
-use crate::signal::Spectrum;
+use crate::signal::{Spectrum, clipped};
 use std::f64::consts::TAU;
 
 /// Factors between channels, or between a reading and a known state, that look like a wrong unit.
@@ -73,6 +73,22 @@ pub fn sizes(
         if ratio.is_finite() && ratio > 0.0 {
             let [low, high] = pair.map(ChannelKind::name);
             say(ratio, format!("the {high} beside the {low} is"));
+        }
+    }
+}
+
+/// Warns of readings that pile up at one value, as where a motion goes beyond the range of its sensor.
+pub fn ranges(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<String>) {
+    for channel in &record.channels {
+        if let Some((readings, level)) = clipped(&channel.values) {
+            warnings.push(format!(
+                "experiments[{i}] ({}): {readings} readings of the {} lie at {} {}, the end of its range: if the sensor \
+                 reads no further, the motion was cut off there, and these readings are better left out (empty fields)",
+                name(file, i),
+                channel.kind.name(),
+                level / channel.unit.factor(),
+                channel.unit.symbol(),
+            ));
         }
     }
 }

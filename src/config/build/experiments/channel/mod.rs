@@ -1,0 +1,268 @@
+//! Channels: readings from columns, with their noise, loss, sensor and filter.
+
+mod noise;
+mod on_grid;
+mod sampling;
+
+pub use on_grid::place;
+
+use super::source::{self, Wanted};
+use super::{ChannelNote, names};
+use crate::config::ModelFile;
+use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
+use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
+use crate::dynamics::{ChannelKind, Grid};
+use crate::error::InputError;
+use crate::objective::{Loss, Weighting};
+use crate::observations::times::{even_spacing, median_spacing};
+use crate::signal::SecondOrder;
+use crate::units::{Kind, Unit};
+use noise::{loss, weighting};
+use sampling::{band, decimate, nearly_equal};
+
+/// Default name of the column of the displacement, for files without `columns`.
+const DISPLACEMENT_COLUMN: &str = "y_m";
+
+/// One channel before it is put on the grid.
+pub struct RawChannel {
+    /// What is measured.
+    pub kind: ChannelKind,
+    /// s.
+    pub times: Vec<f64>,
+    /// SI.
+    pub values: Vec<f64>,
+    /// Spacing of the readings where it is equal and none is missing, s.
+    pub spacing: Option<f64>,
+    /// First and last time of the rows, with a reading or without, s.
+    pub span: [f64; 2],
+    /// Whether most readings were left out, so that they no longer tell how fine the steps must be.
+    pub decimated: bool,
+    /// s.
+    pub median_spacing: f64,
+    /// `None` for the integral cost.
+    pub weighting: Option<Weighting>,
+    /// Sections of the band's filter.
+    pub filter: Vec<SecondOrder>,
+    loss: Loss,
+    pub unit: Unit,
+    ignored: Vec<(usize, String)>,
+    format: String,
+}
+
+impl RawChannel {
+    /// What a report says about it.
+    pub fn note(&self) -> ChannelNote {
+        ChannelNote {
+            kind: self.kind,
+            unit: self.unit,
+            ignored: self.ignored.clone(),
+            format: self.format.clone(),
+        }
+    }
+}
+
+/// What the model says about one kind of channel.
+struct Spec<'a> {
+    kind: ChannelKind,
+    column: Option<&'a ColumnRef>,
+    unit: Option<&'a Text>,
+    sigma: Option<&'a Sigma>,
+    loss: Option<&'a ScalarOr<LossName, LossSpec>>,
+    sensor: Option<&'a SensorSpec>,
+}
+
+fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
+    macro_rules! pick {
+        ($part:expr) => {
+            $part.as_ref().and_then(|part| match kind {
+                ChannelKind::Displacement => part.displacement.as_ref(),
+                ChannelKind::Velocity => part.velocity.as_ref(),
+                ChannelKind::Acceleration => part.acceleration.as_ref(),
+            })
+        };
+    }
+    Spec {
+        kind,
+        column: pick!(spec.columns),
+        unit: pick!(spec.units),
+        sigma: pick!(spec.sigma),
+        loss: pick!(spec.loss),
+        sensor: pick!(spec.sensors),
+    }
+}
+
+/// Reads all channels of experiment `i`.
+pub fn read(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<RawChannel>, InputError> {
+    let named: Vec<ChannelKind> = (ChannelKind::ALL.into_iter())
+        .filter(|kind| spec_of(spec, *kind).column.is_some())
+        .collect();
+    if named.is_empty() && (spec.data.is_none() || named_something_else(spec)) {
+        return Err(no_channel(file, i, spec));
+    }
+    let default: ColumnRef = ScalarOr::Scalar(ColumnId::Name(DISPLACEMENT_COLUMN.to_owned()));
+    let mut channels = Vec::new();
+    for kind in ChannelKind::ALL {
+        let of_kind = spec_of(spec, kind);
+        let usual = named.is_empty() && kind == ChannelKind::Displacement;
+        match of_kind.column.or(usual.then_some(&default)) {
+            Some(column) => channels.push(read_one(file, i, spec, &of_kind, column, warnings)?),
+            None => without_column(file, i, &of_kind, &named)?,
+        }
+    }
+    Ok(channels)
+}
+
+/// Whether `columns` names what drives the motion or nothing but the time.
+fn named_something_else(spec: &ExperimentSpec) -> bool {
+    let columns = spec.columns.as_ref();
+    columns.is_some_and(|c| {
+        c.force.is_some() || c.base_acceleration.is_some() || c.base_displacement.is_some()
+    })
+}
+
+fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
+    let key = format!("experiments[{i}]");
+    match (&spec.data, &spec.columns) {
+        (None, None) => file
+            .error_at(&key, "this experiment has no data")
+            .expected("`data`, a CSV file with the readings"),
+        _ => file
+            .error_at(&format!("{key}.columns"), "this experiment has no readings")
+            .found("columns of other things only")
+            .expected("one or more of `displacement`, `velocity`, `acceleration`"),
+    }
+}
+
+/// Refuses a sigma, a loss or a sensor of a channel that is not read.
+fn without_column(
+    file: &ModelFile,
+    i: usize,
+    spec: &Spec,
+    named: &[ChannelKind],
+) -> Result<(), InputError> {
+    let name = spec.kind.name();
+    let given = [
+        ("sigma", spec.sigma.is_some()),
+        ("units", spec.unit.is_some()),
+        ("loss", spec.loss.is_some()),
+        ("sensors", spec.sensor.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((part, _)) => Err(file
+            .error_at(
+                &format!("experiments[{i}].{part}.{name}"),
+                format!("the {name} has no column, so it is not read"),
+            )
+            .found(match named {
+                [] => "no `columns`: the displacement is read".to_owned(),
+                some => format!("columns of {}", names(some)),
+            })
+            .expected(format!("`columns: {{{name}: …}}`, or no such key here"))),
+        None => Ok(()),
+    }
+}
+
+fn read_one(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    of_kind: &Spec,
+    column: &ColumnRef,
+    warnings: &mut Vec<String>,
+) -> Result<RawChannel, InputError> {
+    let kind = of_kind.kind;
+    let key = format!("experiments[{i}]");
+    let sigma_key = format!("{key}.sigma.{}", kind.name());
+    let sigma_column = match of_kind.sigma {
+        Some(Sigma::Column(name)) => Some((name.as_str(), sigma_key.as_str())),
+        _ => None,
+    };
+    let wanted = Wanted {
+        experiment: i,
+        name: kind.name(),
+        kind: match kind {
+            ChannelKind::Displacement => Kind::Displacement,
+            ChannelKind::Velocity => Kind::Velocity,
+            ChannelKind::Acceleration => Kind::Acceleration,
+        },
+        column,
+        unit: of_kind.unit,
+        beside: sigma_column,
+    };
+    let mut source = source::read(file, spec, &wanted, warnings)?;
+    let mut ignored = Vec::new();
+    if source.outside > 0 {
+        ignored.push((source.outside, "outside the window".to_owned()));
+    }
+    if let Some(factor) = spec.decimate {
+        decimate(file, &key, factor.0, &mut source, &mut ignored)?;
+    }
+    let span = [source.times[0], source.times[source.times.len() - 1]];
+    let present: Vec<usize> = (0..source.values.len())
+        .filter(|&r| !source.values[r].is_nan())
+        .collect();
+    let missing = source.values.len() - present.len();
+    if present.is_empty() {
+        return Err(file
+            .error_at(
+                &format!("{key}.columns.{}", kind.name()),
+                "all readings are missing",
+            )
+            .found(format!(
+                "{missing} rows without a number in `{}`",
+                source.label
+            ))
+            .expected("at least some readings"));
+    }
+    if missing > 0 {
+        ignored.push((missing, "missing".to_owned()));
+    }
+    let times: Vec<f64> = present.iter().map(|&r| source.times[r]).collect();
+    let values: Vec<f64> = present.iter().map(|&r| source.values[r]).collect();
+    let sigmas = source
+        .beside
+        .map(|s| present.iter().map(|&r| s[r]).collect::<Vec<f64>>());
+    if values.len() < Grid::FEWEST_NODES {
+        return Err(file
+            .error_at(
+                &format!("{key}.columns.{}", kind.name()),
+                "there are too few readings",
+            )
+            .found(match values.len() {
+                1 => "1 reading".to_owned(),
+                count => format!("{count} readings"),
+            })
+            .expected(format!("at least {}", Grid::FEWEST_NODES)));
+    }
+    let spacing = even_spacing(&times);
+    if spacing.is_none() && missing == 0 && nearly_equal(&times) {
+        warnings.push(format!(
+            "{key}: the times are nearly equally spaced but not quite, as if they had been printed \
+             with too few digits; they are taken as they are. `sample_rate` in place of the column \
+             of times gives them exactly"
+        ));
+    }
+    let filter = band(file, &key, spec, spacing, missing)?;
+    let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
+    let loss = loss(file, &key, of_kind, weighting.as_ref())?;
+    Ok(RawChannel {
+        kind,
+        span,
+        decimated: spec.decimate.is_some_and(|factor| factor.0 > 1),
+        median_spacing: median_spacing(&times),
+        times,
+        values,
+        spacing,
+        weighting,
+        filter,
+        loss,
+        unit: source.unit,
+        ignored,
+        format: source.format,
+    })
+}

@@ -1,0 +1,109 @@
+//! The standard deviation of readings, and the loss of their residuals.
+
+use super::Spec;
+use crate::config::ModelFile;
+use crate::config::scalar::{ScalarOr, Sigma};
+use crate::config::spec::LossName;
+use crate::error::InputError;
+use crate::objective::{Loss, Weighting};
+
+/// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
+const HUBER: f64 = 1.345;
+/// Degrees of freedom of Student's t.
+const STUDENT: f64 = 4.0;
+/// First guess of a sigma that is estimated, as a share of the readings' size.
+const FIRST_SIGMA: f64 = 0.05;
+
+pub(super) fn weighting(
+    file: &ModelFile,
+    key: &str,
+    sigma: Option<&Sigma>,
+    sigmas: Option<Vec<f64>>,
+    values: &[f64],
+) -> Result<Option<Weighting>, InputError> {
+    let expected = "a number greater than 0, in SI units";
+    match (sigma, sigmas) {
+        (None, _) => Ok(None),
+        (Some(Sigma::Number(sigma)), _) if sigma.0 <= 0.0 => Err(file
+            .error_at(key, "a standard deviation must be positive")
+            .found(sigma.0)
+            .expected(expected)),
+        (Some(Sigma::Number(sigma)), _) => Ok(Some(Weighting::Sigma(sigma.0))),
+        (Some(Sigma::Estimate), _) => {
+            let size = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+            let sigma = FIRST_SIGMA * if size > 0.0 { size } else { 1.0 };
+            Ok(Some(Weighting::Estimated { sigma }))
+        }
+        (Some(Sigma::Column(name)), Some(sigmas)) => {
+            match sigmas.iter().position(|s| !s.is_finite() || *s <= 0.0) {
+                Some(row) => Err(file
+                    .error_at(key, "a standard deviation must be positive")
+                    .found(match sigmas[row].is_nan() {
+                        true => format!("nothing in `{name}` beside reading {}", row + 1),
+                        false => format!("{} in `{name}` beside reading {}", sigmas[row], row + 1),
+                    })
+                    .expected("a number greater than 0 beside every reading")),
+                None => Ok(Some(Weighting::Sigmas(sigmas))),
+            }
+        }
+        (Some(Sigma::Column(_)), None) => Ok(None),
+    }
+}
+
+pub(super) fn loss(
+    file: &ModelFile,
+    key: &str,
+    of_kind: &Spec,
+    weighting: Option<&Weighting>,
+) -> Result<Loss, InputError> {
+    let key = format!("{key}.loss.{}", of_kind.kind.name());
+    let (name, threshold, degrees) = match of_kind.loss {
+        None => return Ok(Loss::Squares),
+        Some(ScalarOr::Scalar(name)) => (*name, None, None),
+        Some(ScalarOr::Map(spec)) => (spec.name, spec.threshold, spec.degrees),
+    };
+    for (part, given, owner) in [
+        ("threshold", threshold, LossName::Huber),
+        ("degrees", degrees, LossName::StudentT),
+    ] {
+        match given {
+            Some(_) if name != owner => {
+                return Err(file
+                    .error_at(
+                        &format!("{key}.{part}"),
+                        format!("`{name}` has no `{part}`"),
+                    )
+                    .found(format!("`{part}`"))
+                    .expected(format!("it beside `{owner}` only")));
+            }
+            Some(number) if number.0 <= 0.0 => {
+                return Err(file
+                    .error_at(
+                        &format!("{key}.{part}"),
+                        format!("the `{part}` must be positive"),
+                    )
+                    .found(number.0)
+                    .expected("a number greater than 0"));
+            }
+            _ => {}
+        }
+    }
+    if name != LossName::Squares && weighting.is_none() {
+        return Err(file
+            .error_at(
+                &key,
+                "a robust loss needs to know which residuals are large",
+            )
+            .found("no `sigma`")
+            .expected(format!("`sigma: {{{}: …}}`", of_kind.kind.name())));
+    }
+    Ok(match name {
+        LossName::Squares => Loss::Squares,
+        LossName::Huber => Loss::Huber {
+            threshold: threshold.map_or(HUBER, |t| t.0),
+        },
+        LossName::StudentT => Loss::StudentT {
+            degrees: degrees.map_or(STUDENT, |d| d.0),
+        },
+    })
+}

@@ -1,0 +1,107 @@
+//! Times of readings, and what is kept of them: fewer, or a band of frequencies.
+
+use super::super::source;
+use crate::config::ModelFile;
+use crate::config::spec::ExperimentSpec;
+use crate::error::InputError;
+use crate::observations::times::{even_spacing, median_spacing};
+use crate::signal::{self, SecondOrder};
+
+/// Order of the filter of a band, run forward and backward.
+const BAND_ORDER: usize = 2;
+/// Spacings that differ by less than this share look like rounded times.
+const ROUNDED: f64 = 0.05;
+
+/// Whether all spacings are within some per cent of their median.
+pub(super) fn nearly_equal(times: &[f64]) -> bool {
+    let median = median_spacing(times);
+    let off = |w: &[f64]| (w[1] - w[0] - median).abs() > ROUNDED * median;
+    !times.windows(2).any(off)
+}
+
+/// Keeps every `factor`-th reading after a low-pass filter.
+pub(super) fn decimate(
+    file: &ModelFile,
+    key: &str,
+    factor: usize,
+    source: &mut source::Source,
+    ignored: &mut Vec<(usize, String)>,
+) -> Result<(), InputError> {
+    let at = format!("{key}.decimate");
+    if factor == 0 {
+        return Err(file
+            .error_at(&at, "every how manyth reading is kept cannot be 0")
+            .found(factor)
+            .expected("an integer, 1 or more"));
+    }
+    let whole = source.values.iter().all(|v| !v.is_nan());
+    if !whole || source.times.len() < 2 || even_spacing(&source.times).is_none() {
+        return Err(file
+            .error_at(
+                &at,
+                "only equally spaced readings without gaps can be decimated",
+            )
+            .found(match whole {
+                true => "times that are not equally spaced",
+                false => "missing readings",
+            })
+            .expected("no `decimate`, or a window without gaps"));
+    }
+    let before = source.values.len();
+    source.values = signal::decimate(&source.values, factor);
+    source.times = source.times.iter().copied().step_by(factor).collect();
+    if let Some(beside) = &mut source.beside {
+        *beside = beside.iter().copied().step_by(factor).collect();
+    }
+    let dropped = before - source.values.len();
+    if dropped > 0 {
+        ignored.push((
+            dropped,
+            format!("left out by decimation to every {factor}th"),
+        ));
+    }
+    Ok(())
+}
+
+/// The filter of the band.
+pub(super) fn band(
+    file: &ModelFile,
+    key: &str,
+    spec: &ExperimentSpec,
+    spacing: Option<f64>,
+    missing: usize,
+) -> Result<Vec<SecondOrder>, InputError> {
+    let Some(band) = &spec.band else {
+        return Ok(Vec::new());
+    };
+    let at = format!("{key}.band");
+    let Some(spacing) = spacing else {
+        return Err(file
+            .error_at(
+                &at,
+                "only equally spaced readings without gaps can be filtered",
+            )
+            .found(match missing {
+                0 => "times that are not equally spaced".to_owned(),
+                count => format!("{count} missing readings"),
+            })
+            .expected("no `band`, or a window without gaps"));
+    };
+    let rate = 1.0 / spacing;
+    let (low, high) = (band.min.map(|f| f.0), band.max.map(|f| f.0));
+    let sections = match (low, high) {
+        (Some(low), Some(high)) => signal::band_pass(BAND_ORDER, low, high, rate),
+        (Some(low), None) => signal::high_pass(BAND_ORDER, low, rate),
+        (None, Some(high)) => signal::low_pass(BAND_ORDER, high, rate),
+        (None, None) => None,
+    };
+    sections.ok_or_else(|| {
+        let end = |f: Option<f64>| f.map_or("open".to_owned(), |f| format!("{f} Hz"));
+        file.error_at(&at, "these frequencies make no band")
+            .found(format!("{} to {}", end(low), end(high)))
+            .expected(format!(
+                "`min`, `max` or both, with 0 < min < max < {} Hz, half the sampling rate",
+                0.5 * rate
+            ))
+    })
+}

@@ -1,0 +1,52 @@
+//! Columns: which parameters act on a reading at all.
+
+use crate::dynamics::{ChannelKind, Method, Place};
+use crate::problem::Problem;
+
+/// The nodes whose values act on some reading.
+pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
+    let nodes = problem.functions.nodes();
+    let mut last = None;
+    for (kind, place) in readings(problem).map(|(_, kind, place)| (kind, place)) {
+        last = last.max(last_acting(problem, kind, place));
+    }
+    (0..nodes).map(|i| last.is_some_and(|l| i <= l)).collect()
+}
+
+/// The last node whose values act on a reading; `None` if none does.
+pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: Place) -> Option<usize> {
+    match (kind, place.as_node(), problem.oscillator.method) {
+        (ChannelKind::Acceleration, Some(node), _) => Some(node),
+        (_, Some(0), _) => None,
+        // The midpoint rule takes the displacement at the end from the velocity half-way.
+        (ChannelKind::Displacement, Some(node), Method::Midpoint) => Some(node - 1),
+        (_, Some(node), _) => Some(node),
+        (_, None, _) => Some(place.step + 1),
+    }
+}
+
+fn readings(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, Place)> + '_ {
+    let experiments = problem.experiments.iter().enumerate();
+    experiments.flat_map(|(e, experiment)| {
+        let channels = experiment.channels.iter();
+        channels.flat_map(move |c| c.places().iter().map(move |p| (e, c.kind(), *p)))
+    })
+}
+
+pub(super) fn parameter_is_visible(problem: &Problem, j: usize, visible: &[bool]) -> bool {
+    let functions = &problem.functions;
+    let found = functions.ranges().iter().position(|r| r.contains(&j));
+    let Some(f) = found else {
+        return true;
+    };
+    let (design, first) = (&functions.get(f).design, functions.ranges()[f].start);
+    match design {
+        crate::functions::Design::Identity => visible[j - first],
+        _ => visible.iter().enumerate().any(|(i, visible)| {
+            *visible
+                && design
+                    .row(i)
+                    .any(|(column, b)| column + first == j && b != 0.0)
+        }),
+    }
+}

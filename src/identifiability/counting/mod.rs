@@ -1,0 +1,117 @@
+//! What records can show at most, from the problem alone: no motion is computed.
+//!
+//! **Rows.** A reading gives one equation. Where every term is linear in the motion (damping and
+//! stiffness), the motion is linear in `(y(0), v(0), f, b'')`: of the readings of one kind at one time only as
+//! many are independent as the records' inputs up to that time. So a third free record adds nothing, and
+//! neither does a forced one before its force sets in.
+//!
+//! **Silent nodes.** With one value per node and one reading per step, a step of the midpoint rule
+//! without a force, and without one half a step before, moves states of two dimensions: it adds at most
+//! two equations.
+//!
+//! **Columns.** A parameter that acts after the last reading is not seen, and neither is the common
+//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the motion unchanged where no force acts. For functions
+//! that are closed under multiplication by `s(t)` that is one direction per node (or cell) without a
+//! force and without a known function that is not zero, for others the constant factor, if there
+//! is neither anywhere.
+//!
+//! The constant factor is exact; `s(t)` holds to the order of the stepper: with displacements alone it
+//! is not seen at all; further channels, or cells whose values jump within a step, may give it singular
+//! values that fall with the step, so that a rank by a relative 1e-12 finds more than is counted here.
+
+mod columns;
+mod rows;
+mod scale;
+
+use super::components::components;
+use crate::problem::Problem;
+use columns::{parameter_is_visible, visible_nodes};
+use rows::equations;
+use scale::Scale;
+
+/// Which factor of all functions nothing in the problem fixes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Symmetry {
+    /// None.
+    None,
+    /// One factor for all times.
+    ConstantFactor,
+    /// One factor for all times exactly, and nearly any slow `s(t)`: the bases have many knots.
+    NearlyFunction,
+    /// Any function `s(t)`, on [`Count::free_on`].
+    Function,
+}
+
+/// What can be seen at most.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Count {
+    /// Upper bound of the number of directions that the readings see.
+    pub seen_at_most: usize,
+    /// Number of parameters.
+    pub of: usize,
+    /// Independent equations of the readings.
+    pub equations: usize,
+    /// The gauge that is left by records, functions, penalties and equality constraints together.
+    pub symmetry: Symmetry,
+    /// The spans of time on which the scale is free, s.
+    pub free_on: Vec<[f64; 2]>,
+    /// What that settles and what it leaves open, in words.
+    pub statements: Vec<Statement>,
+}
+
+impl Count {
+    /// How many directions can be seen, and all statements.
+    pub fn sentences(&self) -> Vec<String> {
+        let all = self.statements.iter().map(|s| s.sentence.clone());
+        std::iter::once(self.headline()).chain(all).collect()
+    }
+
+    /// How many directions can be seen.
+    pub fn headline(&self) -> String {
+        let Self {
+            seen_at_most, of, ..
+        } = self;
+        format!("at most {seen_at_most} of {of} directions can be seen")
+    }
+}
+
+/// A sentence on what the records can show.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Statement {
+    /// The sentence.
+    pub sentence: String,
+    /// Whether it says what stays open, and not what is settled.
+    pub is_open: bool,
+}
+
+/// Counts what the records of `problem` can show.
+pub fn count(problem: &Problem) -> Count {
+    let (equations, mut statements) = equations(problem);
+    let visible = visible_nodes(problem);
+    let mut seen = (0..problem.parameters())
+        .filter(|j| parameter_is_visible(problem, *j, &visible))
+        .count();
+    let mut worst = Symmetry::None;
+    let mut free_on = Vec::new();
+    for component in components(problem) {
+        let scale = Scale::of(problem, &component);
+        seen -= scale.directions(&visible).min(seen);
+        let (left, sentence) = scale.left(problem, &component);
+        if left > worst {
+            worst = left;
+            free_on = scale.free_on(problem);
+        }
+        statements.push(Statement {
+            sentence,
+            is_open: left != Symmetry::None,
+        });
+    }
+    Count {
+        seen_at_most: seen.min(equations),
+        of: problem.parameters(),
+        equations,
+        symmetry: worst,
+        free_on,
+        statements,
+    }
+}

@@ -1,0 +1,243 @@
+//! The common scale of the functions that share one: where it is free, and what holds it.
+
+use super::super::components::{Component, given_words};
+use super::super::linear::{span_words, spans};
+use super::Symmetry;
+use crate::functions::{Basis, CoefficientFunction};
+use crate::problem::Problem;
+
+/// Functions with at least this many knots can follow a slow `s(t)` so nearly that it is hardly seen.
+const MANY_KNOTS: usize = 5;
+/// Knots are the same if they are this near, relative to the record.
+const SAME_TIME: f64 = 1e-9;
+
+/// The scale of one component.
+pub(super) struct Scale {
+    space: Space,
+    /// Nodes at which a force acts or a function is known.
+    forced: Vec<bool>,
+    known: Vec<bool>,
+    free_functions: usize,
+}
+
+impl Scale {
+    pub fn of(problem: &Problem, component: &Component) -> Self {
+        let free: Vec<&CoefficientFunction> = (component.functions.iter())
+            .map(|f| problem.functions.get(*f))
+            .filter(|f| f.parameters() > 0)
+            .collect();
+        Self {
+            space: Space::of(problem, &free),
+            forced: component.forced(problem),
+            known: component.known(problem),
+            free_functions: free.len(),
+        }
+    }
+
+    fn is_free(&self, node: usize) -> bool {
+        self.free_functions > 0 && !self.forced[node] && !self.known[node]
+    }
+
+    fn all_free(&self) -> bool {
+        (0..self.forced.len()).all(|i| self.is_free(i))
+    }
+
+    /// Number of directions of the scale among the parameters that act.
+    pub fn directions(&self, visible: &[bool]) -> usize {
+        let free = |i: &usize| self.is_free(*i);
+        match &self.space {
+            Space::Nodes => (0..visible.len())
+                .filter(free)
+                .filter(|i| visible[*i])
+                .count(),
+            Space::Cells(cells) => {
+                let last = cells.last().map_or(0, |c| c + 1);
+                let nodes = |c: usize| (0..cells.len()).filter(move |i| cells[*i] == c);
+                let counts = |c: &usize| {
+                    let mut all = nodes(*c);
+                    all.all(|i| self.is_free(i)) && nodes(*c).any(|i| visible[i])
+                };
+                (0..last).filter(counts).count()
+            }
+            Space::Constant { .. } => usize::from(self.all_free() && visible.contains(&true)),
+        }
+    }
+
+    pub fn free_on(&self, problem: &Problem) -> Vec<[f64; 2]> {
+        let times = problem.oscillator.grid.times();
+        match self.space {
+            Space::Constant { .. } if !self.all_free() => Vec::new(),
+            _ => spans(&times, |i| self.is_free(i)),
+        }
+    }
+
+    /// What is left of the scale beside penalties and equalities, and a sentence about it.
+    pub fn left(&self, problem: &Problem, component: &Component) -> (Symmetry, String) {
+        let symbols = component.symbols(problem);
+        let by_records = match &self.space {
+            Space::Constant { .. } if !self.all_free() => Symmetry::None,
+            Space::Constant { nearly_more: true } => Symmetry::NearlyFunction,
+            Space::Constant { nearly_more: false } => Symmetry::ConstantFactor,
+            _ if !(0..self.forced.len()).any(|i| self.is_free(i)) => Symmetry::None,
+            _ => Symmetry::Function,
+        };
+        if by_records == Symmetry::None {
+            let given: Vec<String> = component.given(problem).map(|f| f.name()).collect();
+            let why = match (self.free_functions, given.as_slice()) {
+                (0, _) => "fixed: nothing of it is sought".to_owned(),
+                (_, []) => "fixed: a force acts".to_owned(),
+                (_, given) => format!("that of {}", given_words(given)),
+            };
+            return (Symmetry::None, format!("the scale of {symbols} is {why}"));
+        }
+        let held = self.held(problem, component);
+        let smooth = smoothness(problem, component);
+        let where_free = match self.all_free() {
+            true => "because no force acts".to_owned(),
+            false => format!(
+                "on {}, where no force acts",
+                span_words(&self.free_on(problem))
+            ),
+        };
+        let partly = !self.all_free();
+        let reference = smooth.is_some_and(|order| order == 0);
+        let left = match by_records {
+            _ if reference => Symmetry::None,
+            // A force elsewhere and smoothness tie the silent spans to the others.
+            Symmetry::Function if smooth.is_some() && (held || partly) => Symmetry::None,
+            Symmetry::Function | Symmetry::NearlyFunction if smooth.is_some() && !held => {
+                Symmetry::ConstantFactor
+            }
+            Symmetry::ConstantFactor | Symmetry::NearlyFunction if held && smooth.is_some() => {
+                Symmetry::None
+            }
+            Symmetry::ConstantFactor if held => Symmetry::None,
+            other => other,
+        };
+        let sentence = match left {
+            Symmetry::None => format!(
+                "the readings leave the scale of {symbols} free {where_free}; {} it",
+                match (reference, held, smooth.is_some()) {
+                    (true, ..) => "a reference holds",
+                    (_, true, true) => "a value or mean and smoothness hold",
+                    (_, true, false) => "a value or mean holds",
+                    _ => "smoothness and the force elsewhere hold",
+                }
+            ),
+            Symmetry::ConstantFactor => format!(
+                "the constant factor of {symbols} is free {where_free}: hold a value or a mean, fix a \
+                 function, or add a record with a force"
+            ),
+            Symmetry::NearlyFunction => format!(
+                "{} scale s(t) of {symbols} is hardly seen {where_free}, for the bases have many knots: \
+                 fix a function, add smoothness, or add a record with a force",
+                match held {
+                    true => "a value or mean holds the constant factor, but a slowly varying",
+                    false => "the constant factor is free, and a slowly varying",
+                }
+            ),
+            Symmetry::Function => format!(
+                "the scale s(t) of {symbols} is free {where_free}{}: fix a function, add smoothness, or \
+                 add a record with a force {}",
+                match held {
+                    true => " (a value or mean holds only its constant factor)",
+                    false => "",
+                },
+                match partly {
+                    true => "there",
+                    false => "at all times",
+                }
+            ),
+        };
+        (left, sentence)
+    }
+
+    /// Whether an equality with a right-hand side holds the constant factor.
+    fn held(&self, problem: &Problem, component: &Component) -> bool {
+        let mine = |j: usize| {
+            let ranges = problem.functions.ranges();
+            component.functions.iter().any(|f| ranges[*f].contains(&j))
+        };
+        let groups = problem.constraints.groups.iter();
+        groups
+            .flat_map(|g| (0..g.rows.len()).map(move |i| (g, i)))
+            .any(|(g, i)| {
+                let [lower, upper] = g.bounds(i);
+                lower == upper && lower != 0.0 && g.rows.row(i).any(|(j, a)| a != 0.0 && mine(j))
+            })
+    }
+}
+
+/// The factors `s(t)` that keep all functions in their bases.
+enum Space {
+    Nodes,
+    /// Constant on each cell: the cell of every node.
+    Cells(Vec<usize>),
+    Constant {
+        nearly_more: bool,
+    },
+}
+
+impl Space {
+    pub fn of(problem: &Problem, free: &[&CoefficientFunction]) -> Self {
+        let grid = &problem.oscillator.grid;
+        let offset = |f: &&&CoefficientFunction| f.offset.iter().any(|b| *b != 0.0);
+        if free.iter().find(offset).is_some() {
+            return Self::Constant { nearly_more: false };
+        }
+        let slack = SAME_TIME * grid.duration();
+        let mut cells: Option<Vec<f64>> = None;
+        let mut closed = true;
+        for function in free {
+            match &function.basis {
+                Some(Basis::Nodal) => {}
+                Some(Basis::PiecewiseConstant { knots }) => {
+                    cells = Some(match cells {
+                        None => knots.clone(),
+                        Some(common) => {
+                            let also = |t: &f64| knots.iter().any(|k| (k - t).abs() <= slack);
+                            common.into_iter().filter(also).collect()
+                        }
+                    });
+                }
+                _ => closed = false,
+            }
+        }
+        match cells {
+            None if closed => Self::Nodes,
+            Some(knots) if closed && knots.len() > 2 => {
+                let cell = |t: f64| {
+                    let passed = knots.partition_point(|k| *k <= t + slack);
+                    passed.clamp(1, knots.len() - 1) - 1
+                };
+                Self::Cells(grid.times().into_iter().map(cell).collect())
+            }
+            _ => {
+                let many = |f: &&CoefficientFunction| match &f.basis {
+                    Some(Basis::Nodal) => true,
+                    Some(
+                        Basis::PiecewiseLinear { knots }
+                        | Basis::BSpline { knots }
+                        | Basis::PiecewiseConstant { knots },
+                    ) => knots.len() >= MANY_KNOTS,
+                    _ => false,
+                };
+                Self::Constant {
+                    nearly_more: free.iter().all(many),
+                }
+            }
+        }
+    }
+}
+
+/// The lowest order of a penalty on a function of the component; variation counts as order 1.
+fn smoothness(problem: &Problem, component: &Component) -> Option<usize> {
+    let mine = |f: &usize| component.functions.contains(f);
+    let penalties = (problem.penalties.iter())
+        .filter(|p| p.weight > 0.0 && mine(&p.function))
+        .map(|p| p.order);
+    let variations = (problem.variations.iter())
+        .filter(|v| v.weight > 0.0 && mine(&v.function))
+        .map(|_| 1);
+    penalties.chain(variations).min()
+}

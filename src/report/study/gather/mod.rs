@@ -1,0 +1,64 @@
+//! From a fitted problem to the pieces of a study.
+
+mod again;
+mod ahead;
+mod others;
+mod profiles;
+mod seen;
+
+pub use again::{multistart, refits, varies};
+pub use ahead::{candidates, predictions};
+pub use others::{equivalents, level, tubes};
+pub use profiles::{linear, profile_of};
+pub use seen::{bands, spectrum};
+
+use super::pieces::*;
+use crate::objective::Weighting;
+use crate::problem::Problem;
+use crate::solvers::Fit;
+
+/// The fit that is studied.
+pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
+    let sigma = |c: &crate::objective::Channel| match c.weighting() {
+        Weighting::Estimated { sigma } => Some(*sigma),
+        _ => None,
+    };
+    FitPiece {
+        status: fit.outcome.status.name().into(),
+        reason: fit.outcome.reason.clone(),
+        cost: fit.best.evaluation.cost,
+        misfit: fit.best.evaluation.misfit,
+        parameters: fit.best.parameters.clone(),
+        weights: problem.penalties.iter().map(|p| p.weight).collect(),
+        sigmas: problem.channels().map(sigma).collect(),
+    }
+}
+
+/// Whether a fit that was kept has the shape of this problem's: a journal may be damaged.
+pub fn is_of(problem: &Problem, fit: &FitPiece) -> bool {
+    let lengths = [fit.parameters.len(), fit.weights.len(), fit.sigmas.len()];
+    let expected = [
+        problem.parameters(),
+        problem.penalties.len(),
+        problem.channels().count(),
+    ];
+    let is_positive = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
+    lengths == expected && fit.sigmas.iter().flatten().all(is_positive)
+}
+
+/// The problem with the sigmas that the fit estimated and the weights that it chose.
+pub fn as_fitted(problem: &Problem, fit: &FitPiece) -> Problem {
+    let mut problem = problem.clone();
+    for (penalty, weight) in problem.penalties.iter_mut().zip(&fit.weights) {
+        penalty.weight = *weight;
+    }
+    let channels = problem.experiments.iter_mut().flat_map(|e| &mut e.channels);
+    for (channel, sigma) in channels.zip(&fit.sigmas) {
+        if let Some(sigma) = *sigma {
+            *channel = channel
+                .clone()
+                .with_weighting(Weighting::Estimated { sigma });
+        }
+    }
+    problem
+}

@@ -1,0 +1,117 @@
+//! The tables of a fit.
+
+use super::FittedModel;
+use super::csv::CsvTable;
+use super::drawn::ends;
+use crate::functions::Ratios;
+use crate::solvers::Row;
+
+impl FittedModel<'_> {
+    pub(super) fn history(&self) -> CsvTable {
+        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect();
+        CsvTable::new()
+            .column("iteration", column(|r| r.iteration as f64))
+            .column("cost", column(|r| r.cost))
+            .column("cost_ratio", column(|r| r.cost_ratio))
+            .column(
+                "gradient_norm_squared_ratio",
+                column(|r| r.gradient_norm_squared_ratio),
+            )
+            .column("step", column(|r| r.step))
+            .column("relative_change", column(|r| r.relative_change))
+    }
+
+    pub(super) fn functions_table(&self) -> CsvTable {
+        let device = &self.fit.best.evaluation.device;
+        let times = self.model.problem.oscillator.grid.times();
+        let mut table = CsvTable::new().column("t_s", times);
+        for (function, values) in self.named_functions() {
+            let column = function.quantity.column();
+            let name = match &function.owner {
+                None => column.to_owned(),
+                // A comma would end the header.
+                Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
+            };
+            table = table.column(name, values);
+        }
+        let ratios = Ratios::of(device);
+        table = table
+            .column("k_over_m_per_s2", ratios.k_over_m)
+            .column("c_over_m_per_s", ratios.c_over_m)
+            .column("natural_frequency_Hz", ratios.frequency)
+            .column("damping_ratio", ratios.damping_ratio);
+        if let Some(bands) = self.bands() {
+            let times = self.model.problem.oscillator.grid.times();
+            for list in [&bands.functions, &bands.ratios] {
+                for (band, [low, high]) in list.iter().zip(ends(bands, list, &times)) {
+                    let name = band.name.replace([' ', '/', ','], "_");
+                    table = table
+                        .column(format!("{name}_low_95"), low)
+                        .column(format!("{name}_high_95"), high);
+                }
+            }
+        }
+        if let Some(truth) = &self.model.truth {
+            let functions = self.model.problem.functions.iter();
+            for (function, values) in functions.zip(truth.functions()) {
+                let name = format!("true_{}", function.quantity.column());
+                table = table.column(name, values.to_vec());
+            }
+        }
+        table
+    }
+
+    pub(super) fn trajectories(&self) -> CsvTable {
+        let problem = &self.model.problem;
+        let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
+        let several = problem.experiments.len() > 1;
+        let motions = problem
+            .experiments
+            .iter()
+            .zip(&self.fit.best.evaluation.trajectories);
+        for (i, (experiment, motion)) in motions.enumerate() {
+            let name = |column: &str| match several {
+                true => format!("{column}_{}", i + 1),
+                false => column.to_string(),
+            };
+            // A record may end before the grid does.
+            let full = |values: &[f64]| {
+                let mut values = values.to_vec();
+                values.resize(problem.oscillator.grid.nodes(), f64::NAN);
+                values
+            };
+            table = table
+                .column(name("y_m"), full(&motion.displacement))
+                .column(name("v_m_per_s"), full(&motion.velocity));
+            if let [channel] = experiment.channels.as_slice()
+                && let Some(stride) = channel.stride()
+            {
+                let mut observed = vec![f64::NAN; problem.oscillator.grid.nodes()];
+                for (i, value) in channel.observed().iter().enumerate() {
+                    observed[i * stride] = *value;
+                }
+                table = table.column(name("observed_y_m"), observed);
+            }
+        }
+        table
+    }
+
+    /// The readings of each channel beside what the model says of them, in the unit of the file, and
+    /// the names of the tables; those that took no part in the fit last.
+    pub(super) fn readings(&self) -> Vec<(String, CsvTable)> {
+        let fitted = self.channels().into_iter().map(|(e, c)| {
+            let seen = self.seen(e, c);
+            let name = format!("readings/{}-{}.csv", e + 1, seen.channel.kind().name());
+            (name, seen.table())
+        });
+        let held_out = self.known.held_out.iter().enumerate();
+        let held_out = held_out.flat_map(|(i, out)| {
+            out.channels().into_iter().map(move |seen| {
+                let kind = seen.channel.kind().name();
+                let name = format!("readings/held-out-{}-{kind}.csv", i + 1);
+                (name, seen.table())
+            })
+        });
+        fitted.chain(held_out).collect()
+    }
+}
