@@ -643,7 +643,12 @@ def machine(load):
     """What ran, without what names it."""
     cpu = platform.processor() or platform.machine()
     try:
-        cpu = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text()).group(1)
+        about = Path("/proc/cpuinfo").read_text()
+        cpu = re.search(r"model name\s*:\s*(.*)", about).group(1)
+        # Processors of several generations have one name.
+        family, model = (re.search(rf"{key}\s*:\s*(\d+)", about).group(1) for key in ("cpu family", "model"))
+        lanes = "AVX-512" if "avx512f" in about else "AVX2" if "avx2" in about else "neither AVX2 nor AVX-512"
+        cpu += f" (family {family}, model {model}; {lanes})"
         memory = int(re.search(r"MemTotal:\s*(\d+)", Path("/proc/meminfo").read_text()).group(1)) / 2**20
     except (OSError, AttributeError):
         memory = None
