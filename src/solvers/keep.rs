@@ -9,7 +9,11 @@
 
 use super::{Counts, Outcome, Point, Row, Timings};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use std::fmt;
 use std::time::Duration;
+
+/// Numbers that are written at once.
+const PIECE: usize = 64;
 
 /// Numbers that are kept with all their bits, also where they are not finite: as a text of 16
 /// hexadecimal digits each.
@@ -267,14 +271,26 @@ impl Point {
 
 impl Serialize for Bits {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&Digits(&self.0))
+    }
+}
+
+/// Numbers as digits, written piece by piece: long ones never stand in memory as a text.
+struct Digits<'a>(&'a [f64]);
+
+impl fmt::Display for Digits<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const DIGITS: &[u8; 16] = b"0123456789abcdef";
-        let mut text = String::with_capacity(16 * self.0.len());
-        for bits in self.0.iter().map(|x| x.to_bits()) {
-            for place in (0..16).rev() {
-                text.push(char::from(DIGITS[(bits >> (4 * place)) as usize & 15]));
+        let mut piece = String::with_capacity(16 * PIECE);
+        for numbers in self.0.chunks(PIECE) {
+            piece.clear();
+            for bits in numbers.iter().map(|x| x.to_bits()) {
+                let digit = |place: usize| DIGITS[(bits >> (4 * place)) as usize & 15];
+                piece.extend((0..16).rev().map(|place| char::from(digit(place))));
             }
+            f.write_str(&piece)?;
         }
-        serializer.serialize_str(&text)
+        Ok(())
     }
 }
 

@@ -17,7 +17,7 @@ use crate::solvers::{Bits, Keeper, Kept, Row, Standing};
 use read::{Contents, Reader, journal_file};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -198,7 +198,13 @@ impl FitJournal {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        let may_wait = matches!(entry, Entry::Row(_));
+        if !matches!(entry, Entry::Row(_)) {
+            self.write();
+            if self.trouble.is_none() {
+                self.trouble = self.stream(entry).err();
+            }
+            return;
+        }
         match serde_json::to_string(&Line(self.unit, entry)) {
             Ok(line) => {
                 self.waiting += &line;
@@ -206,9 +212,17 @@ impl FitJournal {
             }
             Err(error) => self.trouble = Some(io::Error::other(error)),
         }
-        if !may_wait || self.written.elapsed() >= GATHER {
+        if self.written.elapsed() >= GATHER {
             self.write();
         }
+    }
+
+    /// Writes a line that may be long: as a text it would take a multiple of the memory of the fit.
+    fn stream(&self, entry: Entry) -> io::Result<()> {
+        let mut out = BufWriter::with_capacity(1 << 16, &self.file);
+        serde_json::to_writer(&mut out, &Line(self.unit, entry))?;
+        out.write_all(b"\n")?;
+        out.flush()
     }
 
     /// Writes the lines that wait.
@@ -238,7 +252,6 @@ impl FitJournal {
             unit: self.unit,
             standing,
         };
-        // As text it would take a multiple of the memory of the fit.
         write_whole_with(&self.folder.join(CHECKPOINT), |file| {
             Ok(serde_json::to_writer(file, &checkpoint)?)
         })
