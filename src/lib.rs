@@ -93,6 +93,7 @@ pub mod cli;
 pub mod config;
 pub mod constraints;
 pub mod diagnostics;
+mod digits;
 pub mod dynamics;
 pub mod error;
 mod excerpt;

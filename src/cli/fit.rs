@@ -44,7 +44,7 @@ pub struct Arguments {
     plot: bool,
     /// Least time between two checkpoints, from which `resume` goes on after the fit was killed [default:
     /// 1 s, and more where they take more than 2 % of the time].
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     checkpoint: Option<f64>,
 }
 

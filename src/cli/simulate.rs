@@ -28,7 +28,12 @@ pub struct Arguments {
     #[arg(long)]
     nodes: Option<usize>,
     /// Standard deviation of Gaussian noise on the readings, m.
-    #[arg(long, value_name = "SIGMA", requires = "seed")]
+    #[arg(
+        long,
+        value_name = "SIGMA",
+        requires = "seed",
+        allow_negative_numbers = true
+    )]
     noise: Option<f64>,
     /// Seed of the noise (ChaCha8).
     #[arg(long, requires = "noise")]

@@ -135,6 +135,9 @@ impl Failure<'_> {
             .expected(one_of(known.iter().copied()));
         match key {
             "<<" => error.hint("merging maps by `<<` is not supported: write the keys out"),
+            "story" if parent.is_empty() => {
+                error.hint("a file with a `story` is for `kmcfit study`")
+            }
             "dt" if parent == "grid" => {
                 error.hint("the step follows from the others: dt = duration/(nodes - 1)")
             }

@@ -86,6 +86,19 @@ impl Quantity {
         }
     }
 
+    /// Column header with the unit of a rotation.
+    pub fn angular_column(self) -> &'static str {
+        match self {
+            Quantity::Mass => "mass_kg_m2",
+            Quantity::Damping => "damping_N_m_s_per_rad",
+            Quantity::Stiffness => "stiffness_N_m_per_rad",
+            Quantity::CubicStiffness => "cubic_stiffness_N_m_per_rad3",
+            Quantity::QuadraticDamping => "quadratic_damping_N_m_s2_per_rad2",
+            Quantity::CoulombFriction => "coulomb_friction_N_m",
+            Quantity::Offset => "offset_N_m",
+        }
+    }
+
     /// All quantities, in the order in which the program holds them.
     pub const ALL: [Self; 7] = [
         Self::Mass,

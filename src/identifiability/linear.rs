@@ -99,6 +99,7 @@ pub(super) fn span_words(spans: &[[f64; 2]]) -> String {
     let words: Vec<String> = spans.iter().take(MOST_SPANS).map(word).collect();
     match spans.len().saturating_sub(MOST_SPANS) {
         0 => words.join(", "),
+        1 => format!("{} and 1 more span", words.join(", ")),
         more => format!("{} and {more} more spans", words.join(", ")),
     }
 }

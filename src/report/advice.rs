@@ -1,8 +1,9 @@
 //! What to try next. The summary in the terminal and the page say the same.
 
-use super::document::ResultDocument;
+use super::document::{ExperimentSummary, ResultDocument};
 use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
 use super::measured::{ChannelSummary, PatternSummary};
+use crate::digits::significant;
 use crate::dynamics::Method;
 use crate::solvers::{Solver, Status};
 
@@ -37,13 +38,18 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     let is_simulated = document.model.method != Solver::EquationError.name();
     if is_simulated && document.model.parameters > 0 {
         // Constraints may hold what the readings do not show.
-        steps.push(match known.seen < known.of && !known.open.is_empty() {
-            true => format!(
-                "{} free values, {} of them visible at most: fewer (knots), or add `smooth`; `kmcfit study` tells \
-                 which are seen",
-                known.of, known.seen
+        let is_open = known.seen < known.of && !known.open.is_empty();
+        let is_smooth = document.cost.regularisation > 0.0;
+        let visible = format!(
+            "{} free values, {} of them visible at most",
+            known.of, known.seen
+        );
+        steps.push(match (is_open, is_smooth || changes_nothing(document)) {
+            (true, false) => format!(
+                "{visible}: fewer (knots), or add `smooth`; `kmcfit study` tells which are seen"
             ),
-            false => "`kmcfit study` tells how sure each function is, and with `study.candidates` which experiment would \
+            (true, true) => format!("{visible}: `kmcfit study` tells which are seen"),
+            (false, _) => "`kmcfit study` tells how sure each function is, and with `study.candidates` which experiment would \
                       show most"
                 .into(),
         });
@@ -61,8 +67,15 @@ fn wanders(document: &ResultDocument) -> bool {
 
 /// Steps that are too long, with as many nodes as would do by the order of the stepper.
 fn about_steps(document: &ResultDocument) -> Option<String> {
-    let change = document.half_step.as_ref()?.change_per_reading;
-    if change <= COARSE {
+    let half = document.half_step.as_ref()?;
+    let is_exact = worst_fit(document).is_some_and(|worst| worst > EXACT);
+    let beside_residuals = match is_exact {
+        true => 0.0,
+        false => half.change_per_residual,
+    };
+    // A tenth of the residuals is hidden by them.
+    let times = (half.change_per_reading / COARSE).max(10.0 * beside_residuals);
+    if half.change_per_reading <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
     let stepper = match document.model.stepper == Method::Midpoint.name() {
@@ -70,7 +83,7 @@ fn about_steps(document: &ResultDocument) -> Option<String> {
         false => Method::Rk4,
     };
     // By more than 16 it is not the order that rules any more.
-    let finer = (change / COARSE)
+    let finer = times
         .powf(1.0 / f64::from(stepper.order()))
         .clamp(2.0, 16.0)
         .ceil();
@@ -78,18 +91,50 @@ fn about_steps(document: &ResultDocument) -> Option<String> {
     Some(format!("the steps are coarse: grid.nodes={nodes}"))
 }
 
-/// Whether a force or a motion of the base acts in a record.
-fn is_driven(document: &ResultDocument) -> bool {
-    document.experiments.iter().any(|e| e.driven)
+/// Whether the initial state of a record is sought.
+fn start_is_sought(document: &ResultDocument, record: &str) -> bool {
+    let scalar = format!("initial displacement of {record}");
+    document.scalars.iter().any(|s| s.name == scalar)
 }
 
-/// Whether the initial state of every record is sought.
-fn starts_are_sought(document: &ResultDocument) -> bool {
-    let sought = |name: &str| {
-        let scalar = format!("initial displacement of {name}");
-        document.scalars.iter().any(|s| s.name == scalar)
+/// What a record asks for that is hardly matched: its drive is doubted first.
+fn about_mismatch(document: &ResultDocument, record: &ExperimentSummary) -> String {
+    let drive = match record.driven_by.first().map(String::as_str) {
+        None => return more_freedom(document),
+        Some("base") => "the motion of the base",
+        Some(_) => "the force",
     };
-    document.experiments.iter().all(|e| sought(&e.name))
+    let start = match start_is_sought(document, &record.name) {
+        true => "",
+        false => ", and the motion the right start (initial: estimate)",
+    };
+    format!(
+        "look whether {drive} has the right sign (`gain: -1` of a sensor turns it), unit and times{start}; or {}",
+        more_freedom(document)
+    )
+}
+
+/// Functions that change more, and terms that the model does not have.
+fn more_freedom(document: &ResultDocument) -> String {
+    let terms = [
+        ("cubic_stiffness", ""),
+        ("quadratic_damping", ""),
+        ("coulomb_friction", " with its width"),
+    ];
+    let absent = terms
+        .iter()
+        .filter(|(term, _)| !document.model.terms.iter().any(|t| t == term));
+    let absent: Vec<String> = absent.map(|(term, more)| format!("{term}{more}")).collect();
+    let functions = "let a function change more (basis: piecewise-linear, more knots)";
+    match absent.is_empty() {
+        true => functions.into(),
+        false => format!("{functions}, or add a term ({})", absent.join(", ")),
+    }
+}
+
+/// Whether no function changes with time.
+fn changes_nothing(document: &ResultDocument) -> bool {
+    document.functions.values().all(|f| f.min == f.max)
 }
 
 /// What the residuals ask for.
@@ -123,38 +168,27 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
     let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR && !c.robust;
     let told = |c: &ChannelSummary| c.sigma.is_some() && c.whiteness_p_value.is_some();
     let named = document.experiments.iter();
-    let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (&e.name, c)));
+    let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
     match named.find(|(_, channel)| poor(channel)) {
         Some((_, channel)) if told(channel) && !is_coloured(&channel) => Some(format!(
             "the {} is matched to {} only, but what is left looks like noise: no other device would do much better",
             channel.kind,
             percent(channel.fit_percent, 0)
         )),
-        Some((name, channel)) => {
+        Some((record, channel)) => {
             let matched = percent(channel.fit_percent, 0);
             let what = match channels().count() {
                 1 => "the readings are".to_owned(),
-                _ => format!("the {} of {name} is", channel.kind),
+                _ => format!("the {} of {} is", channel.kind, record.name),
             };
-            let more = match (is_driven(document), starts_are_sought(document)) {
-                (true, true) => {
-                    "look whether the force has the right sign (`gain: -1` of a sensor turns it), unit and times"
-                }
-                (true, false) => {
-                    "look whether the force has the right sign (`gain: -1` of a sensor turns it), unit and times, and \
-                     the motion the right start (initial: estimate)"
-                }
-                _ => "let a function change more (basis: piecewise-linear, more knots), or add a term",
-            };
+            let more = about_mismatch(document, record);
             Some(format!(
                 "{what} matched to {matched} only: {elsewhere}{more}"
             ))
         }
-        None => channels().any(|c| is_coloured(&c)).then(|| {
-            "the residuals have a pattern: let a function change more, or add a term (cubic_stiffness, \
-             quadratic_damping, coulomb_friction with its width)"
-                .into()
-        }),
+        None => channels()
+            .any(|c| is_coloured(&c))
+            .then(|| format!("the residuals have a pattern: {}", more_freedom(document))),
     }
 }
 
@@ -187,6 +221,16 @@ fn about_pattern(channel: &ChannelSummary, pattern: &PatternSummary) -> String {
         PatternSummary::Offset => format!(
             "the residuals of the {kind} have an offset: sensors: {{{kind}: {{offset: estimate}}}} in the experiment"
         ),
+        PatternSummary::Tone { frequency, beside } => {
+            let end = if frequency > beside { "max" } else { "min" };
+            format!(
+                "the residuals of the {kind} swing at {} Hz, the readings at {}: of a hum or another mode a band leaves \
+                 little (band: {{{end}: {}}}) in the experiment",
+                significant(*frequency, 3),
+                significant(*beside, 3),
+                significant((frequency * beside).sqrt(), 2)
+            )
+        }
         PatternSummary::Drift => format!(
             "the residuals of the {kind} drift: sensors: {{{kind}: {{offset: estimate, drift: estimate}}}} in the \
              experiment"

@@ -239,9 +239,9 @@ pub struct FunctionSummary {
 pub struct ExperimentSummary {
     /// Name.
     pub name: String,
-    /// Whether a force or a motion of the base acts.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub driven: bool,
+    /// What drives it: `force`, `base` or both; empty for a free motion.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub driven_by: Vec<String>,
     /// Number of readings of all channels.
     pub readings: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.

@@ -192,7 +192,16 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<Row>, InputError> {
 
 /// The mass and the functions of the terms `quantities`, which are finite at every node.
 fn device(table: &Columns, prefix: &str, quantities: &[Quantity]) -> Result<Device, InputError> {
-    let column = |quantity: Quantity| table.finite(&format!("{prefix}{}", quantity.column()));
+    let is_rotation = table
+        .column(&format!("{prefix}{}", Quantity::Mass.angular_column()))
+        .is_some();
+    let column = |quantity: Quantity| {
+        let name = match is_rotation {
+            true => quantity.angular_column(),
+            false => quantity.column(),
+        };
+        table.finite(&format!("{prefix}{name}"))
+    };
     Ok(Device {
         mass: column(Quantity::Mass)?,
         coefficients: quantities

@@ -1,10 +1,12 @@
 //! Whether what a fit came to is a device to speak of, and the only one of its kind.
 
 use super::measured::{HalfStep, StatisticsSummary, diagnostics};
-use crate::diagnostics::fit_percent;
+use crate::diagnostics::{fit_percent, rms};
 use crate::dynamics::{Excitation, Term};
-use crate::objective::{Channel, Evaluation};
+use crate::functions::Quantity;
+use crate::objective::{Channel, Evaluation, Loss};
 use crate::problem::Problem;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
 /// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
@@ -21,6 +23,12 @@ pub(super) const BEYOND_SIGMA: f64 = 3.0;
 const CERTAIN: f64 = 1e-6;
 /// What such a fit leaves is the rounding of the readings, per cent.
 pub(super) const EXACT: f64 = 99.99;
+/// Noise would do if it had this chance.
+const CHANCE: f64 = 1e-3;
+/// A function is negative below this share of the size at which it matters.
+const NEGATIVE: f64 = 1e-3;
+/// A force is ignored that is smaller than this share of mass times acceleration.
+const IGNORED: f64 = 1e-3;
 /// Two and a half readings a period: from there on the frequency is near to that of its first alias.
 const PERIODS_PER_READING: f64 = 0.4;
 /// Equally spaced readings are no further from their places than this part of the spacing.
@@ -48,22 +56,28 @@ impl Doubts {
         tells_errors: bool,
     ) -> Self {
         let no_device = meaningless(problem, evaluation, half_step)
+            .or_else(|| {
+                let is_noise = tells_errors && noise_would_do(problem, evaluation);
+                is_noise
+                    .then(|| "noise of the size of these readings would be matched as well".into())
+            })
             .map(|why| format!("the device is not identified: {why}"));
         let (coloured, poor) = residuals(problem, evaluation, tells_errors);
-        let unexplained = unexplained(statistics).or_else(|| {
+        let unexplained = unexplained(statistics).or_else(|| coarse(problem, evaluation, half_step)).or_else(|| {
             poor.then(|| {
                 "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
                     .to_owned()
             })
         });
-        let errors_hold = no_device.is_none() && unexplained.is_none();
+        let aliased = aliased(problem, evaluation);
+        let errors_hold = no_device.is_none() && unexplained.is_none() && aliased.is_none();
         let optimistic = (errors_hold && coloured).then(|| {
             "by how much the errors are too small is not known: they hold for white residuals, and these are not"
                 .to_owned()
         });
-        let open = unexplained.into_iter().chain(optimistic);
+        let open = unexplained.into_iter().chain(optimistic).chain(aliased);
         Self {
-            open: open.chain(aliased(problem, evaluation)).collect(),
+            open: open.chain(absurd(problem, evaluation)).collect(),
             no_device,
             errors_hold,
         }
@@ -103,6 +117,91 @@ fn meaningless(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep)
         .peekable();
     let absurd = fits.peek().is_some() && fits.all(|fit| fit < ABSURD);
     absurd.then(|| "its motion misses the readings by more than twice what they vary".into())
+}
+
+/// Whether a fit with as many parameters would match white noise as well, by the ratio of likelihoods of the device and of
+/// a constant for each channel; a search among many frequencies has as many chances. Outliers tell nothing of either.
+fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
+    let predictions = evaluation.predictions.iter().flatten();
+    let (mut gain, mut readings) = (0.0, 0);
+    for (channel, predicted) in problem.channels().zip(predictions) {
+        let n = channel.len() as f64;
+        let mean = channel.observed().iter().sum::<f64>() / n;
+        let about = |y: &f64| (y - mean) * (y - mean);
+        let constant: f64 = channel.observed().iter().map(about).sum();
+        let left: f64 = channel.residuals(predicted).map(|r| r * r).sum();
+        if channel.loss() != Loss::Squares || !(constant > 0.0 && left > 0.0) {
+            return false;
+        }
+        gain += n * (constant / left).ln();
+        readings += channel.len();
+    }
+    let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
+        return false;
+    };
+    let frequencies = readings as f64 / 2.0;
+    gain.is_finite() && frequencies * law.sf(gain.max(0.0)) > CHANCE
+}
+
+/// What is said where half the step changes the model's readings by more than what is left of them: then the steps decide
+/// what is found, and not the readings.
+fn coarse(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep) -> Option<String> {
+    let half = half_step.as_ref().ok()?.as_ref()?;
+    let predictions = evaluation.predictions.iter().flatten();
+    let mut fits = (problem.channels().zip(predictions))
+        .map(|(channel, predicted)| fit_percent(channel.observed(), predicted));
+    // Readings that were made with these steps are matched to their rounding.
+    let is_exact = fits.all(|fit| fit > EXACT);
+    (half.change_per_residual > 1.0 && !is_exact).then(|| {
+        format!(
+            "how sure the functions are is not known: half the step changes the model's readings by {:.1} times the residuals",
+            half.change_per_residual
+        )
+    })
+}
+
+/// What is said of optima that are hardly devices.
+fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<String> {
+    let mut said = Vec::new();
+    let sizes = problem.natural_sizes(evaluation);
+    let passive = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let values = problem
+        .functions
+        .assembly(0)
+        .iter()
+        .zip(evaluation.device.functions());
+    for (&f, values) in values {
+        let function = problem.functions.get(f);
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let is_negative = sorted[sorted.len() / 2] < -NEGATIVE * sizes[f];
+        if is_negative && function.parameters() > 0 && passive.contains(&function.quantity) {
+            said.push(format!(
+                "the {} is negative at most times, as that of no passive device",
+                function.name()
+            ));
+        }
+    }
+    let step = problem.oscillator.grid.step();
+    for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
+        let force = experiment
+            .excitation
+            .as_ref()
+            .and_then(|e| e.force.as_ref());
+        let Some(force) = force.filter(|force| !force.is_zero()) else {
+            continue;
+        };
+        let mass = &evaluation.device_of(experiment.device).mass;
+        let inertia = motion.velocity.windows(2).zip(mass);
+        let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
+        if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
+            said.push(format!(
+                "the force of {} is nothing beside those of the device: as if it did not act",
+                experiment.name
+            ));
+        }
+    }
+    said
 }
 
 /// What is said where the residuals are larger than the readings' sigma allows: the errors of all functions are then

@@ -10,12 +10,20 @@ use crate::diagnostics::{
 use crate::dynamics::Breakdown;
 use crate::functions::CoefficientFunction;
 use crate::objective::{Channel, Evaluation, Loss, Refined, Weighting};
+use crate::observations::times::even_spacing;
 use crate::problem::Problem;
+use crate::signal::Spectrum;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Residuals below this share of the largest reading are rounding.
 const ROUNDING: f64 = 1e-6;
+/// Half of the energy of a tone lies within this share of its frequency, which is further than that other share from
+/// that of the readings.
+const NARROW: f64 = 0.15;
+const APART: f64 = 0.25;
+/// A multiple of a frequency is met to within this share.
+const MULTIPLE: f64 = 0.1;
 /// A pattern that holds more than this share of the squares is the first thing to mend.
 const HALF: f64 = 0.5;
 
@@ -78,6 +86,13 @@ pub enum PatternSummary {
     Offset,
     /// The straight line through what their mean leaves holds more than half of their squares.
     Drift,
+    /// They swing at a frequency of their own, far from that of the readings.
+    Tone {
+        /// That frequency, Hz.
+        frequency: f64,
+        /// That of the readings, Hz.
+        beside: f64,
+    },
 }
 
 /// Readings that are not used, and why.
@@ -210,8 +225,27 @@ fn pattern(channel: &Channel, predicted: &[f64]) -> Option<PatternSummary> {
     match () {
         () if offset > HALF => Some(PatternSummary::Offset),
         () if drift > HALF => Some(PatternSummary::Drift),
-        () => None,
+        () => tone(channel, &residuals),
     }
+}
+
+/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the readings', nor
+/// a multiple of it, which is the nonlinearity's. Without a sigma nothing says that residuals are more than what a descent
+/// has left.
+fn tone(channel: &Channel, residuals: &[f64]) -> Option<PatternSummary> {
+    channel.weighting().sigma(0)?;
+    let spacing = even_spacing(channel.times())?;
+    let [own, readings] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
+    let (own, beside) = (own?, readings?.dominant());
+    let [low, high] = own.band(HALF);
+    let frequency = own.dominant();
+    let is_narrow = high - low <= NARROW * frequency.max(own.resolution());
+    let is_other = (frequency - beside).abs() > APART * beside;
+    let is_multiple = [2.0, 3.0]
+        .iter()
+        .any(|n| (frequency - n * beside).abs() <= MULTIPLE * frequency);
+    (is_narrow && is_other && !is_multiple && beside > 0.0 && frequency > 0.0)
+        .then_some(PatternSummary::Tone { frequency, beside })
 }
 
 /// Unit in which reports speak of a channel.

@@ -1,5 +1,6 @@
 //! What a fit leaves behind: tables, figures and the result document.
 
+use super::advice::percent;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
@@ -9,14 +10,15 @@ use super::document::{
 use super::files::Stage;
 use super::knowledge::knowledge;
 use super::known::Known;
+use super::meaning::POOR;
 use super::measured::{self, ChannelSummary};
 use super::page::fit_page;
 use super::render;
 use super::seen::SeenChannel;
 use super::timings::TimingsSummary;
 use crate::config::{ChannelNote, Model};
-use crate::diagnostics::rms;
-use crate::dynamics::Term;
+use crate::diagnostics::{fit_percent, rms};
+use crate::dynamics::{Excitation, Term};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding};
@@ -188,6 +190,19 @@ impl FittedModel<'_> {
             }
         }
         summary.open.extend(doubts.open.iter().cloned());
+        for held in &self.known.held_out {
+            let fits = held.channels();
+            let fits = fits
+                .iter()
+                .map(|c| fit_percent(c.channel.observed(), c.predicted));
+            if let Some(worst) = fits.reduce(f64::min).filter(|worst| *worst < POOR) {
+                summary.open.push(format!(
+                    "the record `{}`, which was held out, is matched to {} only: the device does not predict it",
+                    held.out.experiment.name,
+                    percent(worst, 0)
+                ));
+            }
+        }
         summary
     }
 
@@ -338,7 +353,7 @@ impl FittedModel<'_> {
                 let first = experiment.channels.iter().zip(predictions).next();
                 ExperimentSummary {
                     name: experiment.name.clone(),
-                    driven: (experiment.excitation.as_ref()).is_some_and(|e| !e.is_zero()),
+                    driven_by: driven_by(experiment.excitation.as_ref()),
                     readings: experiment.reading_count(),
                     rms_residual: first.map_or(f64::NAN, |(c, predicted)| {
                         rms(&c.residuals(predicted).collect::<Vec<f64>>())
@@ -351,11 +366,16 @@ impl FittedModel<'_> {
 
     /// SI unit of a function: of a rotation if the channels are.
     pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
-        let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
-        match units.any(|unit| unit.is_angular()) {
+        match self.is_rotation() {
             true => function.quantity.angular_unit(),
             false => function.quantity.unit(),
         }
+    }
+
+    /// Whether the channels are those of a rotation.
+    pub(super) fn is_rotation(&self) -> bool {
+        let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
+        units.any(|unit| unit.is_angular())
     }
 
     /// A channel beside what the fit says of it.
@@ -370,6 +390,13 @@ impl FittedModel<'_> {
     pub(super) fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
         self.model.notes.get(experiment)?.get(channel)
     }
+}
+
+fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {
+    let parts = excitation.map(|e| [("force", &e.force), ("base", &e.base)]);
+    let acting = parts.into_iter().flatten();
+    let acting = acting.filter(|(_, part)| part.as_ref().is_some_and(|part| !part.is_zero()));
+    acting.map(|(name, _)| name.to_owned()).collect()
 }
 
 fn active_summary(group: ActiveGroup) -> ActiveSummary {

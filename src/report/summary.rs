@@ -4,6 +4,7 @@ use super::advice;
 use super::cost::CostKind;
 use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
+use crate::digits::significant;
 use crate::identifiability::Verdict;
 use std::fmt::Write;
 
@@ -77,8 +78,13 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
             true => format!("; J/J0 {:.1e}", document.cost.ratio),
             false => String::new(),
         };
+        let held = document.held_out.iter().flat_map(|e| &e.channels);
+        let held = held.map(|c| c.fit_percent).reduce(f64::min);
+        let held = held.map_or(String::new(), |worst| {
+            format!("; held out: {}", advice::percent(worst, 2))
+        });
         format!(
-            "{what} matched to {}{aside}{ratio}",
+            "{what} matched to {}{aside}{held}{ratio}",
             advice::percent(worst, 2)
         )
     });
@@ -123,21 +129,17 @@ fn found(document: &ResultDocument) -> String {
         };
         Some(format!("{name} {values} {}{seen}", f.unit))
     };
-    names.filter_map(function).collect::<Vec<_>>().join("; ")
+    let found: Vec<String> = names.filter_map(function).collect();
+    let legend = match found.iter().any(|f| f.contains(" +- ")) {
+        true => " (+- one standard error)",
+        false => "",
+    };
+    found.join("; ") + legend
 }
 
 /// Four significant digits.
 fn short(x: f64) -> String {
     significant(x, 4)
-}
-
-/// So many significant digits, without zeros behind; very small and very large numbers in powers of ten.
-fn significant(x: f64, digits: usize) -> String {
-    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
-    match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
-        true => format!("{rounded}"),
-        false => format!("{rounded:e}"),
-    }
 }
 
 /// How well one channel is matched.
@@ -282,8 +284,11 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        if let Some(error) = function.standard_error.filter(|_| !function.is_rounding) {
-            write!(text, "  +- {error:.2e}")?;
+        let is_seen = function.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        match function.standard_error.filter(|_| !function.is_rounding) {
+            _ if !is_seen => write!(text, "  not seen")?,
+            Some(error) => write!(text, "  +- {error:.2e}")?,
+            None => {}
         }
         writeln!(text)?;
     }
@@ -348,8 +353,8 @@ pub fn prediction_table(predictions: &[Prediction]) -> String {
         let _ = writeln!(
             text,
             "{:>12} {:>12} {:>14} {:>14}",
-            p.displacement,
-            p.velocity,
+            significant(p.displacement, 6),
+            significant(p.velocity, 6),
             known(p.cost),
             known(p.energy)
         );

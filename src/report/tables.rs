@@ -3,7 +3,7 @@
 use super::FittedModel;
 use super::csv::CsvTable;
 use super::drawn::ends;
-use crate::functions::Ratios;
+use crate::functions::{Quantity, Ratios};
 use crate::solvers::Row;
 
 impl FittedModel<'_> {
@@ -21,12 +21,20 @@ impl FittedModel<'_> {
             .column("relative_change", column(|r| r.relative_change))
     }
 
+    /// Column header of a quantity.
+    fn column(&self, quantity: Quantity) -> &'static str {
+        match self.is_rotation() {
+            true => quantity.angular_column(),
+            false => quantity.column(),
+        }
+    }
+
     pub(super) fn functions_table(&self) -> CsvTable {
         let device = &self.fit.best.evaluation.device;
         let times = self.model.problem.oscillator.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
         for (function, values) in self.named_functions() {
-            let column = function.quantity.column();
+            let column = self.column(function.quantity);
             let name = match &function.owner {
                 None => column.to_owned(),
                 // A comma would end the header.
@@ -54,7 +62,7 @@ impl FittedModel<'_> {
         if let Some(truth) = &self.model.truth {
             let functions = self.model.problem.functions.iter();
             for (function, values) in functions.zip(truth.functions()) {
-                let name = format!("true_{}", function.quantity.column());
+                let name = format!("true_{}", self.column(function.quantity));
                 table = table.column(name, values.to_vec());
             }
         }
@@ -65,6 +73,10 @@ impl FittedModel<'_> {
         let problem = &self.model.problem;
         let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
         let several = problem.experiments.len() > 1;
+        let [y, v, observed_y] = match self.is_rotation() {
+            true => ["y_rad", "v_rad_per_s", "observed_y_rad"],
+            false => ["y_m", "v_m_per_s", "observed_y_m"],
+        };
         let motions = problem
             .experiments
             .iter()
@@ -81,8 +93,8 @@ impl FittedModel<'_> {
                 values
             };
             table = table
-                .column(name("y_m"), full(&motion.displacement))
-                .column(name("v_m_per_s"), full(&motion.velocity));
+                .column(name(y), full(&motion.displacement))
+                .column(name(v), full(&motion.velocity));
             if let [channel] = experiment.channels.as_slice()
                 && let Some(stride) = channel.stride()
             {
@@ -90,7 +102,7 @@ impl FittedModel<'_> {
                 for (i, value) in channel.observed().iter().enumerate() {
                     observed[i * stride] = *value;
                 }
-                table = table.column(name("observed_y_m"), observed);
+                table = table.column(name(observed_y), observed);
             }
         }
         table

@@ -45,7 +45,10 @@ pub fn charts(
     let times = table.required("t_s")?;
     let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
     for quantity in names.filter_map(|name| Quantity::ALL.into_iter().find(|q| q.name() == name)) {
-        let Some(values) = table.column(quantity.column()) else {
+        let values =
+            (table.column(quantity.column())).or_else(|| table.column(quantity.angular_column()));
+        let (Some(values), Some(function)) = (values, document.functions.get(quantity.name()))
+        else {
             continue;
         };
         let mut chart = Chart::new(width, LOW, &times);
@@ -54,7 +57,7 @@ pub fn charts(
         text += &format!(
             "\n{} in {}\n{}",
             quantity.name(),
-            quantity.unit(),
+            function.unit,
             chart.text()
         );
     }

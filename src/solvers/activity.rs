@@ -39,6 +39,7 @@ impl ActiveGroup {
             let more = spans.len().saturating_sub(MOST_SPANS);
             match more {
                 0 => words.join(", "),
+                1 => format!("{} and 1 more span", words.join(", ")),
                 _ => format!("{} and {more} more spans", words.join(", ")),
             }
         };

@@ -32,6 +32,13 @@ const NAMES: [(Role, &[&str]); 5] = [
 ];
 /// Words in a name that speak of the base.
 const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
+/// Names that are no beginnings: a roller does not roll.
+const WHOLE: [&str; 2] = ["roll", "pitch"];
+/// Units at the end of names that no role has, in small letters.
+const FOREIGN: [&str; 16] = [
+    "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
+    "bar", "ohm", "ma", "db",
+];
 /// Longest name that is taken for a single letter with a number or unit: `y1`, `acc 1`.
 const LONGEST_LETTER: usize = 2;
 
@@ -98,13 +105,22 @@ pub struct Columns {
 
 impl Columns {
     pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
-        let numeric: Vec<usize> = (0..table.width())
-            .filter(|i| {
-                table
-                    .readings(*i)
-                    .is_ok_and(|r| r.iter().any(|x| x.is_finite()))
-            })
-            .collect();
+        let mut numeric = Vec::new();
+        for i in 0..table.width() {
+            match table.readings(i) {
+                Ok(readings) if readings.iter().any(|x| x.is_finite()) => numeric.push(i),
+                Ok(_) => {}
+                // A name that is known says that numbers were meant.
+                Err(error) => match known(table, i).map(|column| column.role) {
+                    Some(Role::Time) if sample_rate.is_some() => {}
+                    Some(Role::Time) => {
+                        return Err(error.hint("without this column: `--sample-rate HZ`"));
+                    }
+                    Some(_) => return Err(error),
+                    None => {}
+                },
+            }
+        }
         let mut columns = Self {
             used: Vec::new(),
             unused: Vec::new(),
@@ -251,10 +267,10 @@ fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
 /// What unit and name say of a column.
 fn known(table: &Table, index: usize) -> Option<Column> {
     let label = table.headers().get(index).map_or("", String::as_str);
-    let name = label.to_lowercase();
-    let by_name = role_of(&name);
+    let (label, is_base) = without_base(label);
+    let by_name = role_of(&label.to_lowercase());
     let in_file = table.unit(index);
-    let in_name = suffix(label);
+    let in_name = suffix(&label);
     let roles = [
         Role::Time,
         Role::Acceleration,
@@ -268,13 +284,15 @@ fn known(table: &Table, index: usize) -> Option<Column> {
             .or_else(|| in_name.as_deref().and_then(unit).map(|u| (u, true)))
     };
     let by_unit = roles.into_iter().find(|role| unit_of(*role).is_some());
+    if by_unit.is_none() && is_foreign(&label) {
+        return None;
+    }
     // A name that the unit agrees with comes first: volts and letters may be of several kinds.
     let role = by_name
         .filter(|r| unit_of(*r).is_some())
         .or(by_unit)
         .or(by_name)?;
     let (unit, in_name) = unit_of(role).unwrap_or((Unit::si(role.kind()), false));
-    let is_base = BASE.iter().any(|word| name.contains(word));
     Some(Column {
         index,
         role: role.of_base().filter(|_| is_base).unwrap_or(role),
@@ -282,6 +300,31 @@ fn known(table: &Table, index: usize) -> Option<Column> {
         tell_unit: in_name && unit.factor() != 1.0,
         guessed: false,
     })
+}
+
+/// A label without its word that speaks of the base, and whether there was one: `table_acc` is an acceleration, too.
+fn without_base(label: &str) -> (String, bool) {
+    // Of the same length, whatever letters there are.
+    let small = label.to_ascii_lowercase();
+    let found = BASE
+        .iter()
+        .find_map(|word| Some((small.find(word)?, word.len())));
+    let Some((at, length)) = found else {
+        return (label.to_owned(), false);
+    };
+    let rest = [&label[..at], &label[at + length..]].concat();
+    let is_separator = |c: char| matches!(c, '_' | ' ' | '-' | '.');
+    (rest.trim_start_matches(is_separator).to_owned(), true)
+}
+
+/// Whether a name ends with a unit of something else.
+fn is_foreign(label: &str) -> bool {
+    let small = label.to_lowercase();
+    let mut words = small.split(['_', ' ', '[', ']', '(', ')', '/']);
+    words.next();
+    words
+        .rfind(|word| !word.is_empty())
+        .is_some_and(|unit| FOREIGN.contains(&unit))
 }
 
 /// What a name in small letters says.
@@ -292,6 +335,7 @@ fn role_of(name: &str) -> Option<Role> {
         .unwrap_or_default();
     let means = |begin: &str| match begin.len() {
         1 => bare.starts_with(begin) && bare.len() <= LONGEST_LETTER,
+        _ if WHOLE.contains(&begin) => bare.trim_end_matches(|c: char| c.is_ascii_digit()) == begin,
         _ => bare.starts_with(begin),
     };
     let named = NAMES

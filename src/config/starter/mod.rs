@@ -98,18 +98,19 @@ fn text(
     if let Some(units) = columns.units() {
         line("    units: ", units, "converted to SI");
     }
+    let between = format!("{{interpolation: {}}}", motion.between);
     if columns.has(Role::Force) {
         line(
             "    force: ",
-            "{interpolation: linear}".into(),
-            "between samples: or hold, cubic",
+            between.clone(),
+            "between samples: or hold, linear, cubic",
         );
     }
     if columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement) {
         line(
             "    base: ",
-            "{interpolation: linear}".into(),
-            "between samples: or hold, cubic",
+            between,
+            "between samples: or hold, linear, cubic",
         );
     }
     let sigmas: Vec<String> = (columns.channels())
@@ -120,19 +121,25 @@ fn text(
         format!("{{{}}}", sigmas.join(", ")),
         "standard deviation of a reading, SI; a number, if it is known",
     );
+    let mut sensors = Vec::new();
+    let mut why = Vec::new();
     if columns.has(Role::Acceleration) {
-        line(
-            "    sensors: ",
-            "{acceleration: {offset: estimate}}".into(),
-            "accelerometers have one; leave it out if yours has none",
-        );
+        sensors.push("acceleration: {offset: estimate}");
+        why.push("accelerometers have one; leave it out if yours has none");
     }
-    if columns.has(Role::Displacement) && motion.is_off_centre {
-        line(
-            "    sensors: ",
-            "{displacement: {offset: estimate}}".into(),
-            "the readings swing about another value than zero",
-        );
+    // A force may be what holds a displacement off zero.
+    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
+        if motion.drifts {
+            sensors.push("displacement: {offset: estimate, drift: estimate}");
+            why.push("the readings swing about a line that rises or falls");
+        } else if motion.is_off_centre {
+            sensors.push("displacement: {offset: estimate}");
+            why.push("the readings swing about another value than zero");
+        }
+    }
+    if !sensors.is_empty() {
+        let sensors = format!("{{{}}}", sensors.join(", "));
+        line("    sensors: ", sensors, &why.join("; "));
     }
     line(
         "    initial: ",

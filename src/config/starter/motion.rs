@@ -1,6 +1,7 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
 use super::columns::{Column, Columns, Role};
+use crate::diagnostics::offset_and_drift;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use crate::signal::Spectrum;
@@ -9,6 +10,12 @@ use crate::signal::Spectrum;
 const FEWEST: usize = 8;
 /// Spacings that differ by less than this share are equal, but for rounded times.
 const REGULAR: f64 = 0.05;
+/// Fewest periods of readings that may be said to drift, and what share of their squares about the mean the line then holds:
+/// a swing of so many periods has a few hundredths.
+const DRIFT_PERIODS: f64 = 4.0;
+const DRIFT: f64 = 0.1;
+/// A drive that changes at less than this share of its samples jumps.
+const MOST_JUMPS: f64 = 0.1;
 
 /// The motion of a record.
 #[derive(Debug)]
@@ -24,11 +31,15 @@ pub struct Motion {
     pub frequency: Option<f64>,
     /// Whether the mean of the readings is larger than their distances from it.
     pub is_off_centre: bool,
+    /// Whether a straight line is a good part of readings that swing about it.
+    pub drifts: bool,
     /// Root-mean-square force, N, and motion with the power of the frequency that makes it an
     /// acceleration.
     force: Option<f64>,
     motion: f64,
     power: i32,
+    /// How force and base are read between their samples.
+    pub between: &'static str,
 }
 
 impl Motion {
@@ -75,14 +86,23 @@ impl Motion {
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let spacing = median(&spacings);
         let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;
+        let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
+        let drive = drives.into_iter().find_map(channel);
+        let drive = drive.map(|c| in_si(table, c)).transpose()?;
+        // The line is a drift where the readings swing about it, and not the swing itself.
+        let duration = times[times.len() - 1] - times[0];
+        let beside_line = without_line(&pairs).and_then(|pairs| frequency(&pairs, spacing));
+        let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
         Ok(Self {
+            between: between(&drive.unwrap_or_default()),
             readings: pairs.len(),
             missing: times.len() - pairs.len(),
-            duration: times[times.len() - 1] - times[0],
+            duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
-            frequency: frequency(&pairs, spacing),
+            frequency: beside_line.or_else(|| frequency(&pairs, spacing)),
             is_off_centre: off_centre(&pairs),
+            drifts: beside_line.is_some(),
             force: force.map(|f| spread(f.into_iter().filter(|x| x.is_finite()))),
             motion: spread(pairs.iter().map(|(_, value)| *value)),
             power,
@@ -110,6 +130,52 @@ impl Motion {
             some => format!(", {some} missing"),
         };
         format!("{kind} {} s{missing}", super::short(self.spacing))
+    }
+}
+
+/// Readings without their straight line, if that is a good part of them.
+fn without_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+    let (times, values): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    let [mean, line] = offset_and_drift(&times, &values);
+    if line <= DRIFT * (1.0 - mean) {
+        return None;
+    }
+    let n = pairs.len() as f64;
+    let [middle, level] = [&times, &values].map(|x| x.iter().sum::<f64>() / n);
+    let along: f64 = pairs.iter().map(|(t, y)| (t - middle) * (y - level)).sum();
+    let slope = along
+        / times
+            .iter()
+            .map(|t| (t - middle) * (t - middle))
+            .sum::<f64>();
+    Some(
+        pairs
+            .iter()
+            .map(|(t, y)| (*t, y - slope * (t - middle)))
+            .collect(),
+    )
+}
+
+/// How a drive goes on between its samples, as far as they say: those that are left out tell, every second of them.
+fn between(drive: &[f64]) -> &'static str {
+    let steps: Vec<bool> = drive.windows(2).map(|pair| pair[0] != pair[1]).collect();
+    let jumps = steps.iter().filter(|moves| **moves).count();
+    let run = steps.windows(2).filter(|pair| pair[0] && pair[1]).count();
+    // A hammer's blow runs over some samples.
+    if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * drive.len() as f64 {
+        return "hold";
+    }
+    let (mut line, mut cubic) = (0.0, 0.0);
+    for x in drive.windows(7) {
+        let near = 0.5 * (x[2] + x[4]);
+        let far = 0.5 * (x[0] + x[6]);
+        line += (x[3] - near).powi(2);
+        cubic += (x[3] - near - (near - far) / 8.0).powi(2);
+    }
+    // Squares: by less than half the error.
+    match cubic < 0.25 * line {
+        true => "cubic",
+        false => "linear",
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
 
 use super::table::{list, number, table};
+use crate::identifiability::Verdict;
 use crate::report::advice;
 use crate::report::cost::CostKind;
 use crate::report::document::{FunctionSummary, ResultDocument};
@@ -29,6 +30,9 @@ pub(super) fn opening(document: &ResultDocument) -> String {
     let notes: Vec<String> = (document.warnings.iter().map(|w| format!("warning: {w}")))
         .chain(document.remarks.iter().map(|r| format!("note: {r}")))
         .collect();
+    if !notes.is_empty() {
+        text += "<h3>Notes</h3>\n";
+    }
     text + &list(&notes)
 }
 
@@ -61,7 +65,7 @@ fn facts(document: &ResultDocument) -> String {
             1 => "fit of the readings",
             _ => "fit of the worst channel",
         };
-        facts.push((name, format!("{worst:.2} %")));
+        facts.push((name, advice::percent(worst, 2)));
     }
     if let Some(reduced) = document.statistics.reduced_chi_square {
         facts.push(("chi-square per degree of freedom", number(reduced)));
@@ -102,15 +106,25 @@ fn found(document: &ResultDocument) -> String {
         .collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
     let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
-    let mut headings = vec!["function", "smallest", "largest"];
+    let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
+    let mut headings = vec!["function", "smallest", "largest", "unit"];
     headings.extend(has_error.then_some("standard error"));
+    headings.extend(has_verdict.then_some("known"));
     if has_truth {
         headings.extend(["largest error", "rms error"]);
     }
     let known = |x: Option<f64>| x.map_or(String::new(), number);
     let row = |(name, f): &(&str, &FunctionSummary)| {
-        let mut cells = vec![name.to_string(), number(f.min), number(f.max)];
-        cells.extend(has_error.then(|| known(f.standard_error)));
+        let is_seen = f.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        let [low, high] = match (is_seen, f.is_rounding) {
+            (false, _) => [String::new(), String::new()],
+            (true, true) => [number(0.0), number(0.0)],
+            (true, false) => [number(f.min), number(f.max)],
+        };
+        let error = f.standard_error.filter(|_| is_seen && !f.is_rounding);
+        let mut cells = vec![name.to_string(), low, high, f.unit.clone()];
+        cells.extend(has_error.then(|| known(error)));
+        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict.as_deref()).to_owned()));
         if has_truth {
             cells.extend([known(f.truth_max_error), known(f.truth_rms_error)]);
         }
@@ -118,6 +132,18 @@ fn found(document: &ResultDocument) -> String {
     };
     let rows: Vec<Vec<String>> = functions.iter().map(row).collect();
     table(&headings, &rows)
+}
+
+/// A verdict's name as a word of a table.
+fn verdict_in_words(verdict: Option<&str>) -> &'static str {
+    match verdict {
+        Some("identified") => "yes",
+        Some("only-ratio") => "only a ratio",
+        Some("only-on") => "at times",
+        Some("not-seen") => "not seen",
+        Some("fixed") => "given",
+        _ => "",
+    }
 }
 
 /// How well each record is matched, those that were held out included.

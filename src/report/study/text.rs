@@ -1,6 +1,7 @@
 //! A study for a terminal: its sentences.
 
 use super::StudyDocument;
+use crate::digits::significant;
 
 /// How the search for an extreme device ends when it has found it.
 pub const ENDED: &str = "no further";
@@ -63,8 +64,13 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             .max_by(|a, b| width(a).total_cmp(&width(b)))
             .unwrap_or(0);
         format!(
-            "{}: widest at {} s, from {:.6} to {:.6} {}, among devices with a misfit of at most {:.4e}",
-            t.name, t.times[widest], t.low[widest], t.high[widest], t.unit, t.level
+            "{}: widest at {} s, from {} to {} {}, among devices with a misfit of at most {:.4e}",
+            t.name,
+            t.times[widest],
+            significant(t.low[widest], 6),
+            significant(t.high[widest], 6),
+            t.unit,
+            t.level
         )
     };
     let mut lines: Vec<String> = study.tubes.iter().map(tube).collect();
@@ -99,7 +105,13 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
         study.varies.iter().map(|v| v.sentence.clone()).collect(),
     );
     let interval = |b: &super::BootstrapRecord| match b.interval {
-        Some([low, high]) => format!("{}: {low:.6} to {high:.6} {}", b.name, b.unit),
+        Some([low, high]) => format!(
+            "{}: {} to {} {}",
+            b.name,
+            significant(low, 6),
+            significant(high, 6),
+            b.unit
+        ),
         None => format!("{}: too few refits ended well", b.name),
     };
     add("Refits", study.bootstrap.iter().map(interval).collect());
@@ -114,8 +126,9 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
     let prediction = |p: &super::PredictionRecord| match &p.furthest {
         Some((name, distance)) => {
             format!(
-                "{}: the device `{name}` moves up to {distance:.4} m away",
-                p.name
+                "{}: the device `{name}` moves up to {} m away",
+                p.name,
+                significant(*distance, 4)
             )
         }
         None => format!("{}: no other device to compare with", p.name),

@@ -8,6 +8,7 @@
 //! all the same) say nothing of a frequency: no step is then longer than from one to the next.
 
 use crate::config::build::experiments::Record;
+use crate::digits::significant;
 use crate::dynamics::Method;
 use crate::signal::Spectrum;
 use std::f64::consts::TAU;
@@ -76,10 +77,11 @@ pub fn nodes(
         return nodes;
     }
     remarks.push(format!(
-        "grid: {nodes} nodes were chosen: {:.0} steps in a period of {fastest:.4} Hz, below which \
+        "grid: {nodes} nodes were chosen: {:.0} steps in a period at {} Hz, below which \
          {:.0} % of the readings' energy lies, for a phase error of about {:.0e} rad at the end of \
          the record",
         1.0 / (fastest * step),
+        significant(fastest, 4),
         100.0 * ENERGY,
         omega * duration * (omega * step).powf(order) / constant,
     ));
