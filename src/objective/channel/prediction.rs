@@ -77,6 +77,7 @@ impl Channel {
         }
         if self.is_acceleration_on_nodes() {
             let channel = self;
+            out.reserve_exact(self.len());
             lanes::run(Predict { channel, view, out });
         } else if self.sensor == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
