@@ -52,7 +52,9 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
     }
     let file = File::open(path).map_err(|error| unreadable(path, what, &error))?;
     // At once: bytes that grow leave their smaller selves behind in memory that costs time to get.
-    let bytes = Vec::with_capacity(usize::try_from(metadata.len()).unwrap_or(0) + 1);
+    let mut bytes = Vec::new();
+    // Where there is not so much, reading says so.
+    let _ = bytes.try_reserve_exact(usize::try_from(metadata.len()).unwrap_or(0));
     read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))
 }
 

@@ -136,9 +136,13 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
         gain += n * (constant / left).ln();
         readings += channel.len();
     }
+    // As many parameters as readings match anything: no ratio tells noise from a device then.
     let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
         return false;
     };
+    if problem.parameters() >= readings {
+        return false;
+    }
     let frequencies = readings as f64 / 2.0;
     gain.is_finite() && frequencies * law.sf(gain.max(0.0)) > CHANCE
 }
