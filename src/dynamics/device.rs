@@ -23,7 +23,8 @@ impl Device {
     pub fn zeros(nodes: usize, terms: usize) -> Self {
         Self {
             mass: vec![0.0; nodes],
-            coefficients: vec![vec![0.0; nodes]; terms],
+            // One by one: zeros come from the system as they are, copies of them are made.
+            coefficients: (0..terms).map(|_| vec![0.0; nodes]).collect(),
         }
     }
 

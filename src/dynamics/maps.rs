@@ -2,7 +2,8 @@
 
 use super::stages::Rhs;
 use super::tableau::{MIDPOINT, Position, RK4, Tableau};
-use super::{MOST_TERMS, Method, Trajectory, window};
+use super::term::with_known;
+use super::{MOST_TERMS, Method, Term, Trajectory, window};
 use crate::lanes::{Arithmetic, Eight, LANES, Row};
 
 /// Most functions of a device: the mass and one for each term.
@@ -10,6 +11,7 @@ pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
 
 /// How the states at the right nodes of eight steps answer, one step a lane. The first index is the
 /// one of the right node's state (displacement, velocity).
+#[repr(align(64))]
 pub(super) struct Maps {
     /// To displacement and velocity at the left node, less the identity.
     pub growth: [[Row; 2]; 2],
@@ -34,20 +36,15 @@ struct Places<A: Arithmetic>([Eight<A>; 3]);
 impl<A: Arithmetic> Places<A> {
     #[inline(always)]
     fn of(arithmetic: A, values: &[f64], i: usize) -> Self {
-        let left = Eight::load(arithmetic, &window::row(values, i));
-        let right = Eight::load(arithmetic, &window::row(values, i + 1));
+        let left = window::eight(arithmetic, values, i);
+        let right = window::eight(arithmetic, values, i + 1);
         let middle = (right + left) * Eight::splat(arithmetic, 0.5);
         Self([left, middle, right])
     }
 
     #[inline(always)]
     fn stepwise(arithmetic: A, part: Option<&super::Stepwise>, i: usize) -> Self {
-        let [left, middle, right] = window::stepwise(part, i);
-        Self([
-            Eight::load(arithmetic, &left),
-            Eight::load(arithmetic, &middle),
-            Eight::load(arithmetic, &right),
-        ])
+        Self(window::stepwise(arithmetic, part, i))
     }
 
     #[inline(always)]
@@ -67,16 +64,21 @@ pub(super) fn linearise<A: Arithmetic>(
     wanted: &[bool; FUNCTIONS],
     maps: &mut Maps,
 ) {
-    match method {
-        Method::Midpoint => by(arithmetic, &MIDPOINT, rhs, motion, i, wanted, maps),
-        Method::Rk4 => by(arithmetic, &RK4, rhs, motion, i, wanted, maps),
-    }
+    with_known!(rhs.terms, terms, TERMS => match method {
+        Method::Midpoint => by::<A, 2, TERMS>(arithmetic, &MIDPOINT, terms, rhs, motion, i, wanted, maps),
+        Method::Rk4 => by::<A, 4, TERMS>(arithmetic, &RK4, terms, rhs, motion, i, wanted, maps),
+    });
 }
 
 #[inline(always)]
-fn by<A: Arithmetic, const S: usize>(
+#[allow(
+    clippy::too_many_arguments,
+    reason = "all of it is laid out for each list of terms"
+)]
+fn by<A: Arithmetic, const S: usize, const TERMS: usize>(
     arithmetic: A,
     tableau: &Tableau<S>,
+    terms: &[Term],
     rhs: &Rhs,
     motion: &Trajectory,
     i: usize,
@@ -92,17 +94,17 @@ fn by<A: Arithmetic, const S: usize>(
     let force = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
     let base = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
 
-    let nothing = Places([zero; 3]);
-    let mut functions = [nothing; MOST_TERMS];
-    for (places, values) in functions.iter_mut().zip(&rhs.device.coefficients) {
-        *places = Places::of(arithmetic, values, i);
+    let mut functions = [Places([zero; 3]); TERMS];
+    for j in 0..terms.len().min(TERMS) {
+        functions[j] = Places::of(arithmetic, &rhs.device.coefficients[j], i);
     }
 
     // Forwards: the stages, their slopes, and how the acceleration answers to each function.
-    let y0 = Eight::load(arithmetic, &window::row(&motion.displacement, i));
-    let v0 = Eight::load(arithmetic, &window::row(&motion.velocity, i));
+    let y0 = window::eight(arithmetic, &motion.displacement, i);
+    let v0 = window::eight(arithmetic, &motion.velocity, i);
     let [mut v, mut a, mut by_y, mut by_v] = [[zero; S]; 4];
-    let mut answers = [[zero; FUNCTIONS]; S];
+    let mut inertias = [zero; S];
+    let mut answers = [[zero; TERMS]; S];
     for s in 0..S {
         let position = tableau.position[s];
         let (mut y_s, mut v_s) = (y0, v0);
@@ -117,11 +119,11 @@ fn by<A: Arithmetic, const S: usize>(
         let per_mass = per_mass.at(position);
         let minus_per_mass = -per_mass;
         let mut push = force.at(position);
-        for (j, term) in rhs.terms.iter().enumerate().take(MOST_TERMS) {
+        for (j, term) in terms.iter().enumerate().take(TERMS) {
             let p = functions[j].at(position);
             let response = term.respond(arithmetic, y_s, v_s);
             push = push - p * response.phi;
-            answers[s][j + 1] = response.phi * minus_per_mass;
+            answers[s][j] = response.phi * minus_per_mass;
             by_y[s] = response.by_y.taken_from(by_y[s], p);
             by_v[s] = response.by_v.taken_from(by_v[s], p);
         }
@@ -129,7 +131,7 @@ fn by<A: Arithmetic, const S: usize>(
         a[s] = inertia - base.at(position);
         by_y[s] = by_y[s] * per_mass;
         by_v[s] = by_v[s] * per_mass;
-        answers[s][0] = inertia * minus_per_mass;
+        inertias[s] = inertia * minus_per_mass;
     }
 
     // Backwards, from each component of the state at the right node.
@@ -156,13 +158,18 @@ fn by<A: Arithmetic, const S: usize>(
             to_v += v_bar[s];
         }
         maps.growth[end] = [to_y.row(), to_v.row()];
-        for f in 0..=rhs.terms.len() {
+        for f in 0..=terms.len().min(TERMS) {
             if !wanted[f] {
                 continue;
             }
             let [mut left, mut middle, mut right] = [zero; 3];
             for s in 0..S {
-                let answer = a_bar[s] * answers[s][f];
+                let answer = a_bar[s]
+                    * if f == 0 {
+                        inertias[s]
+                    } else {
+                        answers[s][f - 1]
+                    };
                 match tableau.position[s] {
                     Position::Left => left += answer,
                     Position::Middle => middle += answer,

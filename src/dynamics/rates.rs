@@ -61,6 +61,7 @@ const STAGES: usize = 4;
 /// `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of
 /// the tableau.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Rates {
     kinds: [Row; MOST_TERMS],
     drive: Row,
@@ -131,33 +132,57 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
+        let steady = Steady::of(&self.rhs, &self.kinds);
         let mut brought = [NOTHING; STAGES];
+        let mut per_mass = PerMass::at(arithmetic, &self.rhs, 0);
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
         let motion = &mut *self.trajectory;
         let steps = motion.nodes() - 1;
         (motion.displacement[0], motion.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            prepare(
+            if from > 0 && !steady.mass {
+                per_mass = PerMass::at(arithmetic, &self.rhs, from);
+            }
+            prepare_drive(
                 arithmetic,
                 tableau,
                 &self.rhs,
-                &self.kinds,
+                &per_mass,
                 from,
                 &mut brought,
             );
+            for k in 0..MOST_TERMS {
+                if from > 0 && steady.kinds[k] {
+                    continue;
+                }
+                if let Some(j) = self.kinds[k] {
+                    let values = &self.rhs.device.coefficients[j];
+                    prepare(
+                        arithmetic,
+                        tableau,
+                        self.rhs.dt,
+                        values,
+                        &per_mass,
+                        from,
+                        k,
+                        &mut brought,
+                    );
+                }
+            }
             let to = (from + LANES).min(steps);
             let ends = motion.displacement[from + 1..=to]
                 .iter_mut()
                 .zip(&mut motion.velocity[from + 1..=to]);
             for (l, (end_y, end_v)) in ends.enumerate() {
+                let l = l & (LANES - 1);
                 step(
                     tableau,
                     &brought,
                     there,
                     self.width,
                     self.rhs.dt,
-                    l & (LANES - 1),
+                    l,
                     &mut y,
                     &mut v,
                 );
@@ -168,43 +193,98 @@ impl Forward<'_> {
     }
 }
 
+/// What stays as it is made for the first eight steps: what depends on constants alone.
+struct Steady {
+    mass: bool,
+    /// The rates of each kind.
+    kinds: [bool; MOST_TERMS],
+}
+
+impl Steady {
+    #[inline(always)]
+    fn of(rhs: &Rhs, kinds: &[Option<usize>; MOST_TERMS]) -> Self {
+        let mass = is_constant(&rhs.device.mass);
+        let is_steady = |j: usize| mass && is_constant(&rhs.device.coefficients[j]);
+        Self {
+            mass,
+            kinds: kinds.map(|kind| kind.is_some_and(is_steady)),
+        }
+    }
+}
+
+/// Whether all values are the same.
 #[inline(always)]
+fn is_constant(values: &[f64]) -> bool {
+    let first = values[0];
+    // A part at a time, without a branch for each value.
+    let mut parts = values.chunks(32 * LANES);
+    parts.all(|part| part.iter().fold(true, |same, x| same & (*x == first)))
+}
+
+/// One by the mass at the left ends, middles and right ends of eight steps.
+#[derive(Clone, Copy)]
+struct PerMass<A: Arithmetic>([Eight<A>; 3]);
+
+impl<A: Arithmetic> PerMass<A> {
+    #[inline(always)]
+    fn at(arithmetic: A, rhs: &Rhs, i: usize) -> Self {
+        let one = Eight::splat(arithmetic, 1.0);
+        Self(places(arithmetic, &rhs.device.mass, i).map(|mass| one / mass))
+    }
+}
+
+/// A function at the left ends, middles and right ends of eight steps.
+#[inline(always)]
+fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
+    let left = window::eight(arithmetic, values, i);
+    let right = window::eight(arithmetic, values, i + 1);
+    [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
+}
+
+/// The rates of a kind of term from its function, over the steps from `i` on.
+#[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "rows go where they stay, and nowhere between"
+)]
 fn prepare<A: Arithmetic, const S: usize>(
     arithmetic: A,
     tableau: &Tableau<S>,
+    dt: f64,
+    values: &[f64],
+    per_mass: &PerMass<A>,
+    i: usize,
+    kind: usize,
+    brought: &mut [Brought; STAGES],
+) {
+    let mut p = places(arithmetic, values, i);
+    for q in 0..3 {
+        p[q] = p[q] * per_mass.0[q];
+    }
+    for (s, stage) in brought.iter_mut().enumerate().take(S) {
+        let [next, end] = factors(tableau, dt, s);
+        let p = p[tableau.position[s] as usize];
+        stage.next.kinds[kind] = (p * Eight::splat(arithmetic, next)).row();
+        stage.end.kinds[kind] = (p * Eight::splat(arithmetic, end)).row();
+    }
+}
+
+/// What drives the steps from `i` on.
+#[inline(always)]
+fn prepare_drive<A: Arithmetic, const S: usize>(
+    arithmetic: A,
+    tableau: &Tableau<S>,
     rhs: &Rhs,
-    kinds: &[Option<usize>; MOST_TERMS],
+    per_mass: &PerMass<A>,
     i: usize,
     brought: &mut [Brought; STAGES],
 ) {
-    let (one, half) = (Eight::splat(arithmetic, 1.0), Eight::splat(arithmetic, 0.5));
-    let left = Eight::load(arithmetic, &window::row(&rhs.device.mass, i));
-    let right = Eight::load(arithmetic, &window::row(&rhs.device.mass, i + 1));
-    let per_mass = [one / left, one / ((right + left) * half), one / right];
-    for (k, kind) in kinds.iter().enumerate() {
-        let Some(j) = *kind else {
-            continue;
-        };
-        let p = &rhs.device.coefficients[j];
-        let left = Eight::load(arithmetic, &window::row(p, i));
-        let right = Eight::load(arithmetic, &window::row(p, i + 1));
-        let mut p = [left, (right + left) * half, right];
-        for q in 0..3 {
-            p[q] = p[q] * per_mass[q];
-        }
-        for (s, stage) in brought.iter_mut().enumerate().take(S) {
-            let [next, end] = factors(tableau, rhs.dt, s);
-            let p = p[tableau.position[s] as usize];
-            stage.next.kinds[k] = (p * Eight::splat(arithmetic, next)).row();
-            stage.end.kinds[k] = (p * Eight::splat(arithmetic, end)).row();
-        }
-    }
-    let force = window::stepwise(rhs.excitation.and_then(|e| e.force.as_ref()), i);
-    let base = window::stepwise(rhs.excitation.and_then(|e| e.base.as_ref()), i);
+    let force = window::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
+    let base = window::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
     for (s, stage) in brought.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
-        let push = Eight::load(arithmetic, &force[q]) * per_mass[q];
-        let drive = push - Eight::load(arithmetic, &base[q]);
+        let push = force[q] * per_mass.0[q];
+        let drive = push - base[q];
         let [next, end] = factors(tableau, rhs.dt, s);
         stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();
         stage.end.drive = (drive * Eight::splat(arithmetic, end)).row();
@@ -220,6 +300,9 @@ fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] 
 }
 
 /// One step, in lane `l` of the rates.
+///
+/// Sums are in the order in which their parts become known: the displacement of a stage before its velocity, and
+/// at the first stage before the velocity that the step starts from.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -240,19 +323,27 @@ fn step<const S: usize>(
     for (s, stage) in brought.iter().enumerate().take(S) {
         let phi = Phi::at(there, width, y_s, v_s);
         let [next, end] = factors(tableau, dt, s);
-        if end != 0.0 {
+        if tableau.b[s] != 0.0 {
             y_end += end * v_s;
-            v_end = phi.add(&stage.end, there, l, v_end);
+            let rates = &stage.end;
+            v_end =
+                phi.damped(rates, there, l, v_end) + phi.pushed(rates, there, l, rates.drive[l]);
         }
         if s + 1 < S {
             y_s = *y + next * v_s;
-            v_s = phi.add(&stage.next, there, l, *v);
+            let rates = &stage.next;
+            let drive = rates.drive[l];
+            let pushed = match s {
+                0 => *v + phi.pushed(rates, there, l, drive),
+                _ => phi.pushed(rates, there, l, *v + drive),
+            };
+            v_s = phi.damped(rates, there, l, pushed);
         }
     }
     (*y, *v) = (y_end, v_end);
 }
 
-/// What each term multiplies its function by, at one stage.
+/// What each term multiplies its function by, at one stage; for the cubic stiffness the square alone.
 #[derive(Clone, Copy)]
 struct Phi([f64; MOST_TERMS]);
 
@@ -264,7 +355,7 @@ impl Phi {
         phi[STIFFNESS] = y;
         phi[DAMPING] = v;
         if there[CUBIC_STIFFNESS] {
-            phi[CUBIC_STIFFNESS] = y * y * y;
+            phi[CUBIC_STIFFNESS] = y * y;
         }
         if there[QUADRATIC_DAMPING] {
             phi[QUADRATIC_DAMPING] = Term::QuadraticDamping.phi(y, v);
@@ -275,22 +366,33 @@ impl Phi {
         Self(phi)
     }
 
-    /// `v + h y''`: what is known first is added first.
+    /// `sum` and what the displacement brings.
     #[inline(always)]
-    fn add(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, v: f64) -> f64 {
-        let mut v = v + rates.drive[l];
-        for kind in [
-            OFFSET,
-            DAMPING,
-            STIFFNESS,
-            CUBIC_STIFFNESS,
-            QUADRATIC_DAMPING,
-            COULOMB_FRICTION,
-        ] {
+    fn pushed(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
+        let Self(phi) = self;
+        let mut sum = sum;
+        for kind in [OFFSET, STIFFNESS] {
             if there[kind] {
-                v -= rates.kinds[kind][l] * self.0[kind];
+                sum -= rates.kinds[kind][l] * phi[kind];
             }
         }
-        v
+        if there[CUBIC_STIFFNESS] {
+            // In pairs, of which neither waits for the other.
+            let slope = rates.kinds[CUBIC_STIFFNESS][l] * phi[STIFFNESS];
+            sum -= slope * phi[CUBIC_STIFFNESS];
+        }
+        sum
+    }
+
+    /// `sum` and what the velocity brings.
+    #[inline(always)]
+    fn damped(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
+        let mut sum = sum;
+        for kind in [DAMPING, QUADRATIC_DAMPING, COULOMB_FRICTION] {
+            if there[kind] {
+                sum -= rates.kinds[kind][l] * self.0[kind];
+            }
+        }
+        sum
     }
 }

@@ -1,11 +1,13 @@
 //! The accelerations at eight neighbouring nodes: what an accelerometer sampled with the grid sees.
 
 use super::maps::FUNCTIONS;
-use super::{Device, Oscillator, Trajectory, window};
+use super::term::with_known;
+use super::{Device, MOST_TERMS, Oscillator, Term, Trajectory, window};
 use crate::lanes::{Arithmetic, Eight, LANES, Row};
 
 /// Accelerations at eight nodes and their derivatives, one node a lane.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(crate) struct Accelerations {
     /// The accelerations of `y`, relative to the base.
     pub value: Row,
@@ -39,19 +41,31 @@ impl Sight<'_> {
         &self,
         arithmetic: A,
         i: usize,
-        [force, base]: [Row; 2],
+        around: [Eight<A>; 2],
+        seen: &mut Accelerations,
+    ) {
+        with_known!(self.oscillator.terms.as_slice(), terms, TERMS => self.see_terms::<A, TERMS>(arithmetic, terms, i, around, seen));
+    }
+
+    #[inline(always)]
+    fn see_terms<A: Arithmetic, const TERMS: usize>(
+        &self,
+        arithmetic: A,
+        terms: &[Term],
+        i: usize,
+        [force, base]: [Eight<A>; 2],
         seen: &mut Accelerations,
     ) {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
-        let y = Eight::load(arithmetic, &window::row(&self.states.displacement, i));
-        let v = Eight::load(arithmetic, &window::row(&self.states.velocity, i));
-        let per_mass = one / Eight::load(arithmetic, &window::row(&self.device.mass, i));
+        let y = window::eight(arithmetic, &self.states.displacement, i);
+        let v = window::eight(arithmetic, &self.states.velocity, i);
+        let per_mass = one / window::eight(arithmetic, &self.device.mass, i);
         let minus_per_mass = -per_mass;
-        let mut push = Eight::load(arithmetic, &force);
+        let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
-        let terms = self.oscillator.terms.iter().zip(&self.device.coefficients);
-        for (j, (term, p)) in terms.enumerate() {
-            let p = Eight::load(arithmetic, &window::row(p, i));
+        for (j, term) in terms.iter().enumerate().take(TERMS) {
+            let p = &self.device.coefficients[j];
+            let p = window::eight(arithmetic, p, i);
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;
             seen.functions[j + 1] = (response.phi * minus_per_mass).row();
@@ -61,6 +75,6 @@ impl Sight<'_> {
         let inertia = push * per_mass;
         seen.functions[0] = (inertia * minus_per_mass).row();
         seen.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
-        seen.value = (inertia - Eight::load(arithmetic, &base)).row();
+        seen.value = (inertia - base).row();
     }
 }

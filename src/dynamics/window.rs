@@ -1,15 +1,15 @@
 //! Eight neighbouring values of what is known at the nodes or over the steps.
 
 use super::Stepwise;
-use crate::lanes::{LANES, Row};
+use crate::lanes::{Arithmetic, Eight, LANES, Row};
 
 /// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.
 #[inline(always)]
-pub(crate) fn row(values: &[f64], i: usize) -> Row {
+pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> Eight<A> {
     let inside = values.get(i..).and_then(<[f64]>::first_chunk::<LANES>);
     match inside {
-        Some(row) => *row,
-        None => padded(values, i),
+        Some(row) => Eight::load(arithmetic, row),
+        None => Eight::load(arithmetic, &padded(values, i)),
     }
 }
 
@@ -20,18 +20,34 @@ fn padded(values: &[f64], i: usize) -> Row {
     std::array::from_fn(|l| values[(i + l).min(last)])
 }
 
-/// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`.
+/// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`, and beyond the end the last
+/// step, for lanes that nobody asks.
 #[inline(always)]
-pub(crate) fn stepwise(part: Option<&Stepwise>, i: usize) -> [Row; 3] {
-    let mut rows = [[0.0; LANES]; 3];
-    if let Some(steps) = part.map(Stepwise::values) {
-        let last = steps.len().saturating_sub(1);
-        for l in 0..LANES {
-            let at = (i + l).min(last);
-            for (row, value) in rows.iter_mut().zip(&steps[at]) {
-                row[l] = *value;
-            }
-        }
+pub(crate) fn stepwise<A: Arithmetic>(
+    arithmetic: A,
+    part: Option<&Stepwise>,
+    i: usize,
+) -> [Eight<A>; 3] {
+    let Some(steps) = part.map(Stepwise::values) else {
+        return [Eight::splat(arithmetic, 0.0); 3];
+    };
+    let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);
+    match inside {
+        Some(steps) => columns(steps).map(|row| Eight::load(arithmetic, &row)),
+        None => padded_steps(steps, i).map(|row| Eight::load(arithmetic, &row)),
     }
-    rows
+}
+
+#[inline(always)]
+fn columns(steps: &[[f64; 3]; LANES]) -> [Row; 3] {
+    std::array::from_fn(|q| std::array::from_fn(|l| steps[l][q]))
+}
+
+#[cold]
+#[inline(never)]
+fn padded_steps(steps: &[[f64; 3]], i: usize) -> [Row; 3] {
+    match steps.len().checked_sub(1) {
+        Some(last) => columns(&std::array::from_fn(|l| steps[(i + l).min(last)])),
+        None => [[0.0; LANES]; 3],
+    }
 }

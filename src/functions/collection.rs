@@ -347,28 +347,25 @@ impl Functions {
         out
     }
 
-    /// `integral sum_j (B_j theta_j)^2 dt` by the trapezoid rule, summed over the functions node by
-    /// node, plus `T x^2` for each scalar: G^2 of the paper when `theta` is the L2 gradient.
+    /// `integral sum_j (B_j theta_j)^2 dt` by the trapezoid rule, plus `T x^2` for each scalar: G^2 of the paper when
+    /// `theta` is the L2 gradient. Functions with one value a node are summed node by node.
     pub fn norm_squared(&self, theta: &[f64]) -> f64 {
-        let mut squares = vec![0.0; self.nodes];
-        let mut values = Vec::new();
-        for (function, range) in self.list.iter().zip(&self.ranges) {
+        let mut squares = Vec::new();
+        let mut others = 0.0;
+        let list = self.list.iter().zip(&self.grams);
+        for ((function, gram), range) in list.zip(&self.ranges) {
             let theta = &theta[range.clone()];
-            let values = match &function.design {
-                Design::Identity => theta,
-                design => {
-                    values.clear();
-                    values.resize(self.nodes, 0.0);
-                    design.multiply_add(theta, &mut values);
-                    &values
-                }
-            };
-            for (sum, value) in squares.iter_mut().zip(values) {
+            if !matches!(function.design, Design::Identity) {
+                others += gram.square(theta);
+                continue;
+            }
+            squares.resize(self.nodes, 0.0);
+            for (sum, value) in squares.iter_mut().zip(theta) {
                 *sum += value * value;
             }
         }
         let scalars = theta[self.scalar_range()].iter().map(|x| x * x);
-        let functions = trapezoid(&squares, self.step);
+        let functions = others + trapezoid(&squares, self.step);
         match self.scalars.is_empty() {
             true => functions,
             false => functions + self.duration() * scalars.sum::<f64>(),

@@ -2,6 +2,7 @@
 
 use super::Design;
 use nalgebra::DMatrix;
+use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CscMatrix, CsrMatrix, SparseEntry};
 
@@ -70,6 +71,25 @@ impl Gram {
             Gram::Factored { matrix, .. } => {
                 out.fill(0.0);
                 Design::Sparse(matrix.clone()).multiply_add(theta, out);
+            }
+        }
+    }
+
+    /// `theta^T G theta`, the square of the function's size.
+    pub fn square(&self, theta: &[f64]) -> f64 {
+        match self {
+            Gram::Diagonal(weights) => {
+                let terms = weights.iter().zip(theta);
+                terms.map(|(w, t)| w * t * t).sum()
+            }
+            // As |L^T theta|^2, in which nothing cancels.
+            Gram::Factored { factor, .. } => {
+                let columns = factor.l().col_iter();
+                let product = |column: &CscCol<'_, f64>| -> f64 {
+                    let entries = column.row_indices().iter().zip(column.values());
+                    entries.map(|(i, l)| l * theta[*i]).sum()
+                };
+                columns.map(|column| product(&column).powi(2)).sum()
             }
         }
     }

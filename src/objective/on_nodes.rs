@@ -16,11 +16,17 @@ impl Channel {
     /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
     /// nothing.
     #[inline(always)]
-    fn around_eight(&self, excitation: Option<&Excitation>, i: usize) -> [Row; 2] {
+    fn around_eight<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        excitation: Option<&Excitation>,
+        i: usize,
+    ) -> [Eight<A>; 2] {
+        if let Some(around) = self.surroundings() {
+            return [0, 1].map(|part| window::eight(arithmetic, &around[part], i));
+        }
         let mut rows = [[0.0; LANES]; 2];
-        if let Some([forces, bases]) = self.surroundings() {
-            rows = [window::row(forces, i), window::row(bases, i)];
-        } else if excitation.is_some() {
+        if excitation.is_some() {
             let [forces, bases] = &mut rows;
             let lanes = forces.iter_mut().zip(bases).enumerate();
             for (l, (force, base)) in lanes.take(self.len() - i) {
@@ -28,7 +34,7 @@ impl Channel {
                 (*force, *base) = (around.force, around.base);
             }
         }
-        rows
+        rows.map(|row| Eight::load(arithmetic, &row))
     }
 
     /// The accelerations on eight nodes from node `i` on.
@@ -45,7 +51,8 @@ impl Channel {
             device: view.device,
             states: view.motion,
         };
-        sight.see(arithmetic, i, self.around_eight(view.excitation, i), seen);
+        let around = self.around_eight(arithmetic, view.excitation, i);
+        sight.see(arithmetic, i, around, seen);
     }
 }
 
@@ -68,11 +75,10 @@ impl Kernel for Predict<'_> {
         for from in (0..channel.len()).step_by(LANES) {
             let count = LANES.min(channel.len() - from);
             channel.accelerations(arithmetic, view, from, &mut seen);
-            let base = match channel.base() {
-                [] => [0.0; LANES],
-                base => window::row(base, from),
-            };
-            let value = Eight::load(arithmetic, &seen.value) + Eight::load(arithmetic, &base);
+            let mut value = Eight::load(arithmetic, &seen.value);
+            if !channel.base().is_empty() {
+                value += window::eight(arithmetic, channel.base(), from);
+            }
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {
                 for (l, value) in row.iter_mut().enumerate().take(count) {

@@ -77,9 +77,10 @@ impl Kernel for Back<'_> {
             for i in (from..to).rev() {
                 let l = i - from;
                 (ends[0][l], ends[1][l]) = (x[0], x[1]);
+                // In pairs, of which neither waits for the other.
                 x = [
-                    x[0] + (yy[l] * x[0] + vy[l] * x[1] + source.displacement[i]),
-                    x[1] + (yv[l] * x[0] + vv[l] * x[1] + source.velocity[i]),
+                    (x[0] + vy[l] * x[1]) + (source.displacement[i] + yy[l] * x[0]),
+                    (x[1] + yv[l] * x[0]) + (source.velocity[i] + vv[l] * x[1]),
                 ];
             }
             let ends = [

@@ -63,3 +63,27 @@ impl Term {
         matches!(self, Term::Damping | Term::Stiffness)
     }
 }
+
+/// Calls with a list of terms that is known when this is compiled where it is one of the usual ones: what is said of each
+/// term is then laid out one after the other, without a choice. The constant is how many terms there are at most.
+macro_rules! with_known {
+    ($terms:expr, $known:ident, $most:ident => $call:expr) => {
+        match $terms {
+            [Term::Damping, Term::Stiffness] => {
+                const $most: usize = 2;
+                let $known: &[Term] = &[Term::Damping, Term::Stiffness];
+                $call
+            }
+            [Term::Damping, Term::Stiffness, Term::CubicStiffness] => {
+                const $most: usize = 3;
+                let $known: &[Term] = &[Term::Damping, Term::Stiffness, Term::CubicStiffness];
+                $call
+            }
+            $known => {
+                const $most: usize = MOST_TERMS;
+                $call
+            }
+        }
+    };
+}
+pub(super) use with_known;

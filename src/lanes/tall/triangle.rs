@@ -83,7 +83,11 @@ impl Triangle {
     fn reflect(&mut self, piece: &mut Piece, right: &[f64]) {
         let columns = &mut piece.columns[..=self.begun];
         // The right-hand side behind the columns that have begun: the others are zero.
-        columns[self.begun].as_flattened_mut()[..right.len()].copy_from_slice(right);
+        let to = columns[self.begun].as_flattened_mut();
+        match (to.first_chunk_mut::<PIECE>(), right.first_chunk::<PIECE>()) {
+            (Some(to), Some(right)) => *to = *right,
+            _ => to[..right.len()].copy_from_slice(right),
+        }
         for column in columns.iter_mut() {
             column.as_flattened_mut()[right.len()..].fill(0.0);
         }
