@@ -164,7 +164,9 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     );
     // Both are compared to the start values.
     assert_eq!(found.initial_cost, alone.initial_cost);
-    assert_eq!(found.initial_norm_squared, alone.initial_norm_squared);
+    // One by an adjoint, the other from tangents: sums of 40,000 parts in another order.
+    let relative = found.initial_norm_squared / alone.initial_norm_squared - 1.0;
+    assert!(relative.abs() <= 1e-12, "{relative}");
     for ((p, q), truth) in (found.best.parameters.iter())
         .zip(&alone.best.parameters)
         .zip(truth)

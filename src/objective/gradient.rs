@@ -43,14 +43,25 @@ impl Problem {
     /// # Panics
     /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
-        let (mut euclidean, mut l2) = match kind {
+        match kind {
             GradientKind::Discrete => {
-                let euclidean = self.discrete_gradient(evaluation);
-                let l2 = self.functions.gram_solve(&euclidean);
-                (euclidean, l2)
+                self.gradient_of_misfit(theta, self.discrete_gradient(evaluation))
             }
-            GradientKind::Continuous => self.continuous_gradient(evaluation),
-        };
+            GradientKind::Continuous => {
+                let (euclidean, l2) = self.continuous_gradient(evaluation);
+                self.completed(theta, euclidean, l2)
+            }
+        }
+    }
+
+    /// The gradient at `theta` from the Euclidean one of the misfit.
+    pub(crate) fn gradient_of_misfit(&self, theta: &[f64], misfit: Vec<f64>) -> Gradient {
+        let l2 = self.functions.gram_solve(&misfit);
+        self.completed(theta, misfit, l2)
+    }
+
+    /// The gradient at `theta` from that of the misfit in both inner products.
+    fn completed(&self, theta: &[f64], mut euclidean: Vec<f64>, mut l2: Vec<f64>) -> Gradient {
         if self.is_regularised() {
             let push = self.penalty_gradient(theta);
             let push_l2 = self.functions.gram_solve(&push);

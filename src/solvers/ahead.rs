@@ -5,8 +5,11 @@
 //! the adjoint solve, while this one goes along the tangents and reduces the rows of the Jacobian. After that the
 //! second thread goes on with reducing or, where there are so few columns that handing rows over takes as long as
 //! reducing them, finds the natural sizes. Who does what changes no bit.
+//!
+//! A long record with few parameters is cut in two, and each thread goes along the tangents of one half. Nothing more is
+//! needed for the gradient, so there is no adjoint solve, on one thread either.
 
-use super::gauss_newton::{FEW_PARAMETERS, Reduced, is_wide};
+use super::gauss_newton::{FEW_PARAMETERS, Half, Reduced, Which, halfway, is_wide};
 use super::{FitSettings, Point, Solver, Timings};
 use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
@@ -23,10 +26,12 @@ const WAITING: usize = 16;
 /// Entries of a Jacobian from which on two threads are quicker than one: it takes microseconds to hand over.
 const WORTH_SHARING: usize = 4000;
 
-/// The second thread of a search, and what it was for.
+/// The second thread of a search, if there is one, and what it was for.
 pub(crate) struct Ahead<'s, 'p> {
     problem: &'p Problem,
-    companion: Companion<'s, Job<'p>>,
+    companion: Option<Companion<'s, Job<'p>>>,
+    /// Where the record is cut in two.
+    halfway: Option<usize>,
     /// Readings linearised at these parameters.
     linearised: Option<(Vec<f64>, Reduced)>,
 }
@@ -52,6 +57,9 @@ struct Job<'p> {
     problem: &'p Problem,
     kind: GradientKind,
     input: Option<Arc<Input>>,
+    /// Where the record is cut in two, of which the second thread has the second half.
+    halfway: Option<usize>,
+    half: Option<Half>,
     handed: Option<Receiver<Handed>>,
     /// The way back for pieces without rows.
     empty: Option<Sender<Piece>>,
@@ -63,7 +71,19 @@ struct Job<'p> {
 
 impl Job<'_> {
     fn run(&mut self) {
-        let (Some(input), Some(handed)) = (self.input.take(), self.handed.take()) else {
+        let Some(input) = self.input.take() else {
+            return;
+        };
+        if let Some(halfway) = self.halfway {
+            self.half = Some(Half::of(
+                self.problem,
+                &input.evaluation,
+                halfway,
+                Which::Second,
+            ));
+            return;
+        }
+        let Some(handed) = self.handed.take() else {
             return;
         };
         let clock = Instant::now();
@@ -98,7 +118,7 @@ impl Job<'_> {
 }
 
 impl<'s, 'p> Ahead<'s, 'p> {
-    /// For a search by these settings; `None` where one thread is as good.
+    /// For a search by these settings; `None` where there is nothing to be made ahead, or one thread is as good.
     pub fn new(
         scope: &'s Scope<'s, 'p>,
         problem: &'p Problem,
@@ -107,23 +127,27 @@ impl<'s, 'p> Ahead<'s, 'p> {
         let parameters = problem.parameters();
         let is_wanted = settings.solver == Solver::GaussNewton
             && parameters <= FEW_PARAMETERS
-            && problem.reading_count() * parameters >= WORTH_SHARING
-            && Reduced::comes_in_pieces(problem)
-            && threads::spare();
-        is_wanted.then_some(())?;
-        Self::with(scope, problem, settings)
+            && Reduced::comes_in_pieces(problem);
+        let is_shared = problem.reading_count() * parameters >= WORTH_SHARING && threads::spare();
+        let ahead = is_wanted.then(|| Self::with(is_shared.then_some(scope), problem, settings))?;
+        (ahead.companion.is_some() || ahead.is_halved()).then_some(ahead)
     }
 
-    /// [`Ahead::new`], whether it is worth it or not; `None` if the system has no thread to give.
+    /// [`Ahead::new`], whether it is worth it or not; with a second thread if there is a scope, and the system has one to
+    /// give.
     fn with(
-        scope: &'s Scope<'s, 'p>,
+        scope: Option<&'s Scope<'s, 'p>>,
         problem: &'p Problem,
         settings: &FitSettings,
-    ) -> Option<Self> {
+    ) -> Self {
+        let is_exact = settings.gradient == GradientKind::Discrete;
+        let halfway = halfway(problem).filter(|_| is_exact);
         let job = Job {
             problem,
             kind: settings.gradient,
             input: None,
+            halfway,
+            half: None,
             handed: None,
             empty: None,
             gradient: None,
@@ -131,11 +155,17 @@ impl<'s, 'p> Ahead<'s, 'p> {
             reduced: None,
             adjoint: Duration::ZERO,
         };
-        Some(Self {
+        Self {
             problem,
-            companion: Companion::within(scope, job, Job::run)?,
+            companion: scope.and_then(|scope| Companion::within(scope, job, Job::run)),
+            halfway,
             linearised: None,
-        })
+        }
+    }
+
+    /// Whether the record is cut in two, so that points need tangents and no adjoint.
+    pub fn is_halved(&self) -> bool {
+        self.halfway.is_some()
     }
 
     /// The point that an evaluation belongs to; the readings are then linearised, too. If the second thread has not
@@ -147,6 +177,12 @@ impl<'s, 'p> Ahead<'s, 'p> {
         timings: &mut Timings,
     ) -> Result<Point, (Vec<f64>, Evaluation)> {
         self.linearised = None;
+        if let Some(halfway) = self.halfway {
+            return self.point_by_halves(halfway, parameters, evaluation, timings);
+        }
+        let Some(companion) = &mut self.companion else {
+            return Err((parameters, evaluation));
+        };
         let clock = Instant::now();
         let problem = self.problem;
         let input = Arc::new(Input {
@@ -157,7 +193,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
         let its = Arc::clone(&input);
         let (hand, handed) = mpsc::sync_channel(WAITING);
         let (empty, again) = mpsc::channel();
-        let found = self.companion.with(
+        let found = companion.with(
             |job| {
                 job.input = Some(its);
                 (job.handed, job.empty) = (Some(handed), Some(empty));
@@ -187,6 +223,46 @@ impl<'s, 'p> Ahead<'s, 'p> {
             return Err((parameters, evaluation));
         };
         self.linearised = reduced.map(|reduced| (parameters.clone(), reduced));
+        Ok(Point::new(parameters, evaluation, gradient).with_sizes(sizes))
+    }
+
+    /// [`Ahead::point`] of a record that is cut in two.
+    fn point_by_halves(
+        &mut self,
+        halfway: usize,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+        timings: &mut Timings,
+    ) -> Result<Point, (Vec<f64>, Evaluation)> {
+        let clock = Instant::now();
+        let problem = self.problem;
+        let input = Arc::new(Input {
+            parameters,
+            evaluation,
+            is_free: AtomicBool::new(false),
+        });
+        let half = |which| Half::of(problem, &input.evaluation, halfway, which);
+        let own = || (half(Which::First), problem.natural_sizes(&input.evaluation));
+        let ((first, sizes), second) = match &mut self.companion {
+            None => (own(), None),
+            Some(companion) => companion.with(
+                |job| job.input = Some(Arc::clone(&input)),
+                own,
+                |own, job| (own, job.half.take()),
+            ),
+        };
+        let reduced = first.join(&second.unwrap_or_else(|| half(Which::Second)));
+        timings.tangent += clock.elapsed();
+        let Input {
+            parameters,
+            evaluation,
+            ..
+        } = Arc::into_inner(input).expect("the second thread has given it back");
+        let Some(misfit) = reduced.misfit_gradient() else {
+            return Err((parameters, evaluation));
+        };
+        let gradient = problem.gradient_of_misfit(&parameters, misfit);
+        self.linearised = Some((parameters.clone(), reduced));
         Ok(Point::new(parameters, evaluation, gradient).with_sizes(sizes))
     }
 
@@ -229,8 +305,8 @@ fn along(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{Grid, Method, Oscillator, State, Term};
-    use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+    use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
+    use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
     use crate::objective::{Channel, Weighting};
     use crate::problem::Experiment;
     use crate::solvers::{Fit, fit};
@@ -283,7 +359,8 @@ mod tests {
             let alone = threads::sharing(|| fitted(&problem));
             let settings = FitSettings::default();
             std::thread::scope(|scope| {
-                let mut ahead = Ahead::with(scope, &problem, &settings).expect("a thread");
+                let mut ahead = Ahead::with(Some(scope), &problem, &settings);
+                assert!(ahead.companion.is_some() && !ahead.is_halved());
                 let evaluation = problem.evaluate(&problem.start()).expect("a motion");
                 let gradient = problem.gradient(&problem.start(), &evaluation, settings.gradient);
                 let mut timings = Timings::default();
@@ -301,5 +378,107 @@ mod tests {
             assert_eq!(together.counts, alone.counts);
             assert!(together.best.parameters == alone.best.parameters);
         }
+    }
+
+    /// A driven oscillator over a long record, of which displacements are read at every seventh node and accelerations at
+    /// every one; its velocity at the start is sought as well.
+    fn long_problem() -> Problem {
+        let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
+        let nodes = grid.nodes();
+        let constant = |quantity, start| CoefficientFunction::constant(quantity, start, nodes);
+        let list = vec![
+            constant(Quantity::Mass, 1.1),
+            constant(Quantity::Damping, 0.3),
+            constant(Quantity::Stiffness, 2.2),
+        ];
+        let speed = Scalar {
+            name: "speed".into(),
+            unit: "m/s".into(),
+            start: 0.1,
+            size: 1.0,
+            prior: None,
+        };
+        let functions = Functions::new(list, nodes, grid.step()).expect("functions");
+        let times = grid.times();
+        let force: Vec<f64> = times
+            .iter()
+            .map(|t| (0.9 * t).sin() + (1.7 * t).cos())
+            .collect();
+        let read = |t: &f64| (0.9 * t).cos() - (1.7 * t).sin();
+        let weighting = || Weighting::Sigma(0.1);
+        let accelerations = Channel::new(
+            ChannelKind::Acceleration,
+            times.clone(),
+            times.iter().map(read).collect(),
+            weighting(),
+            &grid,
+            nodes,
+        );
+        let sevenths = times.iter().step_by(7).map(read).collect();
+        let record = Experiment {
+            sought: [None, Some(0)],
+            ..Experiment::free("driven", State::default(), nodes)
+                .with_excitation(Excitation::force_at_nodes(&force))
+                .with_channel(Channel::displacement_at_nodes(
+                    sevenths,
+                    7,
+                    weighting(),
+                    &grid,
+                ))
+                .with_channel(accelerations.expect("readings"))
+        };
+        let oscillator = Oscillator {
+            grid,
+            method: Method::Rk4,
+            terms: vec![Term::Damping, Term::Stiffness],
+        };
+        Problem::new(
+            oscillator,
+            functions.with_scalars(vec![speed]),
+            vec![record],
+        )
+    }
+
+    /// Both halves together say what the whole record says, and what the adjoint does.
+    #[test]
+    fn halves_of_a_long_record() {
+        let problem = long_problem();
+        let theta = problem.start();
+        let halfway = halfway(&problem).expect("it is long");
+        let evaluation = problem.evaluate(&theta).expect("a motion");
+        let half = |which| Half::of(&problem, &evaluation, halfway, which);
+        let joined = half(Which::First).join(&half(Which::Second));
+        let order = problem.places();
+        let mut whole = Reduced::new(&problem, &evaluation, order.clone());
+        problem.each_piece(&evaluation, &order, |mut piece| {
+            whole.add(&mut piece);
+            piece
+        });
+        let solution = |reduced: &Reduced| reduced.solution().expect("four independent columns");
+        for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
+            assert!(
+                (joined - whole).abs() <= 1e-11 * whole.abs(),
+                "{joined} {whole}"
+            );
+        }
+        let found = joined.misfit_gradient().expect("finite numbers");
+        let expected = problem.gradient(&theta, &evaluation, GradientKind::Discrete);
+        for (found, expected) in found.iter().zip(&expected.euclidean) {
+            assert!(
+                (found - expected).abs() <= 1e-11 * expected.abs(),
+                "{found} {expected}"
+            );
+        }
+    }
+
+    /// On one thread and on two the same, to the last bit.
+    #[test]
+    fn a_long_record_on_two_threads() {
+        let problem = long_problem();
+        let alone = threads::sharing(|| fitted(&problem));
+        let together = fitted(&problem);
+        assert!(together.history == alone.history && !together.history.is_empty());
+        assert_eq!(together.counts, alone.counts);
+        assert_eq!(together.best.parameters, alone.best.parameters);
     }
 }

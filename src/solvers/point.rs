@@ -132,8 +132,19 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             true => problem.evaluate_in_order_into(&parameters, &mut evaluation)?,
             false => problem.evaluate_into(&parameters, &mut evaluation)?,
         }
-        let gradient = problem.gradient(&parameters, &evaluation, self.kind);
+        let by_halves = || {
+            let reduced = Reduced::at(problem, &evaluation, &mut Timings::default());
+            let misfit = reduced.misfit_gradient()?;
+            Some(problem.gradient_of_misfit(&parameters, misfit))
+        };
+        let gradient = (self.is_halved().then(by_halves).flatten())
+            .unwrap_or_else(|| problem.gradient(&parameters, &evaluation, self.kind));
         Ok(Point::new(parameters, evaluation, gradient))
+    }
+
+    /// Whether points are completed by tangents, and not by an adjoint.
+    fn is_halved(&self) -> bool {
+        self.ahead.as_ref().is_some_and(Ahead::is_halved)
     }
 
     /// The motions at a point that was there before, computed again without counting.
@@ -176,6 +187,13 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
         })
     }
 
+    /// Counts the tangent solves of a linearisation, where those of its point have not been counted.
+    pub fn count_linearisation(&mut self, solves: u64) {
+        if !self.is_halved() {
+            self.count_tangents(solves);
+        }
+    }
+
     /// Counts tangent solves.
     pub fn count_tangents(&mut self, solves: u64) {
         *self.problem.counts.entry(TANGENT).or_insert(0) += solves;
@@ -203,7 +221,10 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             None => (parameters, evaluation),
             Some(ahead) => match ahead.point(parameters, evaluation, &mut self.timings) {
                 Ok(point) => {
-                    *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
+                    match self.is_halved() {
+                        true => self.count_tangents(point.parameters.len() as u64),
+                        false => *self.problem.counts.entry(ADJOINT).or_insert(0) += 1,
+                    }
                     return point;
                 }
                 Err(back) => back,

@@ -116,6 +116,42 @@ impl Triangle {
         })
     }
 
+    /// Adds the rows of another triangle, whose columns, places `0..n` and two more, answer to those of this one by `1`, and
+    /// by `states` those two.
+    pub fn join(&mut self, other: &Triangle, states: &[[f64; 2]]) {
+        let n = self.rows.len();
+        let mut piece = Piece::new(n);
+        piece.restart(0);
+        piece.count = other.begun;
+        piece.widen(n);
+        let mut right = Vec::with_capacity(other.begun);
+        for (i, (entries, b)) in other.rows().enumerate() {
+            for (place, r) in entries {
+                if place < n {
+                    piece.column_mut(place)[i] += r;
+                    continue;
+                }
+                for (own, state) in states.iter().take(n).enumerate() {
+                    piece.column_mut(own)[i] += r * state[place - n];
+                }
+            }
+            right.push(b);
+        }
+        self.add(&mut piece, &right);
+        self.rest += other.rest;
+    }
+
+    /// `R' b`, which is `(D A)' d`.
+    pub fn products(&self) -> Vec<f64> {
+        let mut products = vec![0.0; self.rows.len()];
+        for (entries, b) in self.rows() {
+            for (place, r) in entries {
+                products[place] += r * b;
+            }
+        }
+        products
+    }
+
     /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
     pub fn solve(&self, independent: f64) -> Option<Vec<f64>> {
         let n = self.rows.len();

@@ -3,11 +3,22 @@
 use super::Channel;
 use crate::dynamics::quadrature::trapezoid_weights_at;
 use crate::objective::{Loss, Weighting};
+use std::ops::Range;
 
 impl Channel {
     /// Residuals `r = model - reading`, one per reading.
     pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         predicted.iter().zip(&self.observed).map(|(y, o)| y - o)
+    }
+
+    /// The residuals of some readings.
+    pub(crate) fn residuals_of<'a>(
+        &'a self,
+        predicted: &'a [f64],
+        readings: Range<usize>,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let pairs = predicted[readings.clone()].iter();
+        pairs.zip(&self.observed[readings]).map(|(y, o)| y - o)
     }
 
     /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or

@@ -5,12 +5,14 @@ mod reader;
 
 use super::{Channel, Evaluation, View};
 use crate::dynamics::{Course, TILE};
+use crate::lanes::LANES;
 use crate::lanes::sum::are_finite;
 use crate::lanes::tall::Piece;
 use crate::problem::{Experiment, Problem};
 use moving::Moving;
 use nalgebra::DMatrix;
 use reader::Reader;
+use std::ops::Range;
 
 impl Problem {
     /// The change of every prediction (rows: readings of all channels of all experiments, in order)
@@ -82,10 +84,35 @@ impl Problem {
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.reading_count() > 0 && !order.is_empty() {
                 let view = self.view(evaluation, e);
-                sweep(self, experiment, view, order, row, &mut take);
+                let all = 0..experiment.nodes - 1;
+                sweep(self, experiment, view, order, row, all, &mut take);
             }
             row += experiment.reading_count();
         }
+    }
+
+    /// Where the only record of a problem is cut into two halves that can be gone through at once: at the end of a
+    /// tile. `None` if there are several, or the one is short.
+    pub(crate) fn halfway(&self) -> Option<usize> {
+        let [experiment] = self.experiments.as_slice() else {
+            return None;
+        };
+        let steps = experiment.nodes - 1;
+        (steps >= LONG).then(|| steps / 2 / TILE * TILE)
+    }
+
+    /// [`Problem::each_piece`] for the readings in some steps of the only record, which begin with a tile, and how
+    /// displacement and velocity at their end answer to each place. Later steps than the first do not know how the
+    /// state that they set out from answers: that state has two places of its own, behind the others.
+    pub(crate) fn each_piece_of_part(
+        &self,
+        evaluation: &Evaluation,
+        order: &[usize],
+        steps: Range<usize>,
+        mut take: impl FnMut(Piece) -> Piece,
+    ) -> Vec<[f64; 2]> {
+        let (experiment, view) = (&self.experiments[0], self.view(evaluation, 0));
+        sweep(self, experiment, view, order, 0, steps, &mut take)
     }
 
     /// What the sensors that are sought add to a Jacobian, and what the filters make of it.
@@ -101,22 +128,33 @@ impl Problem {
     }
 }
 
-/// Goes through the motion of one experiment, whose first reading has the row `row`.
+/// Steps from which on a record is long.
+const LONG: usize = 1 << 15;
+
+/// Goes through some steps of the motion of one experiment, whose first reading has the row `row`: how displacement and
+/// velocity at the end answer to each place.
 fn sweep(
     problem: &Problem,
     experiment: &Experiment,
     view: View,
     order: &[usize],
     mut row: usize,
+    steps: Range<usize>,
     take: &mut impl FnMut(Piece) -> Piece,
-) {
+) -> Vec<[f64; 2]> {
     let moving = Moving::new(&problem.functions, order, experiment);
-    let mut tangents = moving.tangents();
+    let is_later = steps.start > 0;
+    let places = order.len() + if is_later { 2 } else { 0 };
+    let mut tangents = match is_later {
+        false => moving.tangents(),
+        true => moving.tangents_from_any_state(),
+    };
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
-        let mut piece = Piece::new(order.len());
-        piece.restart(row);
-        readers.push((Reader::new(channel, view), piece));
+        let first = channel.places().partition_point(|p| p.step < steps.start);
+        let mut piece = Piece::new(places);
+        piece.restart(row + first);
+        readers.push((Reader::new(channel, view, first), piece));
         row += channel.len();
     }
     let mut give = |piece: &mut Piece| {
@@ -131,17 +169,18 @@ fn sweep(
         excitation: view.excitation,
         motion: view.motion,
     };
-    let steps = view.motion.nodes() - 1;
-    let mut from = 0;
-    while from < steps {
-        let to = (from + TILE).min(steps);
-        moving.fill(&mut tangents, from);
+    let mut from = steps.start;
+    let mut last = 0;
+    while from < steps.end {
+        let to = (from + TILE).min(steps.end);
+        moving.fill(&mut tangents, from, from == steps.start);
         tangents.advance(course, from..to);
         for (reader, piece) in &mut readers {
             while reader.read(&tangents, from..to, piece) {
                 give(piece);
             }
         }
+        last = to - from;
         from = to;
     }
     for (_, piece) in &mut readers {
@@ -149,6 +188,11 @@ fn sweep(
             give(piece);
         }
     }
+    let end = |place: usize| {
+        let [y, v] = tangents.states(place / LANES)[last];
+        [y[place % LANES], v[place % LANES]]
+    };
+    (0..places).map(end).collect()
 }
 
 /// What the sensor of one channel adds to its rows, from `row` on, and what its filter makes of them.

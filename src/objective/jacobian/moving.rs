@@ -12,6 +12,8 @@ pub(super) struct Moving<'a> {
     groups: usize,
     /// Initial states that are sought: which, and their places.
     seeds: Vec<(usize, usize)>,
+    /// How many places there are.
+    places: usize,
 }
 
 struct Part<'a> {
@@ -65,6 +67,7 @@ impl<'a> Moving<'a> {
             seeds: seeds.collect(),
             slots,
             groups: order.len().div_ceil(LANES),
+            places: order.len(),
         }
     }
 
@@ -76,13 +79,23 @@ impl<'a> Moving<'a> {
         Tangents::new(self.slots.clone(), &initial)
     }
 
-    /// How the functions change at the nodes of the tile from node `first` on.
-    pub fn fill(&self, tangents: &mut Tangents, first: usize) {
+    /// From a state of which nothing is known: it has two places behind the others.
+    pub fn tangents_from_any_state(&self) -> Tangents {
+        let mut initial = vec![[[0.0; LANES]; 2]; (self.places + 2).div_ceil(LANES)];
+        for state in 0..2 {
+            let place = self.places + state;
+            initial[place / LANES][state][place % LANES] = 1.0;
+        }
+        Tangents::new(self.slots.clone(), &initial)
+    }
+
+    /// How the functions change at the nodes of the tile from node `first` on, and whether it is the first of all.
+    pub fn fill(&self, tangents: &mut Tangents, first: usize, is_first: bool) {
         for part in &self.parts {
             if !part.constant {
                 part.slots.iter().for_each(|slot| tangents.rest(*slot));
                 part.fill(tangents, first);
-            } else if first == 0 {
+            } else if is_first {
                 part.hold(tangents);
             }
         }

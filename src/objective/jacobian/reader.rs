@@ -58,7 +58,8 @@ impl Glance {
 }
 
 impl<'a> Reader<'a> {
-    pub fn new(channel: &'a Channel, view: View<'a>) -> Self {
+    /// From reading `next` on.
+    pub fn new(channel: &'a Channel, view: View<'a>, next: usize) -> Self {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
             kind: match () {
@@ -68,7 +69,7 @@ impl<'a> Reader<'a> {
             },
             channel,
             view,
-            next: 0,
+            next,
             gain,
             glance: Glance::NOTHING,
         }

@@ -1,12 +1,13 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
 use crate::lanes::LANES;
-use crate::lanes::tall::{Piece, Triangle};
-use crate::objective::Evaluation;
+use crate::lanes::tall::{PIECE, Piece, Triangle};
+use crate::objective::{Channel, Evaluation};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::solvers::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// How the residuals of the readings of all channels are weighed.
@@ -20,27 +21,48 @@ struct Residuals {
 impl Residuals {
     /// At an evaluated point.
     fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let mut roots = Vec::with_capacity(problem.reading_count());
-        let mut weighted = Vec::with_capacity(problem.reading_count());
+        let mut all = Self::with_capacity(problem.reading_count());
         for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
             for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-                let first = roots.len();
-                match channel.uniform_weights() {
-                    Some([inner, ends]) => {
-                        roots.resize(first + channel.len(), inner.sqrt());
-                        let last = roots.len() - 1;
-                        (roots[first], roots[last]) = (ends.sqrt(), ends.sqrt());
-                    }
-                    None => {
-                        let each = channel.residuals(predicted).enumerate();
-                        roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
-                    }
-                }
-                let pairs = channel.residuals(predicted).zip(&roots[first..]);
-                weighted.extend(pairs.map(|(r, root)| root * r));
+                all.push(channel, predicted, 0..channel.len());
             }
         }
-        Self { roots, weighted }
+        all
+    }
+
+    fn with_capacity(readings: usize) -> Self {
+        Self {
+            roots: Vec::with_capacity(readings),
+            weighted: Vec::with_capacity(readings),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.roots.clear();
+        self.weighted.clear();
+    }
+
+    /// Adds some readings of a channel.
+    fn push(&mut self, channel: &Channel, predicted: &[f64], readings: Range<usize>) {
+        let Self { roots, weighted } = self;
+        let first = roots.len();
+        let residuals = || channel.residuals_of(predicted, readings.clone());
+        match channel.uniform_weights() {
+            Some([inner, ends]) => {
+                roots.resize(first + readings.len(), inner.sqrt());
+                for end in [0, channel.len() - 1] {
+                    if readings.contains(&end) {
+                        roots[first + end - readings.start] = ends.sqrt();
+                    }
+                }
+            }
+            None => {
+                let each = readings.clone().zip(residuals());
+                roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
+            }
+        }
+        let pairs = residuals().zip(&roots[first..]);
+        weighted.extend(pairs.map(|(r, root)| root * r));
     }
 }
 
@@ -95,8 +117,14 @@ impl Reduced {
     }
 
     /// All rows, piece by piece.
-    fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
+    pub fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
         let clock = Instant::now();
+        if let Some(halfway) = halfway(problem) {
+            let [first, second] =
+                [First, Second].map(|which| Half::of(problem, evaluation, halfway, which));
+            timings.tangent += clock.elapsed();
+            return first.join(&second);
+        }
         let order = problem.places();
         let mut reduced = Self::new(problem, evaluation, order.clone());
         problem.each_piece(evaluation, &order, |mut piece| {
@@ -106,6 +134,96 @@ impl Reduced {
         timings.linear_algebra += reduced.took;
         timings.tangent += clock.elapsed().saturating_sub(reduced.took);
         reduced
+    }
+
+    /// The step to the minimum, less the sign, in the order of the columns.
+    #[cfg(test)]
+    pub fn solution(&self) -> Option<Vec<f64>> {
+        self.triangle.solve(1e-14)
+    }
+
+    /// The gradient of the misfit; `None` where a number has left its range.
+    pub fn misfit_gradient(&self) -> Option<Vec<f64>> {
+        let mut gradient = vec![0.0; self.order.len()];
+        for (product, j) in self.triangle.products().into_iter().zip(&self.order) {
+            gradient[*j] = 2.0 * product;
+        }
+        let is_finite = self.triangle.is_finite() && gradient.iter().all(|g| g.is_finite());
+        is_finite.then_some(gradient)
+    }
+}
+
+/// Which part of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Which {
+    First,
+    Second,
+}
+use Which::{First, Second};
+
+/// Where a problem's record is cut in two, whose readings are linearised and reduced each by itself: where it is long, and
+/// there are few parameters. Two threads can do that at once, and nothing more is needed for the gradient.
+pub(crate) fn halfway(problem: &Problem) -> Option<usize> {
+    let is_narrow = !is_wide(problem.parameters()) && Reduced::comes_in_pieces(problem);
+    problem.halfway().filter(|_| is_narrow)
+}
+
+/// The readings of one half of a record, linearised and reduced.
+pub(crate) struct Half {
+    triangle: Triangle,
+    /// The parameter of each column.
+    order: Vec<usize>,
+    /// How the state at its end answers to each parameter, in the order of the columns.
+    states: Vec<[f64; 2]>,
+}
+
+impl Half {
+    /// Of a record that is cut at the step `halfway`.
+    pub fn of(problem: &Problem, evaluation: &Evaluation, halfway: usize, which: Which) -> Self {
+        let order = problem.places();
+        let experiment = &problem.experiments[0];
+        // The state that the second half sets out from has columns of its own.
+        let (steps, columns) = match which {
+            First => (0..halfway, order.len()),
+            Second => (halfway..experiment.nodes - 1, order.len() + 2),
+        };
+        let mut triangle = Triangle::new(columns);
+        let mut residuals = Residuals::with_capacity(PIECE);
+        let states = problem.each_piece_of_part(evaluation, &order, steps, |mut piece| {
+            // All rows of a piece are of one channel.
+            let mut first = piece.first;
+            let mut of = experiment.channels.iter().zip(&evaluation.predictions[0]);
+            let channel = of.find(|(channel, _)| match first.checked_sub(channel.len()) {
+                Some(rest) => {
+                    first = rest;
+                    false
+                }
+                None => true,
+            });
+            if let Some((channel, predicted)) = channel {
+                residuals.clear();
+                residuals.push(channel, predicted, first..first + piece.count);
+                triangle.add_weighted(&mut piece, &residuals.roots, &residuals.weighted);
+            }
+            piece
+        });
+        Self {
+            triangle,
+            order,
+            states,
+        }
+    }
+
+    /// Both halves as one: the second sets out from the state at the end of the first.
+    pub fn join(self, second: &Half) -> Reduced {
+        let mut triangle = self.triangle;
+        triangle.join(&second.triangle, &self.states);
+        Reduced {
+            triangle,
+            order: self.order,
+            residuals: Residuals::with_capacity(0),
+            took: Duration::ZERO,
+        }
     }
 }
 

@@ -9,7 +9,7 @@
 mod dense;
 mod structured;
 
-pub(crate) use dense::{Reduced, is_wide, weighted_jacobian};
+pub(crate) use dense::{Half, Reduced, Which, halfway, is_wide, weighted_jacobian};
 
 use super::infeasible::no_step;
 use super::point::Work;
@@ -297,7 +297,7 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
 /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
 fn linearise(work: &mut Work, point: &Point) -> Subproblem {
     let problem = work.problem();
-    work.count_tangents(linearisation_tangents(problem));
+    work.count_linearisation(linearisation_tangents(problem));
     let ahead = work.linearised(&point.parameters);
     linearise_from(problem, point, ahead, &mut work.timings).0
 }
