@@ -7,7 +7,7 @@
 use super::maps::{self, FUNCTIONS, Maps};
 use super::stages::Rhs;
 use super::{Device, Excitation, Method, Oscillator, Trajectory};
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use std::ops::Range;
 
 /// Steps of a tile.
@@ -56,16 +56,16 @@ pub(crate) struct Tangents {
     slots: Vec<Slot>,
     of_group: Vec<Range<usize>>,
     wanted: [bool; FUNCTIONS],
-    changes: Vec<[Row; TILE_NODES]>,
+    changes: Vec<Aligned<[Row; TILE_NODES]>>,
     /// Whether a slot's function changes in this tile.
     moves: Vec<bool>,
     /// The slots whose functions change by the same in all tiles.
     steady: Vec<Option<Steady>>,
-    states: Vec<[[Row; 2]; TILE_NODES]>,
+    states: Vec<Aligned<[[Row; 2]; TILE_NODES]>>,
     /// Whether a group has been anything but zero.
     begun: Vec<bool>,
     /// What constants push displacement and velocity of each group by in eight steps: one direction a row.
-    held: Vec<[[Row; LANES]; 2]>,
+    held: Vec<Aligned<[[Row; LANES]; 2]>>,
     maps: Maps,
 }
 
@@ -86,21 +86,21 @@ impl Tangents {
         let range = |g: usize| {
             slots.partition_point(|s| s.group < g)..slots.partition_point(|s| s.group <= g)
         };
-        let mut states = vec![[[[0.0; LANES]; 2]; TILE_NODES]; initial.len()];
+        let mut states = vec![Aligned([[[0.0; LANES]; 2]; TILE_NODES]); initial.len()];
         for (states, initial) in states.iter_mut().zip(initial) {
             states[TILE] = *initial;
         }
         Self {
             of_group: groups.map(range).collect(),
             wanted: std::array::from_fn(|f| slots.iter().any(|s| s.function == f)),
-            changes: vec![[[0.0; LANES]; TILE_NODES]; slots.len()],
+            changes: vec![Aligned([[0.0; LANES]; TILE_NODES]); slots.len()],
             moves: vec![false; slots.len()],
             steady: vec![None; slots.len()],
             slots,
             begun: (initial.iter())
                 .map(|states| states.as_flattened().iter().any(|x| *x != 0.0))
                 .collect(),
-            held: vec![[[[0.0; LANES]; LANES]; 2]; initial.len()],
+            held: vec![Aligned([[[0.0; LANES]; LANES]; 2]); initial.len()],
             maps: Maps::NOTHING,
             states,
         }
@@ -236,10 +236,10 @@ impl Kernel for Advance<'_> {
                     }
                 }
                 let held = match holds {
-                    true => [
+                    true => Aligned([
                         arithmetic.transpose(&held[0]),
                         arithmetic.transpose(&held[1]),
-                    ],
+                    ]),
                     false => *held,
                 };
                 let pushes = Pushes {
@@ -280,7 +280,7 @@ struct Pushes<'a> {
     /// The slots of all other functions.
     moving: &'a [usize],
     slots: &'a [Slot],
-    changes: &'a [[Row; TILE_NODES]],
+    changes: &'a [Aligned<[Row; TILE_NODES]>],
 }
 
 /// Carries a group over up to eight steps.

@@ -19,7 +19,7 @@ mod tests;
 use crate::error::{InputError, Place};
 use crate::near::nearest;
 use portable::Portable;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
 
 /// Number of lanes.
@@ -27,6 +27,28 @@ pub(crate) const LANES: usize = 8;
 
 /// One value a lane, in memory.
 pub(crate) type Row = [f64; LANES];
+
+/// What lies on a boundary of 64 bytes, so that no row in it stands across two lines of the processor's memory: to read a
+/// row that has just been written takes several times as long there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Aligned<T>(pub T);
+
+impl<T> Deref for Aligned<T> {
+    type Target = T;
+
+    #[inline(always)]
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Aligned<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
 
 /// Arithmetic on [`LANES`] numbers at once.
 pub(crate) trait Arithmetic: Copy {

@@ -88,6 +88,9 @@ fn wrong(place: Place, problem: &str, field: &str, decimal: char) -> InputError 
     if field.contains('\n') {
         return error.hint("a quote that is opened in this row is not closed in it");
     }
+    if is_clock(field) {
+        return error.hint("write times in seconds: dates and times of day are not read");
+    }
     let other = if decimal == '.' { ',' } else { '.' };
     match parse(field, other) {
         Some(_) if field.contains(other) => error.hint(match decimal {
@@ -98,9 +101,35 @@ fn wrong(place: Place, problem: &str, field: &str, decimal: char) -> InputError 
     }
 }
 
+/// Whether it looks like a date or a time of day, as `12:00:01.5` or `2026-03-01T12:00`.
+pub fn is_clock(field: &str) -> bool {
+    let belongs = |c: char| c.is_ascii_digit() || ":-/., TZ+".contains(c);
+    let signs = |sign: char| field.chars().filter(|c| *c == sign).count();
+    field.len() <= LONGEST
+        && field.starts_with(|c: char| c.is_ascii_digit())
+        && field.chars().all(belongs)
+        && (field.contains(':') || signs('-') == 2 || signs('/') == 2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dates_and_times_of_day() {
+        for field in [
+            "12:00:01.5",
+            "9:30",
+            "2026-03-01T12:00:00Z",
+            "2026-03-01",
+            "1/3/2026",
+        ] {
+            assert!(is_clock(field), "{field}");
+        }
+        for field in ["12.5", "1e-3-2-", "-1", "a:b", "", ":", "1-2", "3/4"] {
+            assert!(!is_clock(field), "{field}");
+        }
+    }
 
     #[test]
     fn fields_say_what_they_are() {

@@ -341,22 +341,27 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
     Ok(())
 }
 
-/// Predictions as a table: the initial state, the cost against the truth, the energy of the true
+/// Predictions as a table: the initial state and, where a truth is known, the cost against it and the energy of the true
 /// motion.
 pub fn prediction_table(predictions: &[Prediction]) -> String {
-    let mut text = format!(
-        "{:>12} {:>12} {:>14} {:>14}\n",
-        "y(0) m", "v(0) m/s", "cost m^2 s", "energy m^2 s"
-    );
+    let has_truth = predictions
+        .iter()
+        .any(|p| p.cost.is_some() || p.energy.is_some());
+    let row = |state: [&str; 2], truth: [&str; 2]| {
+        let mut row = format!("{:>12} {:>12}", state[0], state[1]);
+        if has_truth {
+            let _ = write!(row, " {:>14} {:>14}", truth[0], truth[1]);
+        }
+        row + "\n"
+    };
+    let mut text = row(["y(0) m", "v(0) m/s"], ["cost m^2 s", "energy m^2 s"]);
     for p in predictions {
+        let state = [p.displacement, p.velocity].map(|x| significant(x, 6));
         let known = |x: Option<f64>| x.map_or("unknown".into(), |x| format!("{x:.5e}"));
-        let _ = writeln!(
-            text,
-            "{:>12} {:>12} {:>14} {:>14}",
-            significant(p.displacement, 6),
-            significant(p.velocity, 6),
-            known(p.cost),
-            known(p.energy)
+        let truth = [p.cost, p.energy].map(known);
+        text += &row(
+            state.each_ref().map(String::as_str),
+            truth.each_ref().map(String::as_str),
         );
         if let Some(failure) = &p.failure {
             let _ = writeln!(text, "{:>12} no motion: {failure}", "");

@@ -3,7 +3,7 @@
 mod piece;
 mod triangle;
 
-use super::{LANES, Row};
+use super::{Aligned, LANES, Row};
 pub(crate) use piece::{PIECE, Piece};
 pub(crate) use triangle::Triangle;
 
@@ -11,4 +11,4 @@ pub(crate) use triangle::Triangle;
 const HIGH: usize = 12;
 
 /// A column of a piece.
-type Column = [Row; HIGH];
+type Column = Aligned<[Row; HIGH]>;

@@ -1,6 +1,6 @@
 //! Some rows of a tall matrix.
 
-use super::{Column, HIGH, LANES};
+use super::{Aligned, Column, HIGH, LANES};
 
 /// Most rows of a piece.
 pub(crate) const PIECE: usize = HIGH * LANES;
@@ -25,14 +25,14 @@ impl Piece {
             first: 0,
             count: 0,
             begun: places,
-            columns: vec![[[0.0; LANES]; HIGH]; places + 1],
+            columns: vec![Aligned([[0.0; LANES]; HIGH]); places + 1],
         }
     }
 
     /// No rows, and zeros everywhere.
     pub fn clear(&mut self) {
         (self.count, self.begun) = (0, self.places());
-        self.columns.fill([[0.0; LANES]; HIGH]);
+        self.columns.fill(Aligned([[0.0; LANES]; HIGH]));
     }
 
     /// No rows, and no column has begun; the first row will be row `first` of the matrix.

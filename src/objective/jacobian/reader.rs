@@ -2,7 +2,7 @@
 
 use crate::dynamics::{Accelerations, Change, FUNCTIONS, Sensed, Steady, TILE, Tangents};
 use crate::lanes::tall::Piece;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::objective::{Channel, View};
 use std::ops::Range;
 
@@ -174,7 +174,7 @@ impl Answer<'_> {
         piece.widen(places);
         piece.count += count;
         for (g, first) in (0..places).step_by(LANES).enumerate() {
-            let mut answers = [[0.0; LANES]; LANES];
+            let mut answers = Aligned([[0.0; LANES]; LANES]);
             if self.tangents.has_begun(g) {
                 // Of lanes without a reading nobody wants to know.
                 match self.kind {
@@ -196,7 +196,7 @@ impl Answer<'_> {
                         }
                     }
                 }
-                answers = arithmetic.transpose(&answers);
+                *answers = arithmetic.transpose(&answers);
                 if self.kind == Kind::Accelerations {
                     self.add_constants(arithmetic, g, &mut answers);
                 }
@@ -204,7 +204,7 @@ impl Answer<'_> {
                     *answer = (gain * Eight::load(arithmetic, answer)).row();
                 }
             }
-            for (place, answer) in (first..places).zip(&answers) {
+            for (place, answer) in (first..places).zip(answers.iter()) {
                 let rows = &mut piece.column_mut(place)[row..row + count];
                 match rows.first_chunk_mut::<LANES>() {
                     Some(rows) => *rows = *answer,
