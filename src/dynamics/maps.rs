@@ -95,8 +95,9 @@ fn by<A: Arithmetic, const S: usize, const TERMS: usize>(
     let base = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
 
     let mut functions = [Places([zero; 3]); TERMS];
-    for j in 0..terms.len().min(TERMS) {
-        functions[j] = Places::of(arithmetic, &rhs.device.coefficients[j], i);
+    let coefficients = rhs.device.coefficients.iter().take(terms.len());
+    for (places, values) in functions.iter_mut().zip(coefficients) {
+        *places = Places::of(arithmetic, values, i);
     }
 
     // Forwards: the stages, their slopes, and how the acceleration answers to each function.

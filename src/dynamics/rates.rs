@@ -258,8 +258,8 @@ fn prepare<A: Arithmetic, const S: usize>(
     brought: &mut [Brought; STAGES],
 ) {
     let mut p = places(arithmetic, values, i);
-    for q in 0..3 {
-        p[q] = p[q] * per_mass.0[q];
+    for (p, per_mass) in p.iter_mut().zip(per_mass.0) {
+        *p = *p * per_mass;
     }
     for (s, stage) in brought.iter_mut().enumerate().take(S) {
         let [next, end] = factors(tableau, dt, s);

@@ -82,8 +82,7 @@ impl<'a> Moving<'a> {
     /// From a state of which nothing is known: it has two places behind the others.
     pub fn tangents_from_any_state(&self) -> Tangents {
         let mut initial = vec![[[0.0; LANES]; 2]; (self.places + 2).div_ceil(LANES)];
-        for state in 0..2 {
-            let place = self.places + state;
+        for (place, state) in (self.places..).zip([0, 1]) {
             initial[place / LANES][state][place % LANES] = 1.0;
         }
         Tangents::new(self.slots.clone(), &initial)
