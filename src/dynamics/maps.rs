@@ -64,9 +64,14 @@ pub(super) fn linearise<A: Arithmetic>(
     wanted: &[bool; FUNCTIONS],
     maps: &mut Maps,
 ) {
-    with_known!(rhs.terms, terms, TERMS => match method {
-        Method::Midpoint => by::<A, 2, TERMS>(arithmetic, &MIDPOINT, terms, rhs, motion, i, wanted, maps),
-        Method::Rk4 => by::<A, 4, TERMS>(arithmetic, &RK4, terms, rhs, motion, i, wanted, maps),
+    let terms = rhs.terms;
+    with_known!(terms, terms, TERMS => match method {
+        Method::Midpoint => {
+            by::<A, 2, TERMS>(arithmetic, &MIDPOINT, terms, rhs, motion, i, wanted, maps);
+        }
+        Method::Rk4 => {
+            by::<A, 4, TERMS>(arithmetic, &RK4, terms, rhs, motion, i, wanted, maps);
+        }
     });
 }
 

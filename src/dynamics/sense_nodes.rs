@@ -44,7 +44,10 @@ impl Sight<'_> {
         around: [Eight<A>; 2],
         seen: &mut Accelerations,
     ) {
-        with_known!(self.oscillator.terms.as_slice(), terms, TERMS => self.see_terms::<A, TERMS>(arithmetic, terms, i, around, seen));
+        let terms = self.oscillator.terms.as_slice();
+        with_known!(terms, terms, TERMS => {
+            self.see_terms::<A, TERMS>(arithmetic, terms, i, around, seen);
+        });
     }
 
     #[inline(always)]

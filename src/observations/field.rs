@@ -101,14 +101,14 @@ fn wrong(place: Place, problem: &str, field: &str, decimal: char) -> InputError 
     }
 }
 
-/// Whether it looks like a date or a time of day, as `12:00:01.5` or `2026-03-01T12:00`.
-pub fn is_clock(field: &str) -> bool {
+/// Whether it looks like a date or a time of day, as `12:00:01.5`, `2026-03-01T12:00` or `1.3.2026`.
+fn is_clock(field: &str) -> bool {
     let belongs = |c: char| c.is_ascii_digit() || ":-/., TZ+".contains(c);
     let signs = |sign: char| field.chars().filter(|c| *c == sign).count();
     field.len() <= LONGEST
         && field.starts_with(|c: char| c.is_ascii_digit())
         && field.chars().all(belongs)
-        && (field.contains(':') || signs('-') == 2 || signs('/') == 2)
+        && (field.contains(':') || ['-', '/', '.'].into_iter().any(|sign| signs(sign) == 2))
 }
 
 #[cfg(test)]

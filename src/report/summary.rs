@@ -29,12 +29,16 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     if document.has_ratio() {
         write!(text, ", J/J0 {:.4e}", cost.ratio)?;
     }
+    let counts = &document.counts;
+    let (others, what) = match (counts.adjoint, counts.tangent) {
+        (0, tangent @ 1..) => (tangent, "tangent"),
+        (adjoint, _) => (adjoint, "adjoint"),
+    };
     writeln!(
         text,
-        "; {}, {} forward and {} adjoint solves, {:.2} s",
+        "; {}, {} forward and {others} {what} solves, {:.2} s",
         iterations(document),
-        document.counts.forward,
-        document.counts.adjoint,
+        counts.forward,
         document.seconds
     )?;
     for experiment in &document.experiments {

@@ -6,10 +6,10 @@
 //! second thread goes on with reducing or, where there are so few columns that handing rows over takes as long as
 //! reducing them, finds the natural sizes. Who does what changes no bit.
 //!
-//! A long record with few parameters is cut in two, and each thread goes along the tangents of one half. Nothing more is
-//! needed for the gradient, so there is no adjoint solve, on one thread either.
+//! Otherwise with a long record and few parameters: it is cut in two, and each thread goes along the tangents of one half.
+//! Nothing more is needed for the discrete gradient, so there is no adjoint solve, on one thread either.
 
-use super::gauss_newton::{FEW_PARAMETERS, Half, Reduced, Which, halfway, is_wide};
+use super::gauss_newton::{FEW_PARAMETERS, Half, Reduced, halfway, is_wide};
 use super::{FitSettings, Point, Solver, Timings};
 use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
@@ -75,12 +75,7 @@ impl Job<'_> {
             return;
         };
         if let Some(halfway) = self.halfway {
-            self.half = Some(Half::of(
-                self.problem,
-                &input.evaluation,
-                halfway,
-                Which::Second,
-            ));
+            self.half = Some(Half::second(self.problem, &input.evaluation, halfway));
             return;
         }
         let Some(handed) = self.handed.take() else {
@@ -125,10 +120,15 @@ impl<'s, 'p> Ahead<'s, 'p> {
         settings: &FitSettings,
     ) -> Option<Self> {
         let parameters = problem.parameters();
+        let is_long = halfway(problem).is_some();
+        // By the continuous gradient of a long record one thread has nothing to make ahead, and two must not differ.
+        let is_exact = settings.gradient == GradientKind::Discrete;
         let is_wanted = settings.solver == Solver::GaussNewton
             && parameters <= FEW_PARAMETERS
-            && Reduced::comes_in_pieces(problem);
-        let is_shared = problem.reading_count() * parameters >= WORTH_SHARING && threads::spare();
+            && Reduced::comes_in_pieces(problem)
+            && (is_exact || !is_long);
+        let is_much = is_long || problem.reading_count() * parameters >= WORTH_SHARING;
+        let is_shared = is_much && threads::spare();
         let ahead = is_wanted.then(|| Self::with(is_shared.then_some(scope), problem, settings))?;
         (ahead.companion.is_some() || ahead.is_halved()).then_some(ahead)
     }
@@ -241,8 +241,10 @@ impl<'s, 'p> Ahead<'s, 'p> {
             evaluation,
             is_free: AtomicBool::new(false),
         });
-        let half = |which| Half::of(problem, &input.evaluation, halfway, which);
-        let own = || (half(Which::First), problem.natural_sizes(&input.evaluation));
+        let own = || {
+            let first = Half::first(problem, &input.evaluation, halfway);
+            (first, problem.natural_sizes(&input.evaluation))
+        };
         let ((first, sizes), second) = match &mut self.companion {
             None => (own(), None),
             Some(companion) => companion.with(
@@ -251,7 +253,8 @@ impl<'s, 'p> Ahead<'s, 'p> {
                 |own, job| (own, job.half.take()),
             ),
         };
-        let reduced = first.join(&second.unwrap_or_else(|| half(Which::Second)));
+        let reduced = first
+            .join(&second.unwrap_or_else(|| Half::second(problem, &input.evaluation, halfway)));
         timings.tangent += clock.elapsed();
         let Input {
             parameters,
@@ -380,16 +383,27 @@ mod tests {
         }
     }
 
-    /// A driven oscillator over a long record, of which displacements are read at every seventh node and accelerations at
-    /// every one; its velocity at the start is sought as well.
-    fn long_problem() -> Problem {
+    /// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
+    /// every one and velocities between them; its velocity at the start is sought as well. The stiffness has so many knots,
+    /// or is a constant.
+    fn long_problem(knots: Option<u32>) -> Problem {
         let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
         let nodes = grid.nodes();
         let constant = |quantity, start| CoefficientFunction::constant(quantity, start, nodes);
+        let stiffness = match knots {
+            None => constant(Quantity::Stiffness, 2.2),
+            Some(knots) => {
+                let spacing = grid.duration() / f64::from(knots - 1);
+                let knots: Vec<f64> = (0..knots).map(|i| f64::from(i) * spacing).collect();
+                let start = knots.iter().map(|t| 2.2 + 1e-3 * t).collect();
+                let basis = Basis::PiecewiseLinear { knots };
+                CoefficientFunction::free(Quantity::Stiffness, basis, &grid, start)
+            }
+        };
         let list = vec![
             constant(Quantity::Mass, 1.1),
             constant(Quantity::Damping, 0.3),
-            constant(Quantity::Stiffness, 2.2),
+            stiffness,
         ];
         let speed = Scalar {
             name: "speed".into(),
@@ -400,85 +414,97 @@ mod tests {
         };
         let functions = Functions::new(list, nodes, grid.step()).expect("functions");
         let times = grid.times();
-        let force: Vec<f64> = times
-            .iter()
+        let force: Vec<f64> = (times.iter())
             .map(|t| (0.9 * t).sin() + (1.7 * t).cos())
             .collect();
         let read = |t: &f64| (0.9 * t).cos() - (1.7 * t).sin();
-        let weighting = || Weighting::Sigma(0.1);
-        let accelerations = Channel::new(
-            ChannelKind::Acceleration,
-            times.clone(),
-            times.iter().map(read).collect(),
-            weighting(),
-            &grid,
-            nodes,
-        );
-        let sevenths = times.iter().step_by(7).map(read).collect();
+        let channel = |kind, times: Vec<f64>| {
+            let values = times.iter().map(read).collect();
+            let weighting = Weighting::Sigma(0.1);
+            Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+        };
+        let sevenths = times.iter().step_by(7).copied().collect();
+        let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
+        let between = between.filter(|t| *t < grid.duration()).collect();
         let record = Experiment {
             sought: [None, Some(0)],
             ..Experiment::free("driven", State::default(), nodes)
                 .with_excitation(Excitation::force_at_nodes(&force))
-                .with_channel(Channel::displacement_at_nodes(
-                    sevenths,
-                    7,
-                    weighting(),
-                    &grid,
-                ))
-                .with_channel(accelerations.expect("readings"))
+                .with_channel(channel(ChannelKind::Displacement, sevenths))
+                .with_channel(channel(ChannelKind::Velocity, between))
+                .with_channel(channel(ChannelKind::Acceleration, times.clone()))
         };
         let oscillator = Oscillator {
             grid,
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness],
         };
-        Problem::new(
-            oscillator,
-            functions.with_scalars(vec![speed]),
-            vec![record],
-        )
+        let functions = functions.with_scalars(vec![speed]);
+        Problem::new(oscillator, functions, vec![record])
     }
 
-    /// Both halves together say what the whole record says, and what the adjoint does.
+    /// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
+    /// leave one lane or none for the state in the middle.
     #[test]
     fn halves_of_a_long_record() {
-        let problem = long_problem();
-        let theta = problem.start();
-        let halfway = halfway(&problem).expect("it is long");
-        let evaluation = problem.evaluate(&theta).expect("a motion");
-        let half = |which| Half::of(&problem, &evaluation, halfway, which);
-        let joined = half(Which::First).join(&half(Which::Second));
-        let order = problem.places();
-        let mut whole = Reduced::new(&problem, &evaluation, order.clone());
-        problem.each_piece(&evaluation, &order, |mut piece| {
-            whole.add(&mut piece);
-            piece
-        });
-        let solution = |reduced: &Reduced| reduced.solution().expect("four independent columns");
-        for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
-            assert!(
-                (joined - whole).abs() <= 1e-11 * whole.abs(),
-                "{joined} {whole}"
-            );
-        }
-        let found = joined.misfit_gradient().expect("finite numbers");
-        let expected = problem.gradient(&theta, &evaluation, GradientKind::Discrete);
-        for (found, expected) in found.iter().zip(&expected.euclidean) {
-            assert!(
-                (found - expected).abs() <= 1e-11 * expected.abs(),
-                "{found} {expected}"
-            );
+        for (knots, parameters) in [(None, 4), (Some(4), 7), (Some(5), 8)] {
+            let problem = long_problem(knots);
+            assert_eq!(problem.parameters(), parameters);
+            let theta = problem.start();
+            let halfway = halfway(&problem).expect("it is long");
+            let evaluation = problem.evaluate(&theta).expect("a motion");
+            let second = Half::second(&problem, &evaluation, halfway);
+            let joined = Half::first(&problem, &evaluation, halfway).join(&second);
+            let order = problem.places();
+            let mut whole = Reduced::new(&problem, &evaluation, order.clone());
+            problem.each_piece(&evaluation, &order, |mut piece| {
+                whole.add(&mut piece);
+                piece
+            });
+            let solution = |reduced: &Reduced| reduced.solution().expect("independent columns");
+            for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
+                let off = (joined - whole).abs();
+                assert!(off <= 1e-10 * whole.abs(), "{joined} {whole}");
+            }
+            let found = joined.misfit_gradient().expect("finite numbers");
+            let expected = problem.gradient(&theta, &evaluation, GradientKind::Discrete);
+            for (found, expected) in found.iter().zip(&expected.euclidean) {
+                let off = (found - expected).abs();
+                assert!(off <= 1e-10 * expected.abs(), "{found} {expected}");
+            }
         }
     }
 
     /// On one thread and on two the same, to the last bit.
     #[test]
     fn a_long_record_on_two_threads() {
-        let problem = long_problem();
+        let problem = long_problem(None);
         let alone = threads::sharing(|| fitted(&problem));
         let together = fitted(&problem);
         assert!(together.history == alone.history && !together.history.is_empty());
         assert_eq!(together.counts, alone.counts);
         assert_eq!(together.best.parameters, alone.best.parameters);
+    }
+
+    /// By the continuous gradient, too, which needs an adjoint.
+    #[test]
+    fn a_long_record_by_the_continuous_gradient() {
+        let mut problem = long_problem(None);
+        let grid = problem.oscillator.grid;
+        let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
+        let spacing = grid.step();
+        let weighting = Weighting::Integral { spacing };
+        let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+        problem.experiments[0].channels = vec![channel];
+        assert!(problem.supports_continuous() && halfway(&problem).is_some());
+        let mut settings = FitSettings {
+            gradient: GradientKind::Continuous,
+            ..FitSettings::default()
+        };
+        settings.stopping.iterations = 3;
+        let run = || fit(&problem, &problem.start(), &settings, &mut |_| {}).expect("a motion");
+        let (alone, together) = (threads::sharing(run), run());
+        assert!(together.history == alone.history && !together.history.is_empty());
+        assert_eq!(together.counts, alone.counts);
     }
 }

@@ -75,7 +75,7 @@ pub struct Counts {
     pub forward: u64,
     /// Adjoint solves.
     pub adjoint: u64,
-    /// Tangent solves.
+    /// Tangent solves, one for each parameter.
     pub tangent: u64,
     /// Quadratic programs.
     pub qp: u64,
@@ -217,18 +217,24 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
 
     /// The point that an evaluation belongs to, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
-        let (parameters, evaluation) = match &mut self.ahead {
-            None => (parameters, evaluation),
-            Some(ahead) => match ahead.point(parameters, evaluation, &mut self.timings) {
-                Ok(point) => {
-                    match self.is_halved() {
-                        true => self.count_tangents(point.parameters.len() as u64),
-                        false => *self.problem.counts.entry(ADJOINT).or_insert(0) += 1,
-                    }
-                    return point;
+        let Some(ahead) = &mut self.ahead else {
+            let gradient = self.gradient(&parameters, &evaluation);
+            return Point::new(parameters, evaluation, gradient);
+        };
+        let solves = parameters.len() as u64;
+        let point = ahead.point(parameters, evaluation, &mut self.timings);
+        let is_halved = self.is_halved();
+        if is_halved {
+            self.count_tangents(solves);
+        }
+        let (parameters, evaluation) = match point {
+            Ok(point) => {
+                if !is_halved {
+                    *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
                 }
-                Err(back) => back,
-            },
+                return point;
+            }
+            Err(back) => back,
         };
         let gradient = self.gradient(&parameters, &evaluation);
         Point::new(parameters, evaluation, gradient)

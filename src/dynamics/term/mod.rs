@@ -66,6 +66,7 @@ impl Term {
 
 /// Calls with a list of terms that is known when this is compiled where it is one of the usual ones: what is said of each
 /// term is then laid out one after the other, without a choice. The constant is how many terms there are at most.
+/// Whoever calls it has [`Term`] and [`MOST_TERMS`] in sight.
 macro_rules! with_known {
     ($terms:expr, $known:ident, $most:ident => $call:expr) => {
         match $terms {

@@ -91,9 +91,9 @@ impl Problem {
         }
     }
 
-    /// Where the only record of a problem is cut into two halves that can be gone through at once: at the end of a
-    /// tile. `None` if there are several, or the one is short.
-    pub(crate) fn halfway(&self) -> Option<usize> {
+    /// The step in the middle of the only record of a problem, at the end of a tile; `None` if there are several, or the one
+    /// is short.
+    pub(crate) fn middle(&self) -> Option<usize> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
         };
@@ -144,7 +144,7 @@ fn sweep(
 ) -> Vec<[f64; 2]> {
     let moving = Moving::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
-    let places = order.len() + if is_later { 2 } else { 0 };
+    let places = order.len() + 2 * usize::from(is_later);
     let mut tangents = match is_later {
         false => moving.tangents(),
         true => moving.tangents_from_any_state(),

@@ -120,8 +120,8 @@ impl Reduced {
     pub fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
         let clock = Instant::now();
         if let Some(halfway) = halfway(problem) {
-            let [first, second] =
-                [First, Second].map(|which| Half::of(problem, evaluation, halfway, which));
+            let first = Half::first(problem, evaluation, halfway);
+            let second = Half::second(problem, evaluation, halfway);
             timings.tangent += clock.elapsed();
             return first.join(&second);
         }
@@ -153,19 +153,11 @@ impl Reduced {
     }
 }
 
-/// Which part of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Which {
-    First,
-    Second,
-}
-use Which::{First, Second};
-
-/// Where a problem's record is cut in two, whose readings are linearised and reduced each by itself: where it is long, and
-/// there are few parameters. Two threads can do that at once, and nothing more is needed for the gradient.
+/// Where a problem's record is cut into halves that are linearised and reduced each by itself, which two threads can do at
+/// once: in the middle of a long record with few parameters. Nothing more is needed for the discrete gradient.
 pub(crate) fn halfway(problem: &Problem) -> Option<usize> {
     let is_narrow = !is_wide(problem.parameters()) && Reduced::comes_in_pieces(problem);
-    problem.halfway().filter(|_| is_narrow)
+    problem.middle().filter(|_| is_narrow)
 }
 
 /// The readings of one half of a record, linearised and reduced.
@@ -178,15 +170,20 @@ pub(crate) struct Half {
 }
 
 impl Half {
-    /// Of a record that is cut at the step `halfway`.
-    pub fn of(problem: &Problem, evaluation: &Evaluation, halfway: usize, which: Which) -> Self {
+    /// The one before the step `halfway`.
+    pub fn first(problem: &Problem, evaluation: &Evaluation, halfway: usize) -> Self {
+        Self::of(problem, evaluation, 0..halfway, problem.parameters())
+    }
+
+    /// The one from the step `halfway` on. The state that it sets out from has columns of its own.
+    pub fn second(problem: &Problem, evaluation: &Evaluation, halfway: usize) -> Self {
+        let steps = halfway..problem.experiments[0].nodes - 1;
+        Self::of(problem, evaluation, steps, problem.parameters() + 2)
+    }
+
+    fn of(problem: &Problem, evaluation: &Evaluation, steps: Range<usize>, columns: usize) -> Self {
         let order = problem.places();
         let experiment = &problem.experiments[0];
-        // The state that the second half sets out from has columns of its own.
-        let (steps, columns) = match which {
-            First => (0..halfway, order.len()),
-            Second => (halfway..experiment.nodes - 1, order.len() + 2),
-        };
         let mut triangle = Triangle::new(columns);
         let mut residuals = Residuals::with_capacity(PIECE);
         let states = problem.each_piece_of_part(evaluation, &order, steps, |mut piece| {

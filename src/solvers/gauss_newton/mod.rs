@@ -9,7 +9,7 @@
 mod dense;
 mod structured;
 
-pub(crate) use dense::{Half, Reduced, Which, halfway, is_wide, weighted_jacobian};
+pub(crate) use dense::{Half, Reduced, halfway, is_wide, weighted_jacobian};
 
 use super::infeasible::no_step;
 use super::point::Work;
