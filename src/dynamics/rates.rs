@@ -396,3 +396,66 @@ impl Phi {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::{Device, Excitation, Grid, Oscillator};
+
+    /// What is constant is made once, and only that: each function in turn changes from the ninth step on.
+    #[test]
+    fn functions_that_are_constant_at_first() {
+        let oscillator = Oscillator {
+            grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
+            method: Method::Rk4,
+            terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        };
+        let drive: Vec<f64> = (0..41).map(|i| (0.3 * f64::from(i)).sin()).collect();
+        let excitation = Excitation::force_at_nodes(&drive);
+        let initial = State {
+            displacement: 0.4,
+            velocity: -0.2,
+        };
+        for moving in 0..=4 {
+            let values = |f: usize, value: f64| -> Vec<f64> {
+                let grows = |i: usize| {
+                    if f == moving && i > 9 {
+                        0.02 * i as f64
+                    } else {
+                        0.0
+                    }
+                };
+                (0..41).map(|i| value + grows(i)).collect()
+            };
+            let device = Device {
+                mass: values(0, 1.2),
+                coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
+            };
+            let run = |solve: fn(
+                &Oscillator,
+                &Device,
+                State,
+                Option<&Excitation>,
+                &mut Trajectory,
+            ) -> Result<(), crate::dynamics::Breakdown>| {
+                let mut motion = Trajectory::zeros(41);
+                solve(
+                    &oscillator,
+                    &device,
+                    initial,
+                    Some(&excitation),
+                    &mut motion,
+                )
+                .expect("a motion");
+                motion
+            };
+            let fast = run(Oscillator::forward_in_blocks_into);
+            let plain = run(Oscillator::forward_into);
+            let pairs = (fast.displacement.iter().zip(&plain.displacement))
+                .chain(fast.velocity.iter().zip(&plain.velocity));
+            for (fast, plain) in pairs {
+                assert!((fast - plain).abs() <= 1e-14, "{moving}: {fast} {plain}");
+            }
+        }
+    }
+}

@@ -119,3 +119,29 @@ fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
         pivot * pivot > INDEPENDENT * diagonal(gram.get_entry(j, j))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra_sparse::CooMatrix;
+
+    /// The square of a size is the sum over the nodes, in whatever basis.
+    #[test]
+    fn squares_are_those_of_the_values() {
+        let weights = [0.5, 1.0, 1.0, 1.0, 0.5];
+        let theta = [1.5, -2.0];
+        let mut entries = CooMatrix::new(5, 2);
+        for i in 0..5 {
+            entries.push(i, 0, 1.0);
+            entries.push(i, 1, 0.25 * i as f64);
+        }
+        let design = Design::Sparse(CsrMatrix::from(&entries));
+        let gram = Gram::new(&design, &weights).expect("independent columns");
+        let value = |i: usize| theta[0] + theta[1] * 0.25 * i as f64;
+        let expected: f64 = (0..5).map(|i| weights[i] * value(i).powi(2)).sum();
+        assert!((gram.square(&theta) - expected).abs() <= 1e-14 * expected);
+        let nodal = Gram::new(&Design::Identity, &weights).expect("weights");
+        let values: Vec<f64> = (0..5).map(value).collect();
+        assert!((nodal.square(&values) - expected).abs() <= 1e-14 * expected);
+    }
+}

@@ -295,3 +295,33 @@ pub fn weighted_jacobian(
     }
     (jacobian, DVector::from_vec(weighted))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::Grid;
+    use crate::objective::Weighting;
+
+    /// The squares of the weighted residuals are the cost, in which the readings at both ends count half; some readings
+    /// at a time are the same.
+    #[test]
+    fn weighted_residuals() {
+        let grid = Grid::new(0.0, 1.0, 11).expect("a grid");
+        let spacing = grid.step();
+        let readings = (0..11).map(|i| f64::from(i).sin()).collect();
+        let weighting = Weighting::Integral { spacing };
+        let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+        let predicted: Vec<f64> = (0..11).map(|i| 2.0 - f64::from(i)).collect();
+        let mut whole = Residuals::with_capacity(11);
+        whole.push(&channel, &predicted, 0..11);
+        let squares: f64 = whole.weighted.iter().map(|r| r * r).sum();
+        let cost = channel.cost(&predicted);
+        assert!((squares - cost).abs() <= 1e-14 * cost, "{squares} {cost}");
+        let mut parts = Residuals::with_capacity(11);
+        for readings in [0..1, 1..6, 6..10, 10..11] {
+            parts.push(&channel, &predicted, readings);
+        }
+        assert_eq!(parts.weighted, whole.weighted);
+        assert_eq!(parts.roots, whole.roots);
+    }
+}
