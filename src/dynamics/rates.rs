@@ -431,26 +431,14 @@ mod tests {
                 mass: values(0, 1.2),
                 coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
             };
-            let run = |solve: fn(
-                &Oscillator,
-                &Device,
-                State,
-                Option<&Excitation>,
-                &mut Trajectory,
-            ) -> Result<(), crate::dynamics::Breakdown>| {
-                let mut motion = Trajectory::zeros(41);
-                solve(
-                    &oscillator,
-                    &device,
-                    initial,
-                    Some(&excitation),
-                    &mut motion,
-                )
+            let zeros = || Trajectory::zeros(41);
+            let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
+            oscillator
+                .forward_in_blocks_into(&device, initial, drive, &mut fast)
                 .expect("a motion");
-                motion
-            };
-            let fast = run(Oscillator::forward_in_blocks_into);
-            let plain = run(Oscillator::forward_into);
+            oscillator
+                .forward_into(&device, initial, drive, &mut plain)
+                .expect("a motion");
             let pairs = (fast.displacement.iter().zip(&plain.displacement))
                 .chain(fast.velocity.iter().zip(&plain.velocity));
             for (fast, plain) in pairs {
