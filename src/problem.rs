@@ -6,6 +6,9 @@ use crate::functions::{Functions, Penalty, Variation};
 use crate::objective::{Channel, Weighting};
 use crate::signal::{Shape, Signal};
 
+/// Steps from which on a record is long: it is then worth being gone through in parts.
+pub(crate) const LONG: usize = 1 << 15;
+
 /// A force over time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Waveform {

@@ -36,10 +36,7 @@ struct Places<A: Arithmetic>([Eight<A>; 3]);
 impl<A: Arithmetic> Places<A> {
     #[inline(always)]
     fn of(arithmetic: A, values: &[f64], i: usize) -> Self {
-        let left = window::eight(arithmetic, values, i);
-        let right = window::eight(arithmetic, values, i + 1);
-        let middle = (right + left) * Eight::splat(arithmetic, 0.5);
-        Self([left, middle, right])
+        Self(window::places(arithmetic, values, i))
     }
 
     #[inline(always)]
@@ -170,12 +167,10 @@ fn by<A: Arithmetic, const S: usize, const TERMS: usize>(
             }
             let [mut left, mut middle, mut right] = [zero; 3];
             for s in 0..S {
-                let answer = a_bar[s]
-                    * if f == 0 {
-                        inertias[s]
-                    } else {
-                        answers[s][f - 1]
-                    };
+                let answer = match f {
+                    0 => a_bar[s] * inertias[s],
+                    _ => a_bar[s] * answers[s][f - 1],
+                };
                 match tableau.position[s] {
                     Position::Left => left += answer,
                     Position::Middle => middle += answer,

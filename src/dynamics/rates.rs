@@ -229,16 +229,8 @@ impl<A: Arithmetic> PerMass<A> {
     #[inline(always)]
     fn at(arithmetic: A, rhs: &Rhs, i: usize) -> Self {
         let one = Eight::splat(arithmetic, 1.0);
-        Self(places(arithmetic, &rhs.device.mass, i).map(|mass| one / mass))
+        Self(window::places(arithmetic, &rhs.device.mass, i).map(|mass| one / mass))
     }
-}
-
-/// A function at the left ends, middles and right ends of eight steps.
-#[inline(always)]
-fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
-    let left = window::eight(arithmetic, values, i);
-    let right = window::eight(arithmetic, values, i + 1);
-    [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
 }
 
 /// The rates of a kind of term from its function, over the steps from `i` on.
@@ -257,7 +249,7 @@ fn prepare<A: Arithmetic, const S: usize>(
     kind: usize,
     brought: &mut [Brought; STAGES],
 ) {
-    let mut p = places(arithmetic, values, i);
+    let mut p = window::places(arithmetic, values, i);
     for (p, per_mass) in p.iter_mut().zip(per_mass.0) {
         *p = *p * per_mass;
     }
@@ -402,7 +394,7 @@ mod tests {
     use super::*;
     use crate::dynamics::{Device, Excitation, Grid, Oscillator};
 
-    /// What is constant is made once, and only that: each function in turn changes from the ninth step on.
+    /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
     #[test]
     fn functions_that_are_constant_at_first() {
         let oscillator = Oscillator {

@@ -13,6 +13,14 @@ pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> E
     }
 }
 
+/// A function at the left ends, middles and right ends of the steps `i`, `i + 1`, ...
+#[inline(always)]
+pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
+    let left = eight(arithmetic, values, i);
+    let right = eight(arithmetic, values, i + 1);
+    [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
+}
+
 #[cold]
 #[inline(never)]
 fn padded(values: &[f64], i: usize) -> Row {

@@ -44,6 +44,22 @@ struct Input {
     is_free: AtomicBool,
 }
 
+impl Input {
+    fn new(parameters: Vec<f64>, evaluation: Evaluation) -> Arc<Self> {
+        Arc::new(Self {
+            parameters,
+            evaluation,
+            is_free: AtomicBool::new(false),
+        })
+    }
+
+    /// What it was made of, once the second thread is done: that drops its own whatever happens to it.
+    fn back(this: Arc<Self>) -> (Vec<f64>, Evaluation) {
+        let input = Arc::into_inner(this).expect("the second thread has given it back");
+        (input.parameters, input.evaluation)
+    }
+}
+
 /// What is handed over to the second thread.
 enum Handed {
     /// What has been reduced until then.
@@ -185,11 +201,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
         };
         let clock = Instant::now();
         let problem = self.problem;
-        let input = Arc::new(Input {
-            parameters,
-            evaluation,
-            is_free: AtomicBool::new(false),
-        });
+        let input = Input::new(parameters, evaluation);
         let its = Arc::clone(&input);
         let (hand, handed) = mpsc::sync_channel(WAITING);
         let (empty, again) = mpsc::channel();
@@ -214,11 +226,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
         timings.adjoint += adjoint;
         timings.linear_algebra += algebra;
         timings.tangent += all - adjoint - algebra;
-        let Input {
-            parameters,
-            evaluation,
-            ..
-        } = Arc::into_inner(input).expect("the second thread has given it back");
+        let (parameters, evaluation) = Input::back(input);
         let (Some(gradient), Some(sizes)) = (gradient, sizes) else {
             return Err((parameters, evaluation));
         };
@@ -236,11 +244,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
     ) -> Result<Point, (Vec<f64>, Evaluation)> {
         let clock = Instant::now();
         let problem = self.problem;
-        let input = Arc::new(Input {
-            parameters,
-            evaluation,
-            is_free: AtomicBool::new(false),
-        });
+        let input = Input::new(parameters, evaluation);
         let own = || {
             let first = Half::first(problem, &input.evaluation, halfway);
             (first, problem.natural_sizes(&input.evaluation))
@@ -256,11 +260,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
         let reduced = first
             .join(&second.unwrap_or_else(|| Half::second(problem, &input.evaluation, halfway)));
         timings.tangent += clock.elapsed();
-        let Input {
-            parameters,
-            evaluation,
-            ..
-        } = Arc::into_inner(input).expect("the second thread has given it back");
+        let (parameters, evaluation) = Input::back(input);
         let Some(misfit) = reduced.misfit_gradient() else {
             return Err((parameters, evaluation));
         };

@@ -12,15 +12,13 @@ use super::{FitSettings, Timings, Watch};
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
 use crate::objective::Evaluation;
-use crate::problem::{Drive, Experiment, Problem};
+use crate::problem::{Drive, Experiment, LONG, Problem};
 use crate::threads;
 use std::time::{Duration, Instant};
 
 /// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
 /// the same step to the last bit.
 const STEPS: [usize; 2] = [1 << 11, 1 << 12];
-/// How many steps a record must have.
-const LONG: usize = 1 << 15;
 /// How many readings there must be for each parameter.
 const READINGS: usize = 20;
 /// Most iterations on the beginning.

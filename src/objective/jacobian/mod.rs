@@ -8,7 +8,7 @@ use crate::dynamics::{Course, TILE};
 use crate::lanes::LANES;
 use crate::lanes::sum::are_finite;
 use crate::lanes::tall::Piece;
-use crate::problem::{Experiment, Problem};
+use crate::problem::{Experiment, LONG, Problem};
 use moving::Moving;
 use nalgebra::DMatrix;
 use reader::Reader;
@@ -127,9 +127,6 @@ impl Problem {
         }
     }
 }
-
-/// Steps from which on a record is long.
-const LONG: usize = 1 << 15;
 
 /// Goes through some steps of the motion of one experiment, whose first reading has the row `row`: how displacement and
 /// velocity at the end answer to each place.
