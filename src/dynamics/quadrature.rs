@@ -82,17 +82,6 @@ pub fn curvature_into(f: &[f64], dt: f64, first: usize, out: &mut [f64]) {
     }
 }
 
-/// The means of neighbours, one less than there are values.
-pub fn midpoints(f: &[f64]) -> Vec<f64> {
-    let mut means = vec![0.0; f.len().saturating_sub(1)];
-    lanes::run(Elementwise(|| {
-        for (mean, pair) in means.iter_mut().zip(f.windows(2)) {
-            *mean = (pair[1] + pair[0]) * 0.5;
-        }
-    }));
-    means
-}
-
 #[inline(always)]
 fn second(a: f64, b: f64, c: f64, dt: f64) -> f64 {
     (a - 2.0 * b + c) / dt / dt

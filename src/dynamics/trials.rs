@@ -4,7 +4,7 @@
 //! integral cost in their order, so that its cost has the bits that it would have by itself.
 
 use super::{State, Trajectory};
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::threads::{self, Companion};
 
 /// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
@@ -88,13 +88,14 @@ impl Owned {
 struct Batch {
     lengths: Vec<Row>,
     /// Displacements and velocities, the rows of one node after those of the node before.
-    motion: [Vec<Row>; 2],
+    motion: [Vec<Aligned<Row>>; 2],
     costs: Vec<Row>,
 }
 
 impl Trials {
     /// The cost `integral (y - y_obs)^2 dt` at every one of `lengths`, which fall; `None` where the mass is
-    /// not positive or the motion leaves the finite numbers.
+    /// not positive or the motion leaves the finite numbers. The ray [`is_moderate`](Ray::is_moderate) as far as the
+    /// longest of them.
     pub fn costs(&mut self, ray: Ray, lengths: &[f64]) -> Vec<Option<f64>> {
         self.without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[self.without_mass..];
@@ -181,7 +182,7 @@ impl Batch {
         lengths.copy_from_slice(&self.lengths);
         let [y, v] = &mut self.motion;
         for rows in [&mut *y, &mut *v] {
-            rows.resize(R * ray.readings.len(), [0.0; LANES]);
+            rows.resize(R * ray.readings.len(), Aligned([0.0; LANES]));
         }
         let costs = lanes::run(Rows {
             ray,
@@ -197,11 +198,23 @@ impl Ray<'_> {
     /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
     /// after rounding.
     fn first_with_mass(self, lengths: &[f64]) -> usize {
-        let has_mass = |a: &f64| {
-            let mut pairs = self.functions[0].iter().zip(self.direction[0]);
-            pairs.all(|(p, g)| p - a * g > 0.0)
-        };
+        let has_mass = |a: &f64| self.masses(*a, |m| m > 0.0);
         lengths.iter().position(has_mass).unwrap_or(lengths.len())
+    }
+
+    /// Whether the masses of all devices as far as `longest` are so moderate, where they are positive, that
+    /// [`Eight::quotients`] divides by them with the bits of a division. A positive difference is no smaller than the
+    /// last place of what it is taken from.
+    pub fn is_moderate(self, longest: f64) -> bool {
+        const LIGHT: f64 = 1e-70;
+        const HEAVY: f64 = 1e70;
+        self.masses(0.0, |m| LIGHT < m && m < HEAVY) && self.masses(longest, |m| m < HEAVY)
+    }
+
+    /// Whether all masses at `a` are as they should be. All are looked at: a loop without a way out is the faster one.
+    fn masses(self, a: f64, are: impl Fn(f64) -> bool) -> bool {
+        let pairs = self.functions[0].iter().zip(self.direction[0]);
+        pairs.fold(true, |so_far, (p, g)| so_far & are(p - a * g))
     }
 }
 
@@ -209,7 +222,7 @@ impl Ray<'_> {
 struct Rows<'a, const R: usize> {
     ray: Ray<'a>,
     lengths: [Row; R],
-    motion: [&'a mut [[Row; R]]; 2],
+    motion: [&'a mut [[Aligned<Row>; R]]; 2],
 }
 
 /// Mass, damping and stiffness of a row of devices.
@@ -231,20 +244,30 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
+    /// Twice the values in the middle: halves of all three would change no bit of an acceleration.
     #[inline(always)]
-    fn middle(self, right: Self, half: Eight<A>) -> Self {
+    fn twice_middle(self, right: Self) -> Self {
         let mut values = self.0;
         for (value, right) in values.iter_mut().zip(right.0) {
-            *value = (right + *value) * half;
+            *value = right + *value;
         }
         Self(values)
     }
 
-    /// `y'' = -k y/m - c v/m`.
+    /// `y'' = -k y/m - c v/m`, by the divider.
     #[inline(always)]
     fn acceleration(self, y: Eight<A>, v: Eight<A>, zero: Eight<A>) -> Eight<A> {
         let [m, c, k] = self.0;
         zero - k * y / m - c * v / m
+    }
+
+    /// The same, with the same bits, by multipliers for the most part: as of the two accelerations of a step one is
+    /// made so, divider and multipliers are busy side by side.
+    #[inline(always)]
+    fn multiplied_acceleration(self, y: Eight<A>, v: Eight<A>, zero: Eight<A>) -> Eight<A> {
+        let [m, c, k] = self.0;
+        let [elastic, viscous] = Eight::quotients(k * y, c * v, m);
+        zero - elastic - viscous
     }
 }
 
@@ -258,59 +281,53 @@ impl<const R: usize> Kernel for Rows<'_, R> {
             lengths,
             motion: [displacement, velocity],
         } = self;
-        let zero = Eight::splat(arithmetic, 0.0);
-        let half = Eight::splat(arithmetic, 0.5);
-        let dt = Eight::splat(arithmetic, ray.step);
-        let nodes = ray.readings.len();
+        let splat = |x| Eight::splat(arithmetic, x);
+        let (zero, dt, half_dt) = (splat(0.0), splat(ray.step), splat(0.5 * ray.step));
+        let (half_weight, weight) = (splat(ray.spacing * 0.5), splat(ray.spacing));
+        let last = ray.readings.len() - 1;
 
-        let mut y = [Eight::splat(arithmetic, ray.initial.displacement); R];
-        let mut v = [Eight::splat(arithmetic, ray.initial.velocity); R];
+        let mut y = [splat(ray.initial.displacement); R];
+        let mut v = [splat(ray.initial.velocity); R];
         let mut left = [Values([zero; 3]); R];
         for r in 0..R {
             left[r] = Values::at(&ray, arithmetic, Eight::load(arithmetic, &lengths[r]), 0);
         }
-        for i in 0..nodes - 1 {
+        for i in 0..last {
             for r in 0..R {
-                displacement[i][r] = y[r].row();
-                velocity[i][r] = v[r].row();
+                displacement[i][r].0 = y[r].row();
+                velocity[i][r].0 = v[r].row();
                 let length = Eight::load(arithmetic, &lengths[r]);
                 let right = Values::at(&ray, arithmetic, length, i + 1);
-                let a = left[r].acceleration(y[r], v[r], zero);
-                let (y_half, v_half) = (y[r] + dt * v[r] * half, v[r] + dt * a * half);
-                let middle = left[r].middle(right, half);
-                let a_half = middle.acceleration(y_half, v_half, zero);
+                let a = left[r].multiplied_acceleration(y[r], v[r], zero);
+                let (y_half, v_half) = (y[r] + half_dt * v[r], v[r] + half_dt * a);
+                let a_half = left[r]
+                    .twice_middle(right)
+                    .acceleration(y_half, v_half, zero);
                 y[r] += dt * v_half;
                 v[r] += dt * a_half;
                 left[r] = right;
             }
         }
         for r in 0..R {
-            displacement[nodes - 1][r] = y[r].row();
-            velocity[nodes - 1][r] = v[r].row();
+            displacement[last][r].0 = y[r].row();
+            velocity[last][r].0 = v[r].row();
         }
 
-        let (weight, two) = (
-            Eight::splat(arithmetic, ray.spacing * 0.5),
-            Eight::splat(arithmetic, 2.0),
-        );
-        let (first, last) = (
-            Eight::splat(arithmetic, ray.readings[0]),
-            Eight::splat(arithmetic, ray.readings[nodes - 1]),
-        );
+        let (first_reading, last_reading) = (splat(ray.readings[0]), splat(ray.readings[last]));
         let mut sums = [zero; R];
         for r in 0..R {
-            let at_first = Eight::load(arithmetic, &displacement[0][r]) - first;
-            let at_last = y[r] - last;
+            let at_first = Eight::load(arithmetic, &displacement[0][r]) - first_reading;
+            let at_last = y[r] - last_reading;
             // Zero, and not a number where the motion is not finite.
             let nothing = zero * y[r] + zero * v[r];
-            sums[r] = weight * (at_first * at_first + at_last * at_last) + nothing;
+            sums[r] = half_weight * (at_first * at_first + at_last * at_last) + nothing;
         }
         let inner = displacement.iter().zip(ray.readings);
-        for (rows, reading) in inner.take(nodes - 1).skip(1) {
-            let reading = Eight::splat(arithmetic, *reading);
+        for (rows, reading) in inner.take(last).skip(1) {
+            let reading = splat(*reading);
             for r in 0..R {
                 let residual = Eight::load(arithmetic, &rows[r]) - reading;
-                sums[r] += weight * (two * (residual * residual));
+                sums[r] += weight * (residual * residual);
             }
         }
         let mut costs = [[0.0; LANES]; R];

@@ -34,7 +34,7 @@ impl Descend for SteepestDescent {
         let lengths: Vec<f64> = (1..=TRIALS)
             .map(|i| LONGEST * root / f64::from(i.pow(4)))
             .collect();
-        let best = match ray(work.problem(), point) {
+        let best = match ray(work.problem(), point).filter(|ray| ray.is_moderate(lengths[0])) {
             Some(ray) => self.side_by_side(work, point, ray, &lengths),
             None => self.one_by_one(work, point, &lengths),
         };
@@ -46,6 +46,10 @@ impl Descend for SteepestDescent {
             },
             None => Step::Stuck(format!("none of the {TRIALS} trial steps lowers the cost")),
         }
+    }
+
+    fn recycle(&mut self, evaluation: Evaluation) {
+        self.spare.push(evaluation);
     }
 }
 

@@ -5,9 +5,10 @@
 //! falls with the step (about 2e-5 at 1000 nodes, 4e-6 at 2000). Kept to reproduce the paper and to
 //! show the difference; [`super::discrete`] has no floor.
 
-use crate::dynamics::quadrature::{curvature, midpoints, slope};
+use crate::dynamics::quadrature::{curvature, slope};
 use crate::dynamics::{Device, DeviceTangent, Excitation, Oscillator, State, Term, Trajectory};
-use crate::lanes::{self, Elementwise};
+use crate::lanes::{self, Arithmetic, Kernel};
+use std::borrow::Cow;
 
 /// Gradient of `J = integral (y - y_obs)^2 dt` with respect to all functions, in the L2 inner
 /// product: functions of time at the nodes, not multiplied by quadrature weights.
@@ -34,7 +35,7 @@ pub fn gradient(
     let nodes = oscillator.grid.nodes();
     assert_eq!(trajectory.nodes(), nodes, "a motion over the whole grid");
     let dt = oscillator.grid.step();
-    let (c, k) = linearised_coefficients(oscillator, device, trajectory);
+    let [c, k] = linearised_coefficients(oscillator, device, trajectory);
     let steps = Steps::new(
         dt,
         [&device.mass, &c, &k],
@@ -76,7 +77,7 @@ pub fn gradient(
 struct Steps {
     /// `m`.
     mass: [Vec<f64>; 2],
-    /// `2 m' - C`.
+    /// `C - 2 m'`.
     damping: [Vec<f64>; 2],
     /// `m'' - C' + K`.
     stiffness: [Vec<f64>; 2],
@@ -87,82 +88,80 @@ struct Steps {
 impl Steps {
     fn new(dt: f64, [m, c, k]: [&[f64]; 3], y: &[f64], observed: &[f64]) -> Self {
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(c, dt));
-        let mass = [m[1..].to_vec(), midpoints(m)];
-        let damping = [
-            combined(&m1[1..], &c[1..], &c[1..], |m1, c, _| 2.0 * m1 - c),
-            combined(&midpoints(&m1), &midpoints(c), &mass[1], |m1, c, _| {
-                2.0 * m1 - c
-            }),
-        ];
-        let stiffness = [
-            combined(&m2[1..], &c1[1..], &k[1..], |m2, c1, k| m2 - c1 + k),
-            combined(
-                &midpoints(&m2),
-                &midpoints(&c1),
-                &midpoints(k),
-                |m2, c1, k| m2 - c1 + k,
-            ),
-        ];
-        let source = [
-            combined(&y[1..], &observed[1..], &mass[0], |y, o, m| {
-                2.0 * (y - o) / m
-            }),
-            combined(&midpoints(y), &midpoints(observed), &mass[1], |y, o, m| {
-                2.0 * (y - o) / m
-            }),
-        ];
         Self {
-            mass,
-            damping,
-            stiffness,
-            source,
+            mass: right_and_middle([m], |[m]| m),
+            damping: right_and_middle([c, &m1], |[c, m1]| c - 2.0 * m1),
+            stiffness: right_and_middle([&m2, &c1, k], |[m2, c1, k]| m2 - c1 + k),
+            source: right_and_middle([y, observed, m], |[y, o, m]| 2.0 * (y - o) / m),
         }
     }
 
     /// The adjoint displacement `z` at the nodes, and `z'` at the first.
     fn adjoint_motion(&self, dt: f64) -> (Vec<f64>, f64) {
-        let h = -dt;
+        let half_dt = 0.5 * dt;
         let steps = self.mass[0].len();
         let mut out = vec![0.0; steps + 1];
         let (mut z, mut w) = (0.0, 0.0);
         for j in (0..steps).rev() {
             let slope = |at: usize, w: f64, z: f64| {
                 let m = self.mass[at][j];
-                -w / m * self.damping[at][j] - z / m * self.stiffness[at][j] + self.source[at][j]
+                w / m * self.damping[at][j] - z / m * self.stiffness[at][j] + self.source[at][j]
             };
-            let l1w = h * slope(0, w, z);
-            let l1z = h * w;
-            let (wh, zh) = (w + l1w * 0.5, z + l1z * 0.5);
-            let l2w = h * slope(1, wh, zh);
-            z += h * wh;
-            w += l2w;
+            let (wh, zh) = (w - half_dt * slope(0, w, z), z - half_dt * w);
+            w -= dt * slope(1, wh, zh);
+            z -= dt * wh;
             out[j] = z;
         }
         (out, w)
     }
 }
 
-/// `f` of three lists, element by element.
-fn combined(a: &[f64], b: &[f64], c: &[f64], f: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
-    let mut out = vec![0.0; a.len()];
-    lanes::run(Elementwise(|| {
-        for (((out, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
-            *out = f(*a, *b, *c);
+/// `f` of the values of some lists, at the right node of every step and of their means at mid-step.
+fn right_and_middle<const N: usize>(
+    lists: [&[f64]; N],
+    f: impl Fn([f64; N]) -> f64,
+) -> [Vec<f64>; 2] {
+    let steps = lists[0].len() - 1;
+    let [mut at_right, mut at_middle] = [vec![0.0; steps], vec![0.0; steps]];
+    let out = [at_right.as_mut_slice(), at_middle.as_mut_slice()];
+    lanes::run(RightAndMiddle { lists, f, out });
+    [at_right, at_middle]
+}
+
+/// What [`right_and_middle`] does.
+struct RightAndMiddle<'a, F, const N: usize> {
+    lists: [&'a [f64]; N],
+    f: F,
+    out: [&'a mut [f64]; 2],
+}
+
+impl<F: Fn([f64; N]) -> f64, const N: usize> Kernel for RightAndMiddle<'_, F, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, _: A) {
+        let [at_right, at_middle] = self.out;
+        let steps = at_right.len();
+        let at_middle = &mut at_middle[..steps];
+        // Lengths that the compiler sees: no check is left in the loop.
+        let left = self.lists.map(|x| &x[..steps]);
+        let right = self.lists.map(|x| &x[1..=steps]);
+        for j in 0..steps {
+            at_right[j] = (self.f)(right.map(|x| x[j]));
+            at_middle[j] = (self.f)(std::array::from_fn(|l| (right[l][j] + left[l][j]) * 0.5));
         }
-    }));
-    out
+    }
 }
 
 /// `(C, K)` at the nodes: what damping and stiffness the motion sees when it is disturbed.
-fn linearised_coefficients(
+fn linearised_coefficients<'a>(
     oscillator: &Oscillator,
-    device: &Device,
+    device: &'a Device,
     trajectory: &Trajectory,
-) -> (Vec<f64>, Vec<f64>) {
+) -> [Cow<'a, [f64]>; 2] {
     let nodes = trajectory.displacement.len();
     if oscillator.terms == [Term::Damping, Term::Stiffness] {
-        let [c, k] = [0, 1].map(|j| device.coefficients[j].clone());
-        return (c, k);
+        return [0, 1].map(|j| Cow::Borrowed(device.coefficients[j].as_slice()));
     }
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
     for (term, p) in oscillator.terms.iter().zip(&device.coefficients) {
@@ -172,5 +171,5 @@ fn linearised_coefficients(
             k[i] += p[i] * phi_y;
         }
     }
-    (c, k)
+    [c, k].map(Cow::Owned)
 }
