@@ -69,7 +69,7 @@ fn hardest(random: &mut impl FnMut() -> u64) -> [f64; 2] {
         let inverse = (0..5).fold(divisor, |x, _| {
             x * (2 + MODULUS - divisor * x % MODULUS) % MODULUS
         });
-        let is_above = random() % 2 == 0;
+        let is_above = random().is_multiple_of(2);
         let middle = if is_above { MODULUS - inverse } else { inverse };
         let product = divisor * middle;
         let numerator = (product + u128::from(is_above)) / MODULUS;
