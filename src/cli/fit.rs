@@ -7,7 +7,7 @@ use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, charts, json,
+    Around, FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, charts, json,
     predict, summary,
 };
 use crate::solvers::{
@@ -173,8 +173,11 @@ pub(super) fn fit_into(
         }
     };
     let model = weighted.as_ref().unwrap_or(model);
+    let analysis = Instant::now();
     let predictions = predictions(model, &found);
     let known = Known::of(model, &found);
+    let analysis = analysis.elapsed();
+    let report = Instant::now();
     let run = FittedModel {
         known: &known,
         model,
@@ -188,10 +191,14 @@ pub(super) fn fit_into(
         .write(&mut stage, &document, with_figures)
         .map_err(full)?;
     let before = &model.preparation;
-    let outside = before.reading + writing;
+    let around = Around {
+        io: before.reading + writing,
+        analysis,
+        report: report.elapsed().saturating_sub(writing),
+    };
     // A fit that was gone on with took longer than this clock saw.
-    let total = (before.total + clock.elapsed()).max(outside + found.elapsed);
-    document.timings = TimingsSummary::new(&found, outside, total);
+    let total = (before.total + clock.elapsed()).max(around.sum() + found.elapsed);
+    document.timings = TimingsSummary::new(&found, &around, total);
     stage.commit_run(&json(&document)).map_err(full)?;
     let status = found.outcome.status;
     if status != Status::Interrupted {

@@ -70,4 +70,4 @@ pub use run::{FittedModel, json};
 pub use summary::{prediction_table, summary};
 pub use svg::{render, render_narrow};
 pub use terminal::charts;
-pub use timings::{PartSummary, TimingsSummary};
+pub use timings::{Around, PartSummary, TimingsSummary};

@@ -15,7 +15,7 @@ use super::measured::{self, ChannelSummary};
 use super::page::fit_page;
 use super::render;
 use super::seen::SeenChannel;
-use super::timings::TimingsSummary;
+use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::diagnostics::{fit_percent, rms};
 use crate::dynamics::{Excitation, Term};
@@ -112,7 +112,7 @@ impl FittedModel<'_> {
                 qp: fit.counts.qp,
             },
             seconds: fit.elapsed.as_secs_f64(),
-            timings: TimingsSummary::new(fit, Duration::ZERO, fit.elapsed),
+            timings: TimingsSummary::new(fit, &Around::default(), fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),

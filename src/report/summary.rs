@@ -220,17 +220,34 @@ pub(super) fn write_scalars(text: &mut String, document: &ResultDocument) -> std
     Ok(())
 }
 
-/// The iterations of the last fit, and of the fits on the way to its weight, if a rule chose that.
+/// The iterations of the last fit, and of the fits on the way to it: to its weight, if a rule chose that, or from other
+/// starts.
 pub(super) fn iterations(document: &ResultDocument) -> String {
     let last = count(document.counts.iterations as usize, "iteration");
-    match &document.weights {
-        Some(weights) => {
-            let fits = count(weights.path.len(), "weight");
-            let before = weights.iterations();
-            format!("{last} after {before} along a path of {fits}")
-        }
-        None => last,
+    if let Some(weights) = &document.weights {
+        let fits = count(weights.path.len(), "weight");
+        let before = weights.iterations();
+        return format!("{last} after {before} along a path of {fits}");
     }
+    if document.rungs.len() < 2 {
+        return last;
+    }
+    let all = document
+        .rungs
+        .iter()
+        .map(|rung| rung.iterations)
+        .sum::<u64>();
+    let starts = count(document.rungs.len(), "start");
+    match estimates_sigma(document) {
+        true => format!("{last} after {all} from {starts}"),
+        false => format!("{last}, {all} in all from {starts}"),
+    }
+}
+
+/// Whether the noise of a channel was estimated by a first fit, so that the last one has another cost.
+fn estimates_sigma(document: &ResultDocument) -> bool {
+    let mut channels = document.experiments.iter().flat_map(|e| &e.channels);
+    channels.any(|channel| channel.sigma_estimated)
 }
 
 /// A number of things, in the singular where there is one.
@@ -330,10 +347,14 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
     if document.rungs.len() < 2 {
         return Ok(());
     }
+    let with = match estimates_sigma(document) {
+        true => " (sigma not estimated yet)",
+        false => "",
+    };
     for rung in &document.rungs {
         let cost = rung
             .cost
-            .map_or("no motion".into(), |cost| format!("J {cost:.4e}"));
+            .map_or("no motion".into(), |cost| format!("J {cost:.4e}{with}"));
         writeln!(
             text,
             "from the {}: {cost} after {} ({})",

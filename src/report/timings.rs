@@ -27,7 +27,13 @@ pub struct TimingsSummary {
     pub start: PartSummary,
     /// Reading data, and writing checkpoints and results; `result.json` itself is written after the clock has stopped.
     pub io: PartSummary,
-    /// The rest: building the model, bookkeeping, bands and statistics, predictions, figures.
+    /// What the fit is worth: errors and bands, statistics, the half step, records held out, predictions.
+    #[serde(default)]
+    pub analysis: PartSummary,
+    /// Tables, figures and the page, made to be written.
+    #[serde(default)]
+    pub report: PartSummary,
+    /// The rest: building the model, bookkeeping.
     pub other: PartSummary,
     /// From the building of the model to the result.
     pub total: PartSummary,
@@ -52,9 +58,27 @@ impl PartSummary {
     }
 }
 
+/// What was done around a fit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Around {
+    /// Reading and writing.
+    pub io: Duration,
+    /// What [`TimingsSummary::analysis`] is.
+    pub analysis: Duration,
+    /// What [`TimingsSummary::report`] is.
+    pub report: Duration,
+}
+
+impl Around {
+    /// The sum of all.
+    pub fn sum(&self) -> Duration {
+        self.io + self.analysis + self.report
+    }
+}
+
 impl TimingsSummary {
-    /// The time of a run that took `total`, `io` of it to read and write.
-    pub fn new(fit: &Fit, io: Duration, total: Duration) -> Self {
+    /// The time of a run that took `total`.
+    pub fn new(fit: &Fit, around: &Around, total: Duration) -> Self {
         let (counts, times) = (&fit.counts, &fit.timings);
         let counted = |time, count| PartSummary::new(time, Some(count));
         let part = |time| PartSummary::new(time, None);
@@ -66,14 +90,16 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(io + times.keeping),
-            other: part(total.saturating_sub(times.sum() + io)),
+            io: part(around.io + times.keeping),
+            analysis: part(around.analysis),
+            report: part(around.report),
+            other: part(total.saturating_sub(times.sum() + around.sum())),
             total: part(total),
         }
     }
 
     /// All parts with their names, in order, the total last.
-    pub fn parts(&self) -> [(&'static str, PartSummary); 9] {
+    pub fn parts(&self) -> [(&'static str, PartSummary); 11] {
         [
             ("forward", self.forward),
             ("adjoint", self.adjoint),
@@ -82,6 +108,8 @@ impl TimingsSummary {
             ("linear algebra", self.linear_algebra),
             ("start", self.start),
             ("I/O", self.io),
+            ("analysis", self.analysis),
+            ("report", self.report),
             ("other", self.other),
             ("total", self.total),
         ]
@@ -129,6 +157,8 @@ mod tests {
         linear algebra     0.0000     0.0
         start              0.0000     0.0
         I/O                0.0000     0.0
+        analysis           0.0000     0.0
+        report             0.0000     0.0
         other              0.2500    12.5
         total              2.0000   100.0
         arithmetic: scalar

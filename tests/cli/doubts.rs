@@ -435,6 +435,54 @@ fn readings_at_the_end_of_a_range_are_seen() {
     assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 readings of the displacement lie at 0.5 m, the end of its range: if the sensor reads no further, the motion was cut off there, and these readings are better left out (empty fields)");
 }
 
+/// Two sensors of one motion, of which one may be the wrong way round.
+#[test]
+fn a_sensor_the_wrong_way_round_is_seen() {
+    let bench = Workbench::empty();
+    let table = |sign: f64| {
+        let rows = (0..=400).map(|i| {
+            let t = 0.05 * f64::from(i);
+            let (decay, phase) = ((-0.05 * t).exp(), 2.0 * t);
+            let y = decay * phase.cos() + 0.02 * pseudo_random(i) + 0.3 + 0.01 * t;
+            let v = decay * (-0.05 * phase.cos() - 2.0 * phase.sin());
+            let a = decay * ((0.0025 - 4.0) * phase.cos() + 0.2 * phase.sin());
+            format!("{t},{y},{},{}\n", sign * v, sign * a)
+        });
+        format!("t_s,y_m,v_mps,a_mps2\n{}", rows.collect::<String>())
+    };
+    let check = |kinds: [&str; 2], more: &str| {
+        let columns = [
+            ("displacement", "y_m"),
+            ("velocity", "v_mps"),
+            ("acceleration", "a_mps2"),
+        ];
+        let named = columns.into_iter().filter(|(kind, _)| kinds.contains(kind));
+        let columns: String = named
+            .map(|(kind, column)| format!("{kind}: {column}, "))
+            .collect();
+        let sigma = kinds.map(|kind| format!("{kind}: 0.02")).join(", ");
+        let lines = format!("    columns: {{{columns}}}\n    sigma: {{{sigma}}}\n{more}");
+        bench.write("model.yaml", &starter("{nodes: 401}", &lines));
+        let (code, _, said) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+        assert_eq!(code, 0, "{said}");
+        said.contains("wrong sign")
+    };
+    let pairs = [
+        ["displacement", "velocity"],
+        ["displacement", "acceleration"],
+        ["velocity", "acceleration"],
+    ];
+    let turned = "    sensors: {velocity: {gain: -1}}\n";
+    bench.write("record.csv", &table(1.0));
+    assert_eq!(pairs.map(|pair| check(pair, "")), [false; 3]);
+    assert!(check(pairs[0], turned));
+    bench.write("record.csv", &table(-1.0));
+    assert_eq!(pairs.map(|pair| check(pair, "")), [true, true, false]);
+    assert!(!check(pairs[0], turned));
+    assert!(!check(pairs[0], &turned.replace("-1", "{start: 1}")));
+    assert!(check(pairs[2], turned));
+}
+
 /// Records of noise alone, of several seeds: a device may match three per cent of them, and shows nothing.
 #[test]
 fn noise_shows_no_device() {

@@ -280,6 +280,8 @@ fn stable_keys(result: &Value) {
         "/timings/linear_algebra/seconds",
         "/timings/start/seconds",
         "/timings/io/seconds",
+        "/timings/analysis/seconds",
+        "/timings/report/seconds",
         "/timings/other/seconds",
         "/timings/total/seconds",
         "/functions/mass/min",
@@ -341,6 +343,8 @@ fn the_parts_of_the_time_add_up() {
         "linear_algebra",
         "start",
         "io",
+        "analysis",
+        "report",
         "other",
     ];
     let seconds = |name: &str| {
@@ -350,7 +354,16 @@ fn the_parts_of_the_time_add_up() {
     let sum: f64 = names.into_iter().map(seconds).sum();
     // Each is rounded to a double.
     assert!((sum / seconds("total") - 1.0).abs() < 1e-12, "{result}");
-    for worked in ["forward", "adjoint", "linear_algebra", "io", "other"] {
+    let worked = [
+        "forward",
+        "adjoint",
+        "linear_algebra",
+        "io",
+        "analysis",
+        "report",
+        "other",
+    ];
+    for worked in worked {
         assert!(seconds(worked) > 0.0, "{worked}: {result}");
     }
     for idle in ["tangent", "qp", "start"] {
@@ -361,7 +374,7 @@ fn the_parts_of_the_time_add_up() {
     let (summary, table) = stdout.split_once("\ntime ").expect("a table");
     assert!(summary.starts_with("Small\n"), "{stdout}");
     let first = |line: &str| line.split("  ").next().unwrap_or_default().to_owned();
-    let rows: Vec<String> = table.lines().skip(1).take(9).map(first).collect();
+    let rows: Vec<String> = table.lines().skip(1).take(11).map(first).collect();
     let shown = [
         "forward",
         "adjoint",
@@ -370,6 +383,8 @@ fn the_parts_of_the_time_add_up() {
         "linear algebra",
         "start",
         "I/O",
+        "analysis",
+        "report",
         "other",
         "total",
     ];

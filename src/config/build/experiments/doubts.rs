@@ -1,6 +1,6 @@
 //! What looks wrong in a record, and what no record can tell.
 
-use super::{Record, name};
+use super::{RawChannel, Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
@@ -8,7 +8,7 @@ use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::problem::Problem;
-use crate::signal::{Spectrum, clipped};
+use crate::signal::{Interpolation, Signal, Spectrum, clipped};
 use std::f64::consts::TAU;
 
 /// Factors between channels, or between a reading and a known state, that look like a wrong unit.
@@ -25,6 +25,9 @@ const SUSPICIOUS: [(f64, &str); 8] = [
 /// How near a ratio must be to such a factor, as a ratio of the two: channels of one motion agree
 /// within some ten per cent, for its frequency is not single.
 const NEAR: f64 = 1.5;
+/// Channels whose correlation is below minus this go against each other: noise brings it nearer to zero, no motion
+/// turns it.
+const AGAINST: f64 = 0.7;
 
 /// Warns where channels of one motion, or a reading and the known state, disagree by a factor that
 /// looks like a wrong unit.
@@ -75,6 +78,87 @@ pub fn sizes(
             say(ratio, format!("the {high} beside the {low} is"));
         }
     }
+}
+
+/// Warns where channels of one motion swing against each other, as where one of them has the wrong sign.
+pub fn signs(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    record: &Record,
+    warnings: &mut Vec<String>,
+) {
+    for (place, high) in record.channels.iter().enumerate() {
+        for low in &record.channels[..place] {
+            let (Some(one), Some(other)) = (turn(spec, low.kind), turn(spec, high.kind)) else {
+                continue;
+            };
+            if one * other * together(low, high).unwrap_or_default() < -AGAINST {
+                let [low, high] = [low, high].map(|c| c.kind.name());
+                warnings.push(format!(
+                    "experiments[{i}] ({}): the {high} goes against what the {low} says of it, as if one of them had the \
+                     wrong sign: `sensors: {{{high}: {{gain: -1}}}}` turns the {high}",
+                    name(file, i)
+                ));
+            }
+        }
+    }
+}
+
+/// The sign of a sensor's gain; `None` where that is sought.
+fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
+    let sensors = spec.sensors.as_ref();
+    let sensor = sensors.and_then(|sensors| match kind {
+        ChannelKind::Displacement => sensors.displacement.as_ref(),
+        ChannelKind::Velocity => sensors.velocity.as_ref(),
+        ChannelKind::Acceleration => sensors.acceleration.as_ref(),
+    });
+    match sensor.and_then(|sensor| sensor.gain.as_ref()) {
+        None => Some(1.0),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.0.signum()),
+        Some(_) => None,
+    }
+}
+
+/// The correlation of the readings of a channel with what a lower derivative of the motion says of them: its own slope, or
+/// for the acceleration beside the displacement the displacement turned, as both are those of a swing.
+fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
+    let values = Signal::new(
+        high.times.clone(),
+        high.values.clone(),
+        Interpolation::Linear,
+    )?;
+    let around = low.times.windows(3).zip(low.values.windows(3));
+    let inside = around.filter(|(t, _)| values.covers(t[1], t[1]));
+    let (mut times, mut said, mut read) = (Vec::new(), Vec::new(), Vec::new());
+    for (t, y) in inside {
+        times.push(t[1]);
+        read.push(values.value(t[1]));
+        said.push(match high.kind as i32 - low.kind as i32 {
+            1 => (y[2] - y[0]) / (t[2] - t[0]),
+            _ => -y[1],
+        });
+    }
+    let [said, read] = [said, read].map(|values| without_line(&times, values));
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation =
+        product(&said, &read) / (product(&said, &said) * product(&read, &read)).sqrt();
+    correlation.is_finite().then_some(correlation)
+}
+
+/// Values without the straight line through them: sensors drift.
+fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
+    let n = values.len() as f64;
+    let [middle, level] = [times, &values].map(|x| x.iter().sum::<f64>() / n);
+    let (mut along, mut spread) = (0.0, 0.0);
+    for (t, y) in times.iter().zip(&values) {
+        along += (t - middle) * (y - level);
+        spread += (t - middle) * (t - middle);
+    }
+    for (t, y) in times.iter().zip(&mut values) {
+        *y -= level + along / spread * (t - middle);
+    }
+    values
 }
 
 /// Warns of readings that pile up at one value, as where a motion goes beyond the range of its sensor.

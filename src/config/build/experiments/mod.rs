@@ -173,6 +173,7 @@ fn read_one(
     one_misfit(file, i, &record)?;
     excitation::covers(file, i, &record.excitation, [record.start(), record.end()])?;
     doubts::sizes(file, i, spec, &record, warnings);
+    doubts::signs(file, i, spec, &record, warnings);
     doubts::ranges(file, i, &record, warnings);
     Ok(record)
 }

@@ -1,6 +1,6 @@
 // One pair of axes in a chart.
 
-const MARGIN = { left: 62, right: 12, top: 8, bottom: 26 };
+const MARGIN = { left: 62, right: 20, top: 8, bottom: 26 };
 
 class Panel {
   constructor(chart, data, name, parent, count) {
