@@ -266,6 +266,8 @@ fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
                 velocity: state.velocity,
                 cost: None,
                 energy: None,
+                largest: None,
+                last: None,
                 failure: Some(breakdown.to_string()),
             }],
         }

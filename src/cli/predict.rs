@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Folder of a finished run.
     run: PathBuf,
-    /// Initial displacement (m) and velocity (m/s); may be given again.
+    /// Initial displacement (m, of a rotation rad) and velocity (m/s, rad/s); may be given again.
     #[arg(long, value_name = "Y,V", required = true, allow_hyphen_values = true)]
     initial: Vec<String>,
     /// Folder for the motions as a table and a figure.
@@ -39,13 +39,18 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let motions = predict(&run.oscillator, &run.device, run.truth.as_ref(), &states)
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     if let Some(folder) = folder {
-        write(&folder, &run.oscillator.grid.times(), &motions)
+        let unit = if run.document.is_rotation() {
+            "rad"
+        } else {
+            "m"
+        };
+        write(&folder, &run.oscillator.grid.times(), &motions, unit)
             .map_err(|error| unwritable(folder.path(), &error))?;
     }
     let summaries: Vec<_> = motions.into_iter().map(|m| m.summary).collect();
     match arguments.json {
         true => print(&json(&summaries)),
-        false => print(&prediction_table(&summaries)),
+        false => print(&prediction_table(&summaries, run.document.is_rotation())),
     }
     Ok(OK)
 }
@@ -70,12 +75,21 @@ fn state(text: &str) -> Result<State, InputError> {
     }
 }
 
-fn write(folder: &OutputFolder, times: &[f64], motions: &[PredictedMotion]) -> std::io::Result<()> {
+fn write(
+    folder: &OutputFolder,
+    times: &[f64],
+    motions: &[PredictedMotion],
+    unit: &str,
+) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
     for (i, motion) in motions.iter().enumerate() {
-        table = table.column(format!("y_m_{}", i + 1), motion.motion.displacement.clone());
+        let header = format!("y_{unit}_{}", i + 1);
+        table = table.column(header, motion.motion.displacement.clone());
         if let Some(truth) = &motion.truth {
-            table = table.column(format!("true_y_m_{}", i + 1), truth.displacement.clone());
+            table = table.column(
+                format!("true_y_{unit}_{}", i + 1),
+                truth.displacement.clone(),
+            );
         }
     }
     let figure = figures::predictions(times, motions);

@@ -73,3 +73,84 @@ fn cone_row(cone: &Cone, theta: &[f64]) -> Option<Vec<(usize, f64)>> {
     }
     Some(entries)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::constraints::Statement;
+
+    fn problem(statement: Statement) -> Problem {
+        let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();
+        let readings: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
+        let record = Record::new("decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let parts = [
+            Part::constant(1.0),
+            Part::constant(0.4),
+            Part::constant(4.0).max(5.0),
+        ];
+        let builder = Builder::new(parts).record(record).demand(statement);
+        builder.build().unwrap()
+    }
+
+    fn at_most(max: f64) -> Statement {
+        Statement::DampingRatio { max }
+    }
+
+    #[test]
+    fn the_row_of_a_cone_is_the_slope_of_its_slack() {
+        let problem = problem(at_most(0.1));
+        // c = 2 zeta sqrt(m k) with zeta = 0.1.
+        let theta = [1.0, 0.4, 4.0];
+        let rows = active_rows(&problem, &theta);
+        let cones = || {
+            problem
+                .constraints
+                .cones
+                .iter()
+                .flat_map(|group| &group.cones)
+        };
+        assert!(!rows.is_empty() && rows.len() == cones().count());
+        let slack = |cone: &Cone, theta: &[f64]| {
+            let parts = cone.rows.multiply(theta);
+            let parts: Vec<f64> = parts
+                .iter()
+                .zip(cone.rows.right())
+                .map(|(v, r)| v - r)
+                .collect();
+            parts[0] - parts[1..].iter().map(|p| p * p).sum::<f64>().sqrt()
+        };
+        for (row, cone) in rows.iter().zip(cones()) {
+            assert!(!row.equality);
+            assert!(slack(cone, &theta).abs() < 1e-12);
+            for j in 0..3 {
+                let along = |step: f64| {
+                    let mut moved = theta;
+                    moved[j] += step;
+                    slack(cone, &moved)
+                };
+                let difference = (along(1e-5) - along(-1e-5)) / 2e-5;
+                let entries = row.entries.iter().filter(|(column, _)| *column == j);
+                let slope: f64 = entries.map(|(_, a)| a).sum();
+                assert!(
+                    (slope - difference).abs() < 1e-8,
+                    "{j}: {slope} {difference}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn rows_point_inwards_and_only_those_that_are_met_are_there() {
+        let problem = problem(at_most(0.5));
+        assert_eq!(active_rows(&problem, &[1.0, 0.4, 4.0]), []);
+        let rows = active_rows(&problem, &[1.0, 0.4, 5.0]);
+        let [row] = rows.as_slice() else {
+            panic!("{rows:?}");
+        };
+        assert!(!row.equality);
+        assert_eq!(row.entries, [(2, -1.0)]);
+    }
+}

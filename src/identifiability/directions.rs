@@ -152,3 +152,84 @@ fn hats(parameters: usize, count: usize) -> Vec<Vec<(usize, f64)>> {
     };
     (0..count).map(hat).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+
+    /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is sought.
+    fn coarse() -> (Problem, Directions) {
+        let times: Vec<f64> = (0..=200).map(|i| 0.05 * f64::from(i)).collect();
+        let readings: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &readings);
+        let parts = [Part::nodal(1.0), Part::constant(0.1), Part::nodal(1.2)];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let evaluation = problem.evaluate(&problem.start()).unwrap();
+        let directions = Directions::new(&problem, &evaluation, 100, 33);
+        (problem, directions)
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-11 * a.abs().max(b.abs()).max(1.0)
+    }
+
+    #[test]
+    fn hats_are_of_length_one_and_as_many_as_are_asked_for() {
+        let (problem, directions) = coarse();
+        assert!(directions.is_coarse() && !directions.is_empty());
+        // Three functions share the 33: eleven hats for each of many values, and the constant by itself.
+        let scalars = problem.functions.scalars().len();
+        assert_eq!(directions.len(), 11 + 1 + 11 + scalars);
+        assert_eq!(directions.parameters(), problem.parameters());
+        for k in 0..directions.len() {
+            let column = directions.column(k).into_iter().zip(&directions.metric);
+            let square: f64 = column.map(|(d, m)| m * d * d).sum();
+            assert!(near(square, 1.0), "{k}: {square}");
+        }
+    }
+
+    #[test]
+    fn what_hats_hold_comes_back() {
+        let (_, directions) = coarse();
+        let z: Vec<f64> = (0..directions.len())
+            .map(|k| (1.7 * k as f64).sin())
+            .collect();
+        let theta = directions.to_parameters(&z);
+        for (back, z) in directions.nearest(&theta).iter().zip(&z) {
+            assert!(near(*back, *z), "{back} {z}");
+        }
+        let slopes: Vec<f64> = (0..theta.len()).map(|j| (0.3 * j as f64).cos()).collect();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let functional = directions.functional(&slopes);
+        assert!(near(product(&functional, &z), product(&slopes, &theta)));
+        let row = directions.row(slopes.iter().copied().enumerate());
+        assert_eq!(row, functional);
+    }
+
+    /// What is smooth on the scale of the hats is one of their sums, what is rough has a nearest one.
+    #[test]
+    fn constants_and_lines_are_sums_of_hats() {
+        let (problem, directions) = coarse();
+        let range = problem.functions.ranges()[0].clone();
+        let mut theta = vec![0.0; problem.parameters()];
+        for j in range.clone() {
+            theta[j] = 2.0 - 0.004 * j as f64;
+        }
+        let nearest = directions.to_parameters(&directions.nearest(&theta));
+        for (there, theta) in nearest.iter().zip(&theta) {
+            assert!((there - theta).abs() < 1e-10, "{there} {theta}");
+        }
+        // The residual of the nearest one is orthogonal to every hat.
+        for j in range {
+            theta[j] = if j % 3 == 0 { 1.0 } else { 0.0 };
+        }
+        let nearest = directions.to_parameters(&directions.nearest(&theta));
+        let pairs = theta.iter().zip(&nearest).zip(&directions.metric);
+        let residual: Vec<f64> = pairs.map(|((t, n), m)| m * (t - n)).collect();
+        assert!(residual.iter().any(|r| r.abs() > 1e-6));
+        let most =
+            (directions.functional(&residual).into_iter()).fold(0.0f64, |m, x| m.max(x.abs()));
+        assert!(most < 1e-12, "{most}");
+    }
+}

@@ -164,8 +164,7 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
         true => "",
         false => "start from the readings (fit.initial=data), or ",
     };
-    // Outliers that a robust loss leaves aside are none of the fit's business.
-    let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR && !c.robust;
+    let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
     let told = |c: &ChannelSummary| c.sigma.is_some() && c.whiteness_p_value.is_some();
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));

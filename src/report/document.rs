@@ -6,6 +6,7 @@ use super::measured::{
 };
 use super::timings::TimingsSummary;
 use crate::dynamics::Grid;
+use crate::functions::Quantity;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -194,6 +195,12 @@ impl ResultDocument {
         let mut channels = self.experiments.iter().flat_map(|e| &e.channels);
         !channels.any(|c| c.sigma_estimated)
     }
+
+    /// Whether the motion is a rotation, in rad: then the mass is a moment of inertia.
+    pub fn is_rotation(&self) -> bool {
+        let mass = self.functions.get(Quantity::Mass.name());
+        mass.is_some_and(|mass| mass.unit == Quantity::Mass.angular_unit())
+    }
 }
 
 /// One function at the best point.
@@ -270,7 +277,7 @@ pub struct IdentifiabilitySummary {
     pub knowledge: Vec<String>,
 }
 
-/// The motion of the found device from one initial state, against the true device's.
+/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// Initial displacement, m.
@@ -283,6 +290,12 @@ pub struct Prediction {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
+    /// Largest distance of the motion from zero, m; `None` where there is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest: Option<f64>,
+    /// Displacement at the last node, m; `None` where there is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub last: Option<f64>,
     /// Why there is no motion from there, if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,

@@ -111,9 +111,11 @@ pub fn convergence(
     cost_ratio: &[f64],
     gradient_norm_squared_ratio: &[f64],
 ) -> Figure {
-    let cost = Style::new(Colour::Blue).width(2.2);
+    // A single iteration is a dot.
+    let factor = if iterations.len() == 1 { 3.0 } else { 1.0 };
+    let cost = Style::new(Colour::Blue).width(2.2 * factor);
     // Both solid, told apart by width: dashes vanish where the gradient norm jumps up and down.
-    let gradient = Style::new(Colour::Orange).width(0.9);
+    let gradient = Style::new(Colour::Orange).width(0.9 * factor);
     let squares = gradient_norm_squared_ratio;
     Figure::new(
         "convergence",

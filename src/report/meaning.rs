@@ -1,7 +1,7 @@
 //! Whether what a fit came to is a device to speak of, and the only one of its kind.
 
 use super::measured::{HalfStep, StatisticsSummary, diagnostics};
-use crate::diagnostics::{fit_percent, rms};
+use crate::diagnostics::rms;
 use crate::dynamics::{Excitation, Term};
 use crate::functions::Quantity;
 use crate::objective::{Channel, Evaluation, Loss};
@@ -12,8 +12,7 @@ use std::f64::consts::TAU;
 /// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
 /// the stepper, and not the device.
 const STEPPER: f64 = 0.1;
-/// A fit is absurd that misses all channels by more than twice what their readings vary, per cent. Outliers that
-/// a robust loss leaves aside cannot bring it below -42 %.
+/// A fit is absurd that misses all channels by more than twice what their readings vary, per cent.
 const ABSURD: f64 = -100.0;
 /// Below this share of the readings the fit does not explain the record, per cent.
 pub(super) const POOR: f64 = 90.0;
@@ -113,7 +112,7 @@ fn meaningless(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep)
     }
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
-        .map(|(channel, predicted)| fit_percent(channel.observed(), predicted))
+        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent)
         .peekable();
     let absurd = fits.peek().is_some() && fits.all(|fit| fit < ABSURD);
     absurd.then(|| "its motion misses the readings by more than twice what they vary".into())
@@ -153,7 +152,7 @@ fn coarse(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep) -> O
     let half = half_step.as_ref().ok()?.as_ref()?;
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
-        .map(|(channel, predicted)| fit_percent(channel.observed(), predicted));
+        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
     // Readings that were made with these steps are matched to their rounding.
     let is_exact = fits.all(|fit| fit > EXACT);
     (half.change_per_residual > 1.0 && !is_exact).then(|| {

@@ -4,7 +4,7 @@ use super::document::number_or_null;
 use super::known::HeldOut;
 use crate::config::ChannelNote;
 use crate::diagnostics::{
-    InformationCriteria, ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift,
+    InformationCriteria, ResidualDiagnostics, ResidualRecord, far_limit, far_off, offset_and_drift,
     with_estimated_sigma, with_known_sigma,
 };
 use crate::dynamics::Breakdown;
@@ -39,6 +39,10 @@ pub struct ChannelSummary {
     /// Readings that are not used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
+    /// Readings that a robust loss leaves aside, as their residuals are more than six robust standard deviations: rms, fit
+    /// and whiteness are those of the others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub left_aside: usize,
     /// Root-mean-square residual.
     #[serde(deserialize_with = "number_or_null")]
     pub rms_residual: f64,
@@ -51,7 +55,7 @@ pub struct ChannelSummary {
     /// Whether that was estimated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sigma_estimated: bool,
-    /// Whether a robust loss leaves readings far off aside.
+    /// Whether the loss is a robust one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub robust: bool,
     /// What the residuals have that is neither noise nor motion, if there is anything of the kind.
@@ -69,6 +73,11 @@ pub struct ChannelSummary {
     /// That of white noise lies below this in 95 of 100 lags.
     #[serde(deserialize_with = "number_or_null")]
     pub autocorrelation_band: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// What residuals have that is neither noise nor motion.
@@ -170,13 +179,12 @@ pub struct HoldOutSummary {
 /// One channel with its note and predictions.
 pub fn channel(channel: &Channel, note: Option<&ChannelNote>, predicted: &[f64]) -> ChannelSummary {
     let factor = note.map_or(1.0, |n| n.unit.factor());
-    let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / factor).collect() };
     let diagnostics = diagnostics(channel, predicted);
     let sigma = match channel.weighting() {
         Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / factor),
         Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
     };
-    let residuals = scaled(&channel.residuals(predicted).collect::<Vec<f64>>());
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
     ChannelSummary {
         kind: channel.kind().name().into(),
         unit: unit(channel, note).into(),
@@ -188,7 +196,8 @@ pub fn channel(channel: &Channel, note: Option<&ChannelNote>, predicted: &[f64])
             });
             ignored.collect()
         }),
-        rms_residual: crate::diagnostics::rms(&residuals),
+        left_aside: left_aside(channel, &residuals).len(),
+        rms_residual: diagnostics.rms / factor,
         fit_percent: diagnostics.fit_percent,
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
@@ -253,15 +262,34 @@ pub fn unit<'a>(channel: &Channel, note: Option<&'a ChannelNote>) -> &'a str {
     note.map_or(channel.kind().unit(), |n| n.unit.symbol())
 }
 
-/// The residuals of a channel, examined.
+/// The residuals of a channel, examined; those that a robust loss leaves aside are missing.
 pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics {
-    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let mut observed = channel.observed().to_vec();
+    for i in left_aside(channel, &residuals) {
+        residuals[i] = f64::NAN;
+        observed[i] = f64::NAN;
+    }
     ResidualDiagnostics::new(&ResidualRecord {
         times: channel.times(),
         residuals: &residuals,
-        observed: channel.observed(),
+        observed: &observed,
         model: predicted,
     })
+}
+
+/// The readings that a robust loss leaves aside, if the channel has one: those far off, whose squares say nothing of how
+/// well the others are matched.
+fn left_aside(channel: &Channel, residuals: &[f64]) -> Vec<usize> {
+    if channel.loss() == Loss::Squares {
+        return Vec::new();
+    }
+    let limit = far_limit(residuals);
+    let far = residuals
+        .iter()
+        .enumerate()
+        .filter(|(_, r)| r.abs() > limit);
+    far.map(|(i, _)| i).collect()
 }
 
 /// All readings together.

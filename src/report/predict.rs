@@ -59,6 +59,8 @@ fn summarise(
         velocity: state.velocity,
         cost: truth.map(|t| integral(&|i| motion.displacement[i] - t.displacement[i])),
         energy: truth.map(|t| integral(&|i| t.displacement[i])),
+        largest: Some((motion.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
+        last: motion.displacement.last().copied(),
         failure: None,
     }
 }

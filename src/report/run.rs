@@ -17,7 +17,7 @@ use super::render;
 use super::seen::SeenChannel;
 use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
-use crate::diagnostics::{fit_percent, rms};
+use crate::diagnostics::rms;
 use crate::dynamics::{Excitation, Term};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
@@ -194,7 +194,7 @@ impl FittedModel<'_> {
             let fits = held.channels();
             let fits = fits
                 .iter()
-                .map(|c| fit_percent(c.channel.observed(), c.predicted));
+                .map(|c| measured::diagnostics(c.channel, c.predicted).fit_percent);
             if let Some(worst) = fits.reduce(f64::min).filter(|worst| *worst < POOR) {
                 summary.open.push(format!(
                     "the record `{}`, which was held out, is matched to {} only: the device does not predict it",

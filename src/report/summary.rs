@@ -61,7 +61,11 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     write_constraints(text, document)?;
     write_rungs(text, document)?;
     if !document.predictions.is_empty() {
-        write!(text, "\n{}", prediction_table(&document.predictions))?;
+        write!(
+            text,
+            "\n{}",
+            prediction_table(&document.predictions, document.is_rotation())
+        )?;
     }
     Ok(())
 }
@@ -74,9 +78,9 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
             1 => "the readings are",
             _ => "the worst channel is",
         };
-        let aside = match channels().any(|c| c.robust) {
-            true => ", with outliers that the loss leaves aside",
-            false => "",
+        let aside = match channels().map(|c| c.left_aside).sum::<usize>() {
+            0 => String::new(),
+            far => format!(", {} far off left aside by the loss", count(far, "reading")),
         };
         let ratio = match document.has_ratio() {
             true => format!("; J/J0 {:.1e}", document.cost.ratio),
@@ -161,6 +165,9 @@ pub(super) fn write_channel(
         fit_in_words(channel.fit_percent),
         count(channel.readings, "reading")
     )?;
+    if channel.left_aside > 0 {
+        write!(text, "; {} far off left aside", channel.left_aside)?;
+    }
     for ignored in &channel.ignored {
         write!(text, "; {} not used: {}", ignored.readings, ignored.reason)?;
     }
@@ -367,27 +374,27 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
 }
 
 /// Predictions as a table: the initial state and, where a truth is known, the cost against it and the energy of the true
-/// motion.
-pub fn prediction_table(predictions: &[Prediction]) -> String {
+/// motion, else how far the motion goes and where it ends.
+pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String {
     let has_truth = predictions
         .iter()
         .any(|p| p.cost.is_some() || p.energy.is_some());
-    let row = |state: [&str; 2], truth: [&str; 2]| {
-        let mut row = format!("{:>12} {:>12}", state[0], state[1]);
-        if has_truth {
-            let _ = write!(row, " {:>14} {:>14}", truth[0], truth[1]);
-        }
-        row + "\n"
+    let m = if is_rotation { "rad" } else { "m" };
+    let row = |[y, v, one, other]: [&str; 4]| format!("{y:>12} {v:>12} {one:>14} {other:>14}\n");
+    let [y, v] = [format!("y(0) {m}"), format!("v(0) {m}/s")];
+    let [one, other] = match has_truth {
+        true => [format!("cost {m}^2 s"), format!("energy {m}^2 s")],
+        false => [format!("largest {m}"), format!("at the end {m}")],
     };
-    let mut text = row(["y(0) m", "v(0) m/s"], ["cost m^2 s", "energy m^2 s"]);
+    let mut text = row([&y, &v, &one, &other]);
     for p in predictions {
-        let state = [p.displacement, p.velocity].map(|x| significant(x, 6));
-        let known = |x: Option<f64>| x.map_or("unknown".into(), |x| format!("{x:.5e}"));
-        let truth = [p.cost, p.energy].map(known);
-        text += &row(
-            state.each_ref().map(String::as_str),
-            truth.each_ref().map(String::as_str),
-        );
+        let [y, v] = [p.displacement, p.velocity].map(|x| significant(x, 6));
+        let [one, other] = match has_truth {
+            true => [p.cost, p.energy].map(|x| x.map(|x| format!("{x:.5e}"))),
+            false => [p.largest, p.last].map(|x| x.map(|x| significant(x, 6))),
+        }
+        .map(|x| x.unwrap_or_else(|| "unknown".into()));
+        text += &row([&y, &v, &one, &other]);
         if let Some(failure) = &p.failure {
             let _ = writeln!(text, "{:>12} no motion: {failure}", "");
         }

@@ -14,6 +14,7 @@ mod clipping;
 mod decimate;
 mod filter;
 mod interpolate;
+mod onset;
 mod shape;
 mod spectrum;
 mod spline;
@@ -25,5 +26,6 @@ pub use filter::{
     zero_phase_transpose,
 };
 pub use interpolate::{Interpolation, Signal};
+pub use onset::onset;
 pub use shape::{Shape, SweepLaw};
 pub use spectrum::Spectrum;

@@ -1,5 +1,6 @@
 //! Which column of a table is what.
 
+use super::motion::spread;
 use super::quoted;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
@@ -39,6 +40,8 @@ const FOREIGN: [&str; 16] = [
     "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
     "bar", "ohm", "ma", "db",
 ];
+/// Of two sensors the later one is taken if it moves so many times as much: with less there is no telling.
+const MUCH: f64 = 3.0;
 /// Longest name that is taken for a single letter with a number or unit: `y1`, `acc 1`.
 const LONGEST_LETTER: usize = 2;
 
@@ -94,6 +97,8 @@ pub struct Column {
     tell_unit: bool,
     /// Whether nothing but its place says what it is.
     guessed: bool,
+    /// Whether the file says its unit.
+    has_unit: bool,
 }
 
 /// The columns that are used, and those that are not.
@@ -133,9 +138,7 @@ impl Columns {
                 continue;
             }
             match known(table, index) {
-                Some(column) if column.role != Role::Time && !columns.has(column.role) => {
-                    columns.used.push(column);
-                }
+                Some(column) if column.role != Role::Time => columns.take(table, column)?,
                 _ => columns.unused.push(index),
             }
         }
@@ -143,6 +146,27 @@ impl Columns {
             columns.guess(table)?;
         }
         Ok(columns)
+    }
+
+    /// Uses a column, or the one of its role that was there before: of several sensors of the motion the one that moves
+    /// much more than those before it.
+    fn take(&mut self, table: &Table, column: Column) -> Result<(), InputError> {
+        let Some(place) = self.used.iter().position(|c| c.role == column.role) else {
+            self.used.push(column);
+            return Ok(());
+        };
+        let size = |c: &Column| -> Result<f64, InputError> {
+            let readings = table.readings(c.index)?.iter().copied();
+            Ok(c.unit.factor() * spread(readings.filter(|x| x.is_finite())))
+        };
+        let moves_more = size(&column)? > MUCH * size(&self.used[place])?;
+        let left = match column.role.is_channel() && moves_more {
+            true => std::mem::replace(&mut self.used[place], column),
+            false => column,
+        };
+        self.unused.push(left.index);
+        self.unused.sort_unstable();
+        Ok(())
     }
 
     /// The first column that nothing is known of is a displacement.
@@ -165,6 +189,7 @@ impl Columns {
             unit: Unit::si(Kind::Displacement),
             tell_unit: false,
             guessed: true,
+            has_unit: false,
         });
         Ok(())
     }
@@ -207,10 +232,10 @@ impl Columns {
     /// What each column was taken for.
     pub fn in_words(&self, table: &Table) -> Vec<String> {
         let said = |c: &Column| {
-            let guess = if c.guessed {
-                ": a guess, please look"
-            } else {
-                ""
+            let guess = match (c.guessed, c.has_unit || c.role == Role::Time) {
+                (true, _) => ": a guess, please look",
+                (false, false) => ": the unit is a guess, please look",
+                (false, true) => "",
             };
             let role = c.role.key().replace('_', " of the ");
             let role = match c.role {
@@ -235,6 +260,16 @@ impl Columns {
     }
 }
 
+/// Readings per second by the column of times, if there is one whose numbers increase.
+pub fn rate(table: &Table) -> Option<(usize, f64)> {
+    (0..table.width()).find_map(|i| {
+        let column = known(table, i).filter(|c| c.role == Role::Time)?;
+        let times = increasing_at(table, i).ok()?;
+        let duration = column.unit.factor() * (times.last()? - times.first()?);
+        Some((i, (times.len() - 1) as f64 / duration))
+    })
+}
+
 /// The column of times: by unit, by name, or the first that increases.
 fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
     let increases = |i: &&usize| increasing_at(table, **i).is_ok();
@@ -255,6 +290,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
                 unit: Unit::si(Kind::Time),
                 tell_unit: false,
                 guessed: true,
+                has_unit: false,
             })),
         None => Err(
             InputError::file(table.path(), "there is no column of times")
@@ -292,13 +328,15 @@ fn known(table: &Table, index: usize) -> Option<Column> {
         .filter(|r| unit_of(*r).is_some())
         .or(by_unit)
         .or(by_name)?;
-    let (unit, in_name) = unit_of(role).unwrap_or((Unit::si(role.kind()), false));
+    let found = unit_of(role);
+    let (unit, in_name) = found.unwrap_or((Unit::si(role.kind()), false));
     Some(Column {
         index,
         role: role.of_base().filter(|_| is_base).unwrap_or(role),
         unit,
         tell_unit: in_name && unit.factor() != 1.0,
         guessed: false,
+        has_unit: found.is_some(),
     })
 }
 

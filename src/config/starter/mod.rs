@@ -6,6 +6,7 @@
 mod columns;
 mod motion;
 
+use crate::digits::significant;
 use crate::error::InputError;
 use crate::observations::Table;
 use columns::{Columns, Role};
@@ -18,6 +19,9 @@ const DAMPING_RATIO: f64 = 0.02;
 const PERIODS_PER_KNOT: f64 = 2.0;
 /// Most knots: enough to see that and how the stiffness changes.
 const MOST_KNOTS: f64 = 11.0;
+
+/// Two rates that differ by less are the same.
+const SAME_RATE: f64 = 0.01;
 
 /// A starter model and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +47,25 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
         short(motion.duration),
         motion.spacing_in_words()
     )];
+    if let Some(begins) = motion.begins {
+        found.insert(
+            0,
+            format!(
+                "nothing moves before {} s: left out (window)",
+                short(begins)
+            ),
+        );
+    }
     found.extend(columns.in_words(&table));
+    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
+        && (rate / given - 1.0).abs() > SAME_RATE
+    {
+        found.push(format!(
+            "`--sample-rate {given}` is taken, though `{}` says {} Hz",
+            table.label(index),
+            significant(rate, 4)
+        ));
+    }
     found.push(match motion.frequency {
         Some(frequency) => format!(
             "dominant frequency {} Hz: {} in the record",
@@ -97,6 +119,13 @@ fn text(
     }
     if let Some(units) = columns.units() {
         line("    units: ", units, "converted to SI");
+    }
+    if let Some(begins) = motion.begins {
+        line(
+            "    window: ",
+            format!("{{min: {}}}", significant(begins, 6)),
+            "s; before, nothing moves: the device is held or not yet struck",
+        );
     }
     let between = format!("{{interpolation: {}}}", motion.between);
     if columns.has(Role::Force) {

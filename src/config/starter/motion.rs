@@ -4,7 +4,7 @@ use super::columns::{Column, Columns, Role};
 use crate::diagnostics::offset_and_drift;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
-use crate::signal::Spectrum;
+use crate::signal::{Spectrum, onset};
 
 /// Fewest readings of which a model can be made.
 const FEWEST: usize = 8;
@@ -27,6 +27,8 @@ pub struct Motion {
     /// Median distance of readings, s.
     pub spacing: f64,
     pub is_regular: bool,
+    /// When the motion begins, s, if the readings stand still before.
+    pub begins: Option<f64>,
     /// Hz.
     pub frequency: Option<f64>,
     /// Whether the mean of the readings is larger than their distances from it.
@@ -89,19 +91,28 @@ impl Motion {
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let drive = drives.into_iter().find_map(channel);
         let drive = drive.map(|c| in_si(table, c)).transpose()?;
+        // What drives a motion may begin late, too.
+        let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
+        let begins = match drive {
+            Some(_) => None,
+            None => onset(&values, spacing),
+        };
+        let missing = times.len() - pairs.len();
+        let pairs = &pairs[begins.unwrap_or(0)..];
         // The line is a drift where the readings swing about it, and not the swing itself.
-        let duration = times[times.len() - 1] - times[0];
-        let beside_line = without_line(&pairs).and_then(|pairs| frequency(&pairs, spacing));
+        let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
+        let beside_line = without_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
         let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
         Ok(Self {
             between: between(&drive.unwrap_or_default()),
             readings: pairs.len(),
-            missing: times.len() - pairs.len(),
+            missing,
+            begins: begins.map(|_| pairs[0].0),
             duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
-            frequency: beside_line.or_else(|| frequency(&pairs, spacing)),
-            is_off_centre: off_centre(&pairs),
+            frequency: beside_line.or_else(|| frequency(pairs, spacing)),
+            is_off_centre: off_centre(pairs),
             drifts: beside_line.is_some(),
             force: force.map(|f| spread(f.into_iter().filter(|x| x.is_finite()))),
             motion: spread(pairs.iter().map(|(_, value)| *value)),
@@ -236,7 +247,7 @@ fn off_centre(pairs: &[(f64, f64)]) -> bool {
 }
 
 /// Standard deviation.
-fn spread(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.collect();
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -4,6 +4,7 @@ use super::run::ComparedRun;
 use super::verdict;
 use crate::dynamics::Device;
 use crate::functions::Ratios;
+use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
 use serde::Serialize;
@@ -33,6 +34,12 @@ pub struct Measures {
     pub misfit: f64,
     /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error.
     pub misfit_unit: &'static str,
+    /// Fit of the channel that is matched worst, per cent; `None` where there is none.
+    pub worst_fit: Option<f64>,
+    /// Whether the motion is a rotation: then what is said in kg, N and m is in kg m², N m and rad.
+    pub is_rotation: bool,
+    /// Whether `J/J0` means anything: not where sigma was estimated.
+    pub has_ratio: bool,
     /// `J/J0`.
     pub cost_ratio: f64,
     /// Iterations of the solver, those along a path of weights included.
@@ -81,6 +88,9 @@ impl Measures {
                 CostKind::EquationError => "N^2 s",
                 CostKind::Integral | CostKind::Mixed => "m^2 s",
             },
+            worst_fit: worst_fit(document),
+            is_rotation: document.is_rotation(),
+            has_ratio: document.has_ratio(),
             cost_ratio: document.cost.ratio,
             iterations: document.counts.iterations
                 + document.weights.as_ref().map_or(0, |w| w.iterations()),

@@ -84,53 +84,83 @@ fn rows(runs: &[Measures]) -> Vec<Row> {
             Cell::Number(m.errors.as_ref().map(of))
         })
     };
+    let units = Units::of(runs);
+    let Units {
+        mass,
+        damping,
+        stiffness,
+        metre,
+        ..
+    } = units;
+    let of = |what: &str, unit: [&str; 2]| format!("{what} ({})", unit[0]);
+    let under = |what: &str, unit: [&str; 2]| format!("{what}_{}", unit[1]);
     let mut rows = vec![
         text("status", "status", |m| m.status.clone()),
         text("method", "method", |m| m.method.clone()),
         count("nodes", "nodes", |m| m.nodes as u64),
         count("free values", "parameters", |m| m.parameters as u64),
         number(misfit_label(runs), "misfit", |m| Some(m.misfit)),
-        number("J/J0", "cost_ratio", |m| Some(m.cost_ratio)),
+        number("worst fit of a channel (%)", "worst_fit_percent", |m| {
+            m.worst_fit
+        }),
+        number("J/J0", "cost_ratio", |m| {
+            m.has_ratio.then_some(m.cost_ratio)
+        }),
         count("iterations", "iterations", |m| m.iterations),
         number("time (s)", "seconds_s", |m| Some(m.seconds)),
-        error("largest error of m (kg)", "mass_error_kg", |e| e.mass),
-        error("  of c (N s/m)", "damping_error_N_s_per_m", |e| e.damping),
-        error("  of k (N/m)", "stiffness_error_N_per_m", |e| e.stiffness),
+        error(
+            &of("largest error of m", mass),
+            &under("mass_error", mass),
+            |e| e.mass,
+        ),
+        error(
+            &of("  of c", damping),
+            &under("damping_error", damping),
+            |e| e.damping,
+        ),
+        error(
+            &of("  of k", stiffness),
+            &under("stiffness_error", stiffness),
+            |e| e.stiffness,
+        ),
         error("  of k/m (1/s²)", "k_over_m_error_per_s2", |e| e.k_over_m),
         error("  of c/m (1/s)", "c_over_m_error_per_s", |e| e.c_over_m),
-        number("smallest m (kg)", "mass_min_kg", |m| Some(m.smallest_mass)),
-        number("smallest c (N s/m)", "damping_min_N_s_per_m", |m| {
-            Some(m.smallest_damping)
+        number(&of("smallest m", mass), &under("mass_min", mass), |m| {
+            Some(m.smallest_mass)
         }),
+        number(
+            &of("smallest c", damping),
+            &under("damping_min", damping),
+            |m| Some(m.smallest_damping),
+        ),
         number("largest violation (relative)", "max_violation", |m| {
             m.max_violation
         }),
         number(
-            "∫(m″)² dt (kg²/s³)",
-            "mass_roughness_kg2_per_s3",
+            &of("∫(m″)² dt", units.mass_roughness),
+            &under("mass_roughness", units.mass_roughness),
             |m| Some(m.roughness.mass),
         ),
         number(
-            "∫(c′)² dt (N² s/m²)",
-            "damping_roughness_N2_s_per_m2",
+            &of("∫(c′)² dt", units.damping_roughness),
+            &under("damping_roughness", units.damping_roughness),
             |m| Some(m.roughness.damping),
         ),
         number(
-            "∫(k′)² dt (N²/(m² s))",
-            "stiffness_roughness_N2_per_m2_s",
+            &of("∫(k′)² dt", units.stiffness_roughness),
+            &under("stiffness_roughness", units.stiffness_roughness),
             |m| Some(m.roughness.stiffness),
         ),
     ];
     for (i, (y, v)) in shared_states(runs).into_iter().enumerate() {
-        let first = if i == 0 {
-            "cost (m² s) from"
-        } else {
-            "  from"
+        let first = match i {
+            0 => format!("cost ({metre}² s) from"),
+            _ => "  from".into(),
         };
         rows.push(row(
             runs,
-            &format!("{first} y = {y} m, v = {v} m/s"),
-            &format!("cost_from_{y}_m_{v}_m_per_s_m2_s"),
+            &format!("{first} y = {y} {metre}, v = {v} {metre}/s"),
+            &format!("cost_from_{y}_{metre}_{v}_{metre}_per_s_{metre}2_s"),
             |m| Cell::Number(find(m, (y, v)).and_then(|p| p.cost)),
         ));
     }
@@ -177,6 +207,42 @@ fn row(runs: &[Measures], label: &str, header: &str, of: impl Fn(&Measures) -> C
         label: label.into(),
         header: header.into(),
         cells: runs.iter().map(of).collect(),
+    }
+}
+
+/// The units of the rows, as people and as headers have them: those of rotations where all runs are.
+struct Units {
+    metre: &'static str,
+    mass: [&'static str; 2],
+    damping: [&'static str; 2],
+    stiffness: [&'static str; 2],
+    mass_roughness: [&'static str; 2],
+    damping_roughness: [&'static str; 2],
+    stiffness_roughness: [&'static str; 2],
+}
+
+impl Units {
+    fn of(runs: &[Measures]) -> Self {
+        match !runs.is_empty() && runs.iter().all(|run| run.is_rotation) {
+            true => Self {
+                metre: "rad",
+                mass: ["kg m²", "kg_m2"],
+                damping: ["N m s/rad", "N_m_s_per_rad"],
+                stiffness: ["N m/rad", "N_m_per_rad"],
+                mass_roughness: ["kg² m⁴/s³", "kg2_m4_per_s3"],
+                damping_roughness: ["N² m² s/rad²", "N2_m2_s_per_rad2"],
+                stiffness_roughness: ["N² m²/(rad² s)", "N2_m2_per_rad2_s"],
+            },
+            false => Self {
+                metre: "m",
+                mass: ["kg", "kg"],
+                damping: ["N s/m", "N_s_per_m"],
+                stiffness: ["N/m", "N_per_m"],
+                mass_roughness: ["kg²/s³", "kg2_per_s3"],
+                damping_roughness: ["N² s/m²", "N2_s_per_m2"],
+                stiffness_roughness: ["N²/(m² s)", "N2_per_m2_s"],
+            },
+        }
     }
 }
 

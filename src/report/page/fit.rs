@@ -152,7 +152,7 @@ fn predictions(document: &ResultDocument) -> String {
         [] => String::new(),
         some => format!(
             "<pre tabindex=\"0\">{}</pre>\n",
-            escape(&prediction_table(some))
+            escape(&prediction_table(some, document.is_rotation()))
         ),
     }
 }

@@ -155,3 +155,89 @@ impl Reduced {
         [&theta[..self.place], &[along / own], &theta[end..]].concat()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::constraints::Statement;
+    use crate::functions::Quantity;
+
+    fn whole() -> Problem {
+        let times: Vec<f64> = (0..=80).map(|i| 0.1 * f64::from(i)).collect();
+        let readings: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &readings);
+        let parts = [
+            Part::piecewise_linear(5, 1.0).smooth(1, 0.3).min(0.1),
+            Part::piecewise_linear(4, 0.2).smooth(0, 0.7).smooth(2, 0.2),
+            Part::piecewise_constant(6, 1.7).variation(0.4),
+        ];
+        let value = |of, value| Statement::Mean { of, value };
+        Builder::new(parts)
+            .record(record)
+            .demand(value(Quantity::Mass, 1.1))
+            .demand(Statement::DampingRatio { max: 0.8 })
+            .demand(Statement::Slope {
+                of: Quantity::Damping,
+                min: Some(-0.5),
+                max: None,
+            })
+            .prefer(value(Quantity::Stiffness, 1.5), 2.0)
+            .prefer(value(Quantity::Damping, 0.3), 3.0)
+            .build()
+            .unwrap()
+    }
+
+    /// With one function constant the problem is the whole one where that function is constant: of every function the
+    /// motion, the penalties, the soft rows and the constraints.
+    #[test]
+    fn the_reduced_problem_is_the_whole_one_at_constants() {
+        let whole = whole();
+        for function in 0..3 {
+            let reduced = Reduced::new(&whole, function);
+            let count = reduced.problem.parameters();
+            let own = whole.functions.ranges()[function].len();
+            assert_eq!(count, whole.parameters() + 1 - own);
+            let theta: Vec<f64> = (0..count)
+                .map(|j| 1.0 + 0.05 * (2.3 * j as f64).sin())
+                .collect();
+            let embedded = reduced.embed(&theta);
+            let costs = [
+                reduced.problem.evaluate(&theta).unwrap(),
+                whole.evaluate(&embedded).unwrap(),
+            ]
+            .map(|evaluation| [evaluation.misfit, evaluation.regularisation]);
+            for (a, b) in costs[0].iter().zip(costs[1]) {
+                assert!((a / b - 1.0).abs() < 1e-12, "{function}: {a} {b}");
+            }
+            assert!(costs[0][1] > 0.0);
+            let worst =
+                [(&reduced.problem, &theta), (&whole, &embedded)].map(|(problem, theta)| {
+                    let worst = problem.constraints.largest_violation(theta);
+                    worst.expect("constraints").relative
+                });
+            assert!(
+                worst[0] > 0.0 && (worst[0] - worst[1]).abs() < 1e-12,
+                "{worst:?}"
+            );
+            for (there, back) in theta.iter().zip(reduced.mean_of(&embedded)) {
+                assert!((there - back).abs() < 1e-12, "{function}: {there} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_about_the_shape_of_a_constant_are_gone() {
+        let whole = whole();
+        let slopes = |problem: &Problem| {
+            let groups = problem.constraints.groups.iter();
+            let of_slopes = groups.filter(|group| group.name.starts_with("slope of "));
+            of_slopes.map(|group| group.rows.len()).sum::<usize>()
+        };
+        assert_eq!(slopes(&whole), 3);
+        assert_eq!(slopes(&Reduced::new(&whole, 1).problem), 0);
+        assert_eq!(slopes(&Reduced::new(&whole, 0).problem), 3);
+        assert!(Reduced::new(&whole, 2).problem.variations.is_empty());
+        assert_eq!(Reduced::new(&whole, 1).problem.penalties.len(), 2);
+    }
+}

@@ -4,11 +4,12 @@ use super::{RawChannel, Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::digits::significant;
 use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::problem::Problem;
-use crate::signal::{Interpolation, Signal, Spectrum, clipped};
+use crate::signal::{Interpolation, Signal, Spectrum, clipped, onset};
 use std::f64::consts::TAU;
 
 /// Factors between channels, or between a reading and a known state, that look like a wrong unit.
@@ -159,6 +160,33 @@ fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
         *y -= level + along / spread * (t - middle);
     }
     values
+}
+
+/// Warns of a record without a drive that stands still before its motion begins: a free motion begins where nothing holds
+/// the device any more, or when it has been struck.
+pub fn stillness(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    record: &Record,
+    warnings: &mut Vec<String>,
+) {
+    let is_free = record.excitation.is_empty() && spec.force.is_none() && spec.base.is_none();
+    let begins = record.channels.iter().find_map(|channel| {
+        let spacing = channel.spacing?;
+        Some((channel, onset(&channel.values, spacing)?))
+    });
+    if let (true, Some((channel, first))) = (is_free, begins) {
+        let from = channel.times[first] + spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
+        warnings.push(format!(
+            "experiments[{i}] ({}): the {} stands still before {} s: a free motion begins where nothing holds or strikes the \
+             device any more: `window: {{min: {}}}`",
+            name(file, i),
+            channel.kind.name(),
+            significant(from, 6),
+            significant(from, 6),
+        ));
+    }
 }
 
 /// Warns of readings that pile up at one value, as where a motion goes beyond the range of its sensor.

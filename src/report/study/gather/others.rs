@@ -153,18 +153,20 @@ pub fn equivalents(
             .fold(0.0f64, |m, y| m.max(y.abs()));
         let pairs = moved.displacement.iter().zip(&motion.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-        records.push(record(
-            grid,
-            &name,
-            &found,
-            if off == 0.0 { 0.0 } else { off / largest },
-        ));
+        let apart = if off == 0.0 { 0.0 } else { off / largest };
+        // On steps that are too long for it a device moves otherwise, if at all.
+        if apart <= SAME_MOTION {
+            records.push(record(grid, &name, &found, apart));
+        }
     }
     match records.len() {
         1 => Vec::new(),
         _ => records,
     }
 }
+
+/// A device has the motion of the fit if it is no further from it than this share of the largest displacement.
+const SAME_MOTION: f64 = 0.1;
 
 /// Masses that grow, fall and swing away from the fit's.
 fn factors(mass: &[f64]) -> Vec<Equivalent> {
