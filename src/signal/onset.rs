@@ -49,7 +49,7 @@ mod tests {
 
     /// From -1 to 1, without a pattern.
     fn shock(i: i32) -> f64 {
-        2.0 * ((12.9898 * f64::from(i)).sin() * 43_758.5453).rem_euclid(1.0) - 1.0
+        2.0 * ((12.9898 * f64::from(i)).sin() * 43_758.545_3).rem_euclid(1.0) - 1.0
     }
 
     fn record(still: i32, noise: f64) -> Vec<f64> {

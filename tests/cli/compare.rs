@@ -157,6 +157,7 @@ fn the_table() {
         nodes                                      200        200        200
         free values                                  2          2        600
         misfit (m² s)                           [tiny]     [tiny]     [tiny]
+        worst fit of a channel (%)               100.0      100.0      99.89
         J/J0                                    [tiny]     [tiny]     [tiny]
         iterations                                   9          7         69
         time (s) [seconds]
@@ -222,6 +223,7 @@ fn files() {
     parameters
     misfit
     misfit_unit
+    worst_fit_percent
     cost_ratio
     iterations
     seconds_s

@@ -435,6 +435,99 @@ fn readings_at_the_end_of_a_range_are_seen() {
     assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 readings of the displacement lie at 0.5 m, the end of its range: if the sensor reads no further, the motion was cut off there, and these readings are better left out (empty fields)");
 }
 
+/// `readings` at every 0.05 s, as a table.
+fn table_of(readings: impl Fn(u32, f64) -> f64) -> String {
+    let row = |i: u32| {
+        let t = 0.05 * f64::from(i);
+        format!("{t},{}\n", readings(i, t))
+    };
+    format!("t_s,y_mm\n{}", (0..=400).map(row).collect::<String>())
+}
+
+/// A device that is held for four seconds before it swings freely, and one that is struck then.
+#[test]
+fn what_stands_still_first_is_left_out() {
+    let bench = Workbench::empty();
+    for (is_held, begins) in [(true, "4.4"), (false, "4.1")] {
+        let reading = |i: u32, t: f64| {
+            let t = t - 4.0;
+            let phase = if is_held {
+                (2.0 * t).cos()
+            } else {
+                (2.0 * t).sin()
+            };
+            let swing = match t >= 0.0 {
+                true => (-0.05 * t).exp() * phase,
+                false => f64::from(u8::from(is_held)),
+            };
+            swing + 0.01 * pseudo_random(i)
+        };
+        bench.write("record.csv", &table_of(reading));
+        let _ = std::fs::remove_file(bench.path("record.yaml"));
+        let said = bench.run_to(0, &["init", "record.csv"]);
+        let moves = format!("nothing moves before {begins} s: left out (window)\n");
+        assert!(said.contains(&moves), "{said}");
+        let window = format!("window: {{min: {begins}}}");
+        assert!(bench.read("record.yaml").contains(&window));
+        let (code, _, told) = bench.run(&["check", "record.yaml", "--no-gradient"]);
+        assert!(code == 0 && !told.contains("warning"), "{told}");
+        let whole = bench
+            .read("record.yaml")
+            .replace(&window, "window: {min: 0}");
+        bench.write("whole.yaml", &whole);
+        let (_, _, told) = bench.run(&["check", "whole.yaml", "--no-gradient"]);
+        let hint = format!("the displacement stands still before {begins} s: a free motion begins");
+        assert!(told.contains(&hint) && told.contains(&window), "{told}");
+    }
+}
+
+/// Sentinels among readings, under squares and under a robust loss: the second is judged by the readings that count, be
+/// its device the right one or not.
+#[test]
+fn a_robust_fit_is_judged_by_the_readings_that_count() {
+    let bench = Workbench::empty();
+    let reading = |i: u32, t: f64| match i % 90 {
+        17 => -9999.0,
+        _ => 3.0 * (-0.05 * t).exp() * (2.0 * t).cos() + 0.03 * pseudo_random(i),
+    };
+    bench.write("record.csv", &table_of(reading));
+    let said = bench.run_to(0, &["init", "record.csv"]);
+    let far =
+        "5 readings lie far off (-9999): empty fields are better; the model has a robust loss\n";
+    assert!(said.contains(far), "{said}");
+    assert!(said.contains("dominant frequency 0.31"), "{said}");
+    let robust = bench.read("record.yaml");
+    let loss = "loss: {displacement: huber}";
+    assert!(robust.contains(loss));
+    let squares = robust.replace(loss, "");
+    bench.write("squares.yaml", &squares);
+    let (_, _, told) = bench.run(&["check", "squares.yaml", "--no-gradient"]);
+    let lie = "5 readings of the displacement lie far off, the first -9999 mm at 0.85 s: better left out (empty fields)";
+    assert!(told.contains(lie), "{told}");
+
+    let fit = [
+        "fit",
+        "record.yaml",
+        "--no-report",
+        "--set",
+        "grid.nodes=801",
+    ];
+    let summary = bench.run_to(0, &fit);
+    let matched = "5 readings far off left aside by the loss\n";
+    assert!(summary.contains(matched), "{summary}");
+    assert!(summary.contains("matched to 99."), "{summary}");
+    assert!(summary.contains("stiffness is identified"), "{summary}");
+    assert!(summary.contains("the residuals look white"), "{summary}");
+    // A device that cannot follow the readings.
+    let wrong = ["--set", "functions.stiffness={fixed: 9.0}"];
+    let summary = bench.run_to(0, &[fit.as_slice(), &wrong].concat());
+    assert!(!summary.contains("is identified"), "{summary}");
+    assert!(
+        summary.contains("what the device leaves of the readings is large, and not white"),
+        "{summary}"
+    );
+}
+
 /// Two sensors of one motion, of which one may be the wrong way round.
 #[test]
 fn a_sensor_the_wrong_way_round_is_seen() {
@@ -602,6 +695,13 @@ fn a_starter_reads_the_names_of_columns() {
     let model = record("t_s,y_m,a_m_per_s2", &off);
     let sensors = "sensors: {acceleration: {offset: estimate}, displacement: {offset: estimate}}";
     assert!(model.contains(sensors), "{model}");
+    // Of several axes the one that moves.
+    let axes = |t: f64| format!("{t},{},{},0.1", 0.01 * (40.0 * t).sin(), (10.0 * t).cos());
+    let model = record("t_s,acc_x_m_per_s2,acc_y_m_per_s2,acc_z_m_per_s2", &axes);
+    assert!(
+        model.contains("columns: {time: t_s, acceleration: acc_y_m_per_s2}"),
+        "{model}"
+    );
     let drifting = |t: f64| format!("{t},{}", t + (10.0 * t).sin());
     let model = record("t_s,y_m", &drifting);
     assert!(

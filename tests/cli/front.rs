@@ -152,6 +152,25 @@ fn a_starter_says_what_was_found() {
     error: run 1/my data.yaml: there is such a file already
       expected: another name: --out MODEL
     ");
+    let said = bench.run_to(
+        0,
+        &[
+            "init",
+            "run 1/my data.csv",
+            "--sample-rate",
+            "500",
+            "--out",
+            "other.yaml",
+        ],
+    );
+    let taken = "`--sample-rate 500` is taken, though `Time [ms]` says 10000 Hz\n";
+    assert!(said.contains(taken), "{said}");
+    bench.write("bare.csv", &text.replace("Time [ms],Weg_mm", "t,y"));
+    let said = bench.run_to(0, &["init", "bare.csv"]);
+    assert!(
+        said.contains("column `y`: displacement, m: the unit is a guess, please look\n"),
+        "{said}"
+    );
     bench.write("only.csv", "acc\n1\n2\n1\n");
     assert_snapshot!(bench.run(&["init", "only.csv"]).2, @"
     error: only.csv: there is no column of times

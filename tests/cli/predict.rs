@@ -1,6 +1,6 @@
 //! `kmcfit predict`.
 
-use crate::workbench::{column, paper_run, table};
+use crate::workbench::{Workbench, column, paper_run, table};
 use insta::assert_snapshot;
 use serde_json::Value;
 
@@ -55,4 +55,77 @@ fn motions_are_written() {
     assert_eq!(column(&motions, "y_m_1")[0], -1.0);
     let svg = bench.read("predicted/figures/predictions.svg");
     roxmltree::Document::parse(&svg).expect("XML");
+}
+
+/// A rotation has the units of one, everywhere; without a truth a prediction says how far the motion goes.
+#[test]
+fn a_rotation_is_told_in_its_units() {
+    let bench = Workbench::with_shipped_models();
+    let model = "models/roll-decay.yaml";
+    let more = ["--no-report", "--set", "fit.stop.iterations=20"];
+    for out in ["roll", "again"] {
+        bench.run_to(0, &[&["fit", model, "--out", out], &more[..]].concat());
+    }
+    let predict = [
+        "predict",
+        "roll",
+        "--initial",
+        "0.1,0",
+        "--out",
+        "predicted",
+    ];
+    let said = bench.run_to(0, &predict);
+    let (header, row) = said.trim_end().split_once('\n').expect("two lines");
+    let words: Vec<&str> = header.split_whitespace().collect();
+    assert_eq!(
+        words.join(" "),
+        "y(0) rad v(0) rad/s largest rad at the end rad"
+    );
+    let motions = bench.read("predicted/predictions.csv");
+    assert_eq!(table(&motions).0, ["t_s", "y_rad_1"]);
+    let motion = column(&motions, "y_rad_1");
+    let numbers: Vec<f64> = row
+        .split_whitespace()
+        .map(|x| x.parse().expect(row))
+        .collect();
+    assert_eq!(numbers[..2], [0.1, 0.0]);
+    let largest = motion.iter().fold(0.0f64, |most, y| most.max(y.abs()));
+    for (shown, exact) in [
+        (numbers[2], largest),
+        (numbers[3], motion[motion.len() - 1]),
+    ] {
+        assert!((shown - exact).abs() <= 1e-5 * exact.abs(), "{said}");
+    }
+    let said = bench.run_to(0, &["compare", "roll", "again", "--out", "both"]);
+    assert!(
+        said.contains("smallest m (kg m²)") && !said.contains("(kg)"),
+        "{said}"
+    );
+    let csv = bench.read("both/compare.csv");
+    assert!(
+        csv.contains(",mass_min_kg_m2,damping_min_N_m_s_per_rad,"),
+        "{csv}"
+    );
+}
+
+/// Readings with the fit, then each function.
+#[test]
+fn the_plot_draws_readings_and_functions() {
+    let bench = Workbench::with_small_model();
+    let plain = ["fit", "model.yaml", "--no-report", "--out", "run"];
+    let without = bench.run_to(0, &plain);
+    let plot = bench.run_to(0, &[&plain[..], &["--plot"]].concat());
+    let begin = plot
+        .find("(line: fit, o: readings off it)")
+        .expect("a chart");
+    assert!(!without.contains("(line: fit"));
+    let charts = &plot[begin..];
+    for title in ["mass in kg", "damping in N s/m", "stiffness in N/m"] {
+        assert!(charts.contains(&format!("\n{title}\n")), "{charts}");
+    }
+    // Ten rows of letters for the readings, five for each function, and an axis of times below each.
+    let drawn = charts
+        .lines()
+        .filter(|line| line.contains('┤') || line.contains('│') || line.contains('|'));
+    assert!(drawn.count() >= 25, "{charts}");
 }

@@ -57,6 +57,17 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
         );
     }
     found.extend(columns.in_words(&table));
+    if let Some((count, first)) = motion.far_off {
+        let column = columns
+            .channels()
+            .next()
+            .and_then(|role| columns.find(role));
+        let factor = column.map_or(1.0, |column| column.unit.factor());
+        found.push(format!(
+            "{count} readings lie far off ({}): empty fields are better; the model has a robust loss",
+            significant(first / factor, 4)
+        ));
+    }
     if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
         && (rate / given - 1.0).abs() > SAME_RATE
     {
@@ -150,6 +161,13 @@ fn text(
         format!("{{{}}}", sigmas.join(", ")),
         "standard deviation of a reading, SI; a number, if it is known",
     );
+    if let (Some(_), Some(role)) = (motion.far_off, columns.channels().next()) {
+        line(
+            "    loss: ",
+            format!("{{{}: huber}}", role.key()),
+            "readings far off count little; squares count them in full",
+        );
+    }
     let mut sensors = Vec::new();
     let mut why = Vec::new();
     if columns.has(Role::Acceleration) {

@@ -1,7 +1,7 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
 use super::columns::{Column, Columns, Role};
-use crate::diagnostics::offset_and_drift;
+use crate::diagnostics::{far_off, offset_and_drift};
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use crate::signal::{Spectrum, onset};
@@ -27,6 +27,8 @@ pub struct Motion {
     /// Median distance of readings, s.
     pub spacing: f64,
     pub is_regular: bool,
+    /// How many readings lie far off, and the first of them, in SI.
+    pub far_off: Option<(usize, f64)>,
     /// When the motion begins, s, if the readings stand still before.
     pub begins: Option<f64>,
     /// Hz.
@@ -67,7 +69,7 @@ impl Motion {
             ));
         };
         let values = in_si(table, column)?;
-        let pairs: Vec<(f64, f64)> = (times.iter().copied().zip(values))
+        let mut pairs: Vec<(f64, f64)> = (times.iter().copied().zip(values))
             .filter(|(_, value)| value.is_finite())
             .collect();
         if pairs.len() < FEWEST {
@@ -91,13 +93,14 @@ impl Motion {
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let drive = drives.into_iter().find_map(channel);
         let drive = drive.map(|c| in_si(table, c)).transpose()?;
-        // What drives a motion may begin late, too.
+        let missing = times.len() - pairs.len();
+        let (pairs, far_off) = without_far_off(pairs);
         let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
+        // What drives a motion may begin late, too.
         let begins = match drive {
             Some(_) => None,
             None => onset(&values, spacing),
         };
-        let missing = times.len() - pairs.len();
         let pairs = &pairs[begins.unwrap_or(0)..];
         // The line is a drift where the readings swing about it, and not the swing itself.
         let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
@@ -107,6 +110,7 @@ impl Motion {
             between: between(&drive.unwrap_or_default()),
             readings: pairs.len(),
             missing,
+            far_off,
             begins: begins.map(|_| pairs[0].0),
             duration,
             spacing,
@@ -142,6 +146,23 @@ impl Motion {
         };
         format!("{kind} {} s{missing}", super::short(self.spacing))
     }
+}
+
+/// Readings without those that lie far off the others, how many those are, and the first of them.
+fn without_far_off(pairs: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, Option<(usize, f64)>) {
+    let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
+    let level = median(&values);
+    let away: Vec<f64> = values.iter().map(|value| value - level).collect();
+    let far = far_off(&away);
+    let Some(first) = far.first().map(|i| values[*i]) else {
+        return (pairs, None);
+    };
+    let stays = |(i, _): &(usize, (f64, f64))| far.binary_search(i).is_err();
+    let near = pairs.into_iter().enumerate().filter(stays);
+    (
+        near.map(|(_, pair)| pair).collect(),
+        Some((far.len(), first)),
+    )
 }
 
 /// Readings without their straight line, if that is a good part of them.

@@ -4,6 +4,7 @@ use super::{RawChannel, Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::diagnostics::far_off;
 use crate::digits::significant;
 use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
@@ -185,6 +186,31 @@ pub fn stillness(
             channel.kind.name(),
             significant(from, 6),
             significant(from, 6),
+        ));
+    }
+}
+
+/// Warns of single readings that lie far off the others, where their squares count in full.
+pub fn outliers(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<String>) {
+    for channel in record.channels.iter().filter(|c| c.is_squared()) {
+        let mut sorted = channel.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let level = sorted[sorted.len() / 2];
+        let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
+        let far = far_off(&away);
+        let Some(first) = far.first() else { continue };
+        let kind = channel.kind.name();
+        let lie = match far.len() {
+            1 => format!("one reading of the {kind} lies far off,"),
+            many => format!("{many} readings of the {kind} lie far off, the first"),
+        };
+        warnings.push(format!(
+            "experiments[{i}] ({}): {lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: \
+             huber}}`)",
+            name(file, i),
+            significant(channel.values[*first] / channel.unit.factor(), 4),
+            channel.unit.symbol(),
+            significant(channel.times[*first], 6),
         ));
     }
 }

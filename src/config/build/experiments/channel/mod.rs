@@ -50,6 +50,11 @@ pub struct RawChannel {
 }
 
 impl RawChannel {
+    /// Whether its residuals count by their squares.
+    pub fn is_squared(&self) -> bool {
+        self.loss == Loss::Squares
+    }
+
     /// What a report says about it.
     pub fn note(&self) -> ChannelNote {
         ChannelNote {
