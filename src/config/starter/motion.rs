@@ -94,7 +94,7 @@ impl Motion {
         let drive = drives.into_iter().find_map(channel);
         let drive = drive.map(|c| in_si(table, c)).transpose()?;
         let missing = times.len() - pairs.len();
-        let (pairs, far_off) = without_far_off(pairs);
+        let far_off = leave_out_far_off(&mut pairs);
         let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
         // What drives a motion may begin late, too.
         let begins = match drive {
@@ -148,21 +148,16 @@ impl Motion {
     }
 }
 
-/// Readings without those that lie far off the others, how many those are, and the first of them.
-fn without_far_off(pairs: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, Option<(usize, f64)>) {
+/// Leaves out the readings that lie far off the others; how many those are, and the first of them.
+fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
     let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
     let level = median(&values);
     let away: Vec<f64> = values.iter().map(|value| value - level).collect();
     let far = far_off(&away);
-    let Some(first) = far.first().map(|i| values[*i]) else {
-        return (pairs, None);
-    };
-    let stays = |(i, _): &(usize, (f64, f64))| far.binary_search(i).is_err();
-    let near = pairs.into_iter().enumerate().filter(stays);
-    (
-        near.map(|(_, pair)| pair).collect(),
-        Some((far.len(), first)),
-    )
+    let first = values[*far.first()?];
+    let mut place = 0..;
+    pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));
+    Some((far.len(), first))
 }
 
 /// Readings without their straight line, if that is a good part of them.
