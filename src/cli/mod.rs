@@ -1,5 +1,6 @@
 //! The command line: one file per command, no numerics.
 
+mod arguments;
 mod check;
 mod compare;
 mod demo;
@@ -20,7 +21,7 @@ use crate::error::{InputError, Place};
 use crate::excerpt::Excerpt;
 use crate::input::harmless;
 use crate::solvers::Status;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use console::style;
 use overrides::Overrides;
 use std::fmt::Display;
@@ -79,7 +80,16 @@ impl From<InputError> for Failure {
 
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => match arguments::no_number(&error) {
+            Some(error) => {
+                complain(&error);
+                return ExitCode::from(BAD_INPUT);
+            }
+            None => arguments::with_near_command(error, &Arguments::command()).exit(),
+        },
+    };
     if let Err(error) = crate::lanes::check_limit() {
         complain(&error);
         return ExitCode::from(BAD_INPUT);

@@ -109,6 +109,32 @@ fn starters_can_be_fitted() {
     assert_eq!(schema["title"], "kmcfit model file");
 }
 
+/// Where clap says too little, its errors are those of the program.
+#[test]
+fn arguments_that_are_no_numbers_and_commands_that_are_near() {
+    let bench = Workbench::with_small_model();
+    let (code, _, said) = bench.run(&["fti", "model.yaml"]);
+    assert_eq!(code, 2);
+    assert!(
+        said.contains("a similar subcommand exists: 'fit'"),
+        "{said}"
+    );
+    let (code, _, said) = bench.run(&["fit", "model.yaml", "--checkpoint", "often"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(said, @"
+    error: --checkpoint <SECONDS>: this is no number
+      found: `often`
+      expected: a number
+    ");
+    let (code, _, said) = bench.run(&["check", "model.yaml", "--nodes", "100,many"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(said, @"
+    error: --nodes <N,N,...>: this is no number
+      found: `many`
+      expected: a whole number, not negative
+    ");
+}
+
 #[test]
 fn a_starter_says_what_was_found() {
     let bench = Workbench::empty();
@@ -171,6 +197,12 @@ fn a_starter_says_what_was_found() {
         said.contains("column `y`: displacement, m: the unit is a guess, please look\n"),
         "{said}"
     );
+    bench.write("empty.csv", "t_s,y_m\n0,\n1,\n2,\n");
+    assert_snapshot!(bench.run(&["init", "empty.csv"]).2, @"
+    error: empty.csv: all readings are missing
+      found: no number in the column `y_m`
+      expected: at least some readings
+    ");
     bench.write("only.csv", "acc\n1\n2\n1\n");
     assert_snapshot!(bench.run(&["init", "only.csv"]).2, @"
     error: only.csv: there is no column of times

@@ -20,7 +20,7 @@ pub enum Role {
 
 /// Beginnings of names, in small letters, and what they name.
 const NAMES: [(Role, &[&str]); 5] = [
-    (Role::Time, &["time", "zeit", "t"]),
+    (Role::Time, &["time", "zeit", "uhrzeit", "t"]),
     (
         Role::Displacement,
         &[
@@ -171,6 +171,13 @@ impl Columns {
 
     /// The first column that nothing is known of is a displacement.
     fn guess(&mut self, table: &Table) -> Result<(), InputError> {
+        let is_channel = |i: &usize| known(table, *i).is_some_and(|c| c.role.is_channel());
+        if let Some(empty) = (0..table.width()).find(is_channel) {
+            let label = table.label(empty);
+            return Err(InputError::file(table.path(), "all readings are missing")
+                .found(format!("no number in the column `{label}`"))
+                .expected("at least some readings"));
+        }
         if self.unused.is_empty() {
             let names = (0..table.width()).map(|i| table.label(i));
             return Err(InputError::file(

@@ -1,0 +1,44 @@
+//! What is wrong with the arguments, where clap says too little.
+
+use crate::error::{InputError, Place};
+use crate::near::nearest;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use std::error::Error;
+use std::num::{ParseFloatError, ParseIntError};
+
+/// An argument that is no number where one must be; `None` for all else.
+pub fn no_number(error: &clap::Error) -> Option<InputError> {
+    if error.kind() != ErrorKind::ValueValidation {
+        return None;
+    }
+    let source = error.source()?;
+    let expected = match () {
+        () if source.is::<ParseFloatError>() => "a number",
+        () if source.is::<ParseIntError>() => "a whole number, not negative",
+        () => return None,
+    };
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    let place = Place::Argument(text(ContextKind::InvalidArg)?);
+    let found = text(ContextKind::InvalidValue)?;
+    let error = InputError::new(place, "this is no number");
+    Some(error.found(format!("`{found}`")).expected(expected))
+}
+
+/// The error, with the command that was probably meant.
+pub fn with_near_command(mut error: clap::Error, program: &clap::Command) -> clap::Error {
+    if let (ErrorKind::InvalidSubcommand, None, Some(ContextValue::String(word))) = (
+        error.kind(),
+        error.get(ContextKind::SuggestedSubcommand),
+        error.get(ContextKind::InvalidSubcommand),
+    ) {
+        let names = program.get_subcommands().map(clap::Command::get_name);
+        if let Some(near) = nearest(word, names) {
+            let near = ContextValue::Strings(vec![near.to_owned()]);
+            error.insert(ContextKind::SuggestedSubcommand, near);
+        }
+    }
+    error
+}
