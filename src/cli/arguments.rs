@@ -21,7 +21,9 @@ pub fn no_number(error: &clap::Error) -> Option<InputError> {
         Some(ContextValue::String(text)) => Some(text.clone()),
         _ => None,
     };
-    let place = Place::Argument(text(ContextKind::InvalidArg)?);
+    let argument = text(ContextKind::InvalidArg)?;
+    let name = argument.split(' ').next().unwrap_or(&argument);
+    let place = Place::Argument(name.into());
     let found = text(ContextKind::InvalidValue)?;
     let error = InputError::new(place, "this is no number");
     Some(error.found(format!("`{found}`")).expected(expected))

@@ -11,6 +11,8 @@ use crate::solvers::{Solver, Status};
 const PATTERN: f64 = 1e-3;
 /// Half the step may change the model's readings by this share of the largest one.
 const COARSE: f64 = 1e-3;
+/// A free record that is matched to less, per cent, may be none.
+const HARDLY: f64 = 50.0;
 /// Name of the rung that starts from the model's start values.
 const FROM_START_VALUES: &str = "start values";
 /// So many things to try next are enough.
@@ -100,7 +102,17 @@ fn start_is_sought(document: &ResultDocument, record: &str) -> bool {
 /// What a record asks for that is hardly matched: its drive is doubted first.
 fn about_mismatch(document: &ResultDocument, record: &ExperimentSummary) -> String {
     let drive = match record.driven_by.first().map(String::as_str) {
-        None => return more_freedom(document),
+        None => {
+            let worst =
+                (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
+            let unknown = match worst < HARDLY {
+                true => {
+                    ", or, if something unknown keeps it moving, compare accelerations instead of motions (fit.method=equation-error)"
+                }
+                false => "",
+            };
+            return more_freedom(document) + unknown;
+        }
         Some("base") => "the motion of the base",
         Some(_) => "the force",
     };

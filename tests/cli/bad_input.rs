@@ -646,9 +646,9 @@ fn simulate_arguments() {
       expected: 3 or more
     ");
     assert_snapshot!(with(&["--nodes", "many"]), @"
-    error: invalid value 'many' for '--nodes <NODES>': invalid digit found in string
-
-    For more information, try '--help'.
+    error: --nodes: this is no number
+      found: `many`
+      expected: a whole number, not negative
     ");
     bench.write("model.yaml", &MODEL.replace("    data: readings.csv\n", ""));
     assert_snapshot!(with(&[]), @"

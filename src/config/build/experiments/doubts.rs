@@ -1,6 +1,6 @@
 //! What looks wrong in a record, and what no record can tell.
 
-use super::{RawChannel, Record, name};
+use super::{RawChannel, Record, is_equation_error, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
@@ -173,6 +173,8 @@ pub fn stillness(
     warnings: &mut Vec<String>,
 ) {
     let is_free = record.excitation.is_empty() && spec.force.is_none() && spec.base.is_none();
+    // The equation error asks for no motion from a start.
+    let is_free = is_free && !is_equation_error(file);
     let begins = record.channels.iter().find_map(|channel| {
         let spacing = channel.spacing?;
         Some((channel, onset(&channel.values, spacing)?))
