@@ -16,7 +16,7 @@ mod words;
 
 pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
 pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
-pub(crate) use pattern::{far_limit, median_size};
+pub(crate) use pattern::median_size;
 pub use pattern::{far_off, offset_and_drift};
 pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};

@@ -37,7 +37,8 @@ pub fn far_off(residuals: &[f64]) -> Vec<usize> {
         i => 0.5 * (residuals[i - 1] + residuals[i + 1]),
     };
     let jumps: Vec<f64> = (0..=last).map(|i| residuals[i] - neighbours(i)).collect();
-    let (size, jump) = (far_limit(residuals), far_limit(&jumps));
+    let limit = |values: &[f64]| FAR * OF_MEDIAN * median_size(values);
+    let (size, jump) = (limit(residuals), limit(&jumps));
     let far: Vec<usize> = (0..=last)
         .filter(|i| residuals[*i].abs() > size && jumps[*i].abs() > jump)
         .collect();
@@ -88,11 +89,6 @@ pub fn offset_and_drift(times: &[f64], residuals: &[f64]) -> [f64; 2] {
     let offset = n as f64 * level * level / squares;
     let drift = along * along / (spread * squares);
     [offset, drift].map(|share| if share.is_finite() { share } else { 0.0 })
-}
-
-/// Beyond this size single residuals are far off: six robust standard deviations.
-pub(crate) fn far_limit(residuals: &[f64]) -> f64 {
-    FAR * OF_MEDIAN * median_size(residuals)
 }
 
 /// The median of the sizes of some values, 0 of none.

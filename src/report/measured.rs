@@ -4,7 +4,7 @@ use super::document::number_or_null;
 use super::known::HeldOut;
 use crate::config::ChannelNote;
 use crate::diagnostics::{
-    InformationCriteria, ResidualDiagnostics, ResidualRecord, far_limit, far_off, offset_and_drift,
+    InformationCriteria, ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift,
     with_estimated_sigma, with_known_sigma,
 };
 use crate::dynamics::Breakdown;
@@ -39,8 +39,8 @@ pub struct ChannelSummary {
     /// Readings that are not used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
-    /// Readings that a robust loss leaves aside, as their residuals are more than six robust standard deviations: rms, fit
-    /// and whiteness are those of the others.
+    /// Single readings far off ([`crate::diagnostics::far_off`]), under a robust loss: rms, fit and whiteness are those of
+    /// the others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub left_aside: usize,
     /// Root-mean-square residual.
@@ -262,7 +262,7 @@ pub fn unit<'a>(channel: &Channel, note: Option<&'a ChannelNote>) -> &'a str {
     note.map_or(channel.kind().unit(), |n| n.unit.symbol())
 }
 
-/// The residuals of a channel, examined; those that a robust loss leaves aside are missing.
+/// The residuals of a channel, examined; those that are left aside are missing.
 pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics {
     let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
     let mut observed = channel.observed().to_vec();
@@ -278,18 +278,13 @@ pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics 
     })
 }
 
-/// The readings that a robust loss leaves aside, if the channel has one: those far off, whose squares say nothing of how
-/// well the others are matched.
+/// Single readings far off ([`far_off`]) that are left aside under a robust loss: their squares say nothing of how well the
+/// others are matched. A part of the motion that is missed is none of them.
 fn left_aside(channel: &Channel, residuals: &[f64]) -> Vec<usize> {
-    if channel.loss() == Loss::Squares {
-        return Vec::new();
+    match channel.loss() {
+        Loss::Squares => Vec::new(),
+        _ => far_off(residuals),
     }
-    let limit = far_limit(residuals);
-    let far = residuals
-        .iter()
-        .enumerate()
-        .filter(|(_, r)| r.abs() > limit);
-    far.map(|(i, _)| i).collect()
 }
 
 /// All readings together.

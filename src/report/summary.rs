@@ -6,6 +6,7 @@ use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
 use crate::digits::significant;
 use crate::identifiability::Verdict;
+use crate::solvers::CONTINUED;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.
@@ -80,7 +81,7 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
         };
         let aside = match channels().map(|c| c.left_aside).sum::<usize>() {
             0 => String::new(),
-            far => format!(", {} far off left aside by the loss", count(far, "reading")),
+            far => format!(", {} far off left aside", count(far, "reading")),
         };
         let ratio = match document.has_ratio() {
             true => format!("; J/J0 {:.1e}", document.cost.ratio),
@@ -244,7 +245,8 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
         .iter()
         .map(|rung| rung.iterations)
         .sum::<u64>();
-    let starts = count(document.rungs.len(), "start");
+    let starts = document.rungs.iter().filter(|rung| rung.start != CONTINUED);
+    let starts = count(starts.count(), "start");
     match estimates_sigma(document) {
         true => format!("{last} after {all} from {starts}"),
         false => format!("{last}, {all} in all from {starts}"),

@@ -32,7 +32,7 @@ const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
 const HORIZON_ITERATIONS: u64 = 20;
 
 /// Name of the rung that goes on with the one that came furthest.
-const CONTINUED: &str = "best of these, continued";
+pub(crate) const CONTINUED: &str = "best of these, continued";
 
 /// Where a fit starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -36,6 +36,7 @@ pub use hold_out::predict_held_out;
 pub use infeasible::without_motion;
 pub use keep::{Bits, Keeper, Kept, Memory, Moment, Standing, Watch};
 pub use kinematics::states_from_readings;
+pub(crate) use ladder::CONTINUED;
 pub use ladder::{Initial, Rung, fit, fit_watched};
 pub use noise::{fit_with_noise, fit_with_noise_watched};
 pub use outcome::{Outcome, Status};

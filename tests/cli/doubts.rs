@@ -478,6 +478,22 @@ fn what_stands_still_first_is_left_out() {
         let (_, _, told) = bench.run(&["check", "whole.yaml", "--no-gradient"]);
         let hint = format!("the displacement stands still before {begins} s: a free motion begins");
         assert!(told.contains(&hint) && told.contains(&window), "{told}");
+        // On a clock of its own, and one that is set to zero.
+        let late = |row: &str| match row.split_once(',').map(|(t, y)| (t.parse::<f64>(), y)) {
+            Some((Ok(t), y)) => format!("{:.2},{y}\n", 1_700_006_000.0 + t),
+            _ => format!("{row}\n"),
+        };
+        let table = bench.read("record.csv");
+        bench.write("late.csv", &table.lines().map(late).collect::<String>());
+        let _ = std::fs::remove_file(bench.path("late.yaml"));
+        bench.run_to(0, &["init", "late.csv"]);
+        let window = format!("window: {{min: 170000600{begins}}}");
+        let late = bench.read("late.yaml");
+        assert!(late.contains(&window), "{late}");
+        let zero = late.replace(&window, "time_zero: 1700006000");
+        bench.write("late.yaml", &zero);
+        let (code, _, told) = bench.run(&["check", "late.yaml", "--no-gradient"]);
+        assert!(code == 0 && told.contains(&window), "{told}");
     }
 }
 
@@ -513,11 +529,21 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
         "grid.nodes=801",
     ];
     let summary = bench.run_to(0, &fit);
-    let matched = "5 readings far off left aside by the loss\n";
+    let matched = "5 readings far off left aside\n";
     assert!(summary.contains(matched), "{summary}");
     assert!(summary.contains("matched to 99."), "{summary}");
     assert!(summary.contains("stiffness is identified"), "{summary}");
     assert!(summary.contains("the residuals look white"), "{summary}");
+    // Without a sigma a robust loss needs one, too.
+    bench.write(
+        "bare.yaml",
+        &squares.replace("sigma: {displacement: estimate}", ""),
+    );
+    let (_, _, told) = bench.run(&["check", "bare.yaml", "--no-gradient"]);
+    assert!(
+        told.contains("(`loss: {displacement: huber}`, with `sigma`)"),
+        "{told}"
+    );
     // A device that cannot follow the readings.
     let wrong = ["--set", "functions.stiffness={fixed: 9.0}"];
     let summary = bench.run_to(0, &[fit.as_slice(), &wrong].concat());
@@ -574,6 +600,13 @@ fn a_sensor_the_wrong_way_round_is_seen() {
     assert!(!check(pairs[0], turned));
     assert!(!check(pairs[0], &turned.replace("-1", "{start: 1}")));
     assert!(check(pairs[2], turned));
+    // What only falls has both of one sign.
+    let falls = (0..=400).map(|i| (0.05 * f64::from(i), (-0.02 * f64::from(i)).exp()));
+    let rows: String = falls
+        .map(|(t, y)| format!("{t},{y},{},{}\n", -0.4 * y, 0.16 * y))
+        .collect();
+    bench.write("record.csv", &format!("t_s,y_m,v_mps,a_mps2\n{rows}"));
+    assert_eq!(pairs.map(|pair| check(pair, "")), [false; 3]);
 }
 
 /// Records of noise alone, of several seeds: a device may match three per cent of them, and shows nothing.
@@ -702,6 +735,29 @@ fn a_starter_reads_the_names_of_columns() {
         model.contains("columns: {time: t_s, acceleration: acc_y_m_per_s2}"),
         "{model}"
     );
+    // Units that nobody says are no reason to leave a column that has one, nor are angles beside lengths.
+    for header in ["t_s,y_mm,y_raw", "t_s,y_mm,roll_deg"] {
+        let model = record(header, &|t| {
+            format!("{t},{},{}", (10.0 * t).cos(), (9.0 * t).cos())
+        });
+        assert!(model.contains("displacement: y_mm"), "{model}");
+    }
+    // An oscilloscope's: the first is the time, whatever it is called.
+    let model = record("x,signal", &|t| format!("{t},{}", (10.0 * t).cos()));
+    assert!(
+        model.contains("columns: {time: x, displacement: signal}"),
+        "{model}"
+    );
+    let spikes = |t: f64| {
+        let y = if (t * 50.0).round() % 60.0 == 7.0 {
+            900.0
+        } else {
+            (10.0 * t).cos()
+        };
+        format!("{t},{},{y}", -0.1 * (10.0 * t).cos())
+    };
+    let model = record("t_s,a_m_per_s2,y_mm", &spikes);
+    assert!(model.contains("loss: {displacement: huber}"), "{model}");
     let drifting = |t: f64| format!("{t},{}", t + (10.0 * t).sin());
     let model = record("t_s,y_m", &drifting);
     assert!(

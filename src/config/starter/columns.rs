@@ -159,8 +159,11 @@ impl Columns {
             let readings = table.readings(c.index)?.iter().copied();
             Ok(c.unit.factor() * spread(readings.filter(|x| x.is_finite())))
         };
-        let moves_more = size(&column)? > MUCH * size(&self.used[place])?;
-        let left = match column.role.is_channel() && moves_more {
+        let there = &self.used[place];
+        let alike = column.has_unit == there.has_unit
+            && column.unit.is_angular() == there.unit.is_angular();
+        let moves_more = size(&column)? > MUCH * size(there)?;
+        let left = match column.role.is_channel() && alike && moves_more {
             true => std::mem::replace(&mut self.used[place], column),
             false => column,
         };
@@ -171,8 +174,13 @@ impl Columns {
 
     /// The first column that nothing is known of is a displacement.
     fn guess(&mut self, table: &Table) -> Result<(), InputError> {
+        let is_empty = |i: &usize| match table.readings(*i) {
+            Ok(readings) => readings.iter().all(|x| x.is_nan()),
+            Err(_) => false,
+        };
         let is_channel = |i: &usize| known(table, *i).is_some_and(|c| c.role.is_channel());
-        if let Some(empty) = (0..table.width()).find(is_channel) {
+        let mut empty = (0..table.width()).filter(|i| is_empty(i) && is_channel(i));
+        if let Some(empty) = empty.next() {
             let label = table.label(empty);
             return Err(InputError::file(table.path(), "all readings are missing")
                 .found(format!("no number in the column `{label}`"))

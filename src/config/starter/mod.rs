@@ -50,22 +50,14 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
     if let Some(begins) = motion.begins {
         found.insert(
             0,
-            format!(
-                "nothing moves before {} s: left out (window)",
-                short(begins)
-            ),
+            format!("nothing moves before {begins} s: left out (window)"),
         );
     }
     found.extend(columns.in_words(&table));
     if let Some((count, first)) = motion.far_off {
-        let column = columns
-            .channels()
-            .next()
-            .and_then(|role| columns.find(role));
-        let factor = column.map_or(1.0, |column| column.unit.factor());
         found.push(format!(
             "{count} readings lie far off ({}): empty fields are better; the model has a robust loss",
-            significant(first / factor, 4)
+            significant(first / motion.channel.1, 4)
         ));
     }
     if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
@@ -134,7 +126,7 @@ fn text(
     if let Some(begins) = motion.begins {
         line(
             "    window: ",
-            format!("{{min: {}}}", significant(begins, 6)),
+            format!("{{min: {begins}}}"),
             "s; before, nothing moves: the device is held or not yet struck",
         );
     }
@@ -161,10 +153,10 @@ fn text(
         format!("{{{}}}", sigmas.join(", ")),
         "standard deviation of a reading, SI; a number, if it is known",
     );
-    if let (Some(_), Some(role)) = (motion.far_off, columns.channels().next()) {
+    if motion.far_off.is_some() {
         line(
             "    loss: ",
-            format!("{{{}: huber}}", role.key()),
+            format!("{{{}: huber}}", motion.channel.0.key()),
             "readings far off count little; squares count them in full",
         );
     }

@@ -2,6 +2,7 @@
 
 use super::columns::{Column, Columns, Role};
 use crate::diagnostics::{far_off, offset_and_drift};
+use crate::digits::clock;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use crate::signal::{Spectrum, onset};
@@ -27,6 +28,8 @@ pub struct Motion {
     /// Median distance of readings, s.
     pub spacing: f64,
     pub is_regular: bool,
+    /// The channel that the rest is about, and its unit as a factor to SI.
+    pub channel: (Role, f64),
     /// How many readings lie far off, and the first of them, in SI.
     pub far_off: Option<(usize, f64)>,
     /// When the motion begins, s, if the readings stand still before.
@@ -110,8 +113,9 @@ impl Motion {
             between: between(&drive.unwrap_or_default()),
             readings: pairs.len(),
             missing,
+            channel: (column.role, column.unit.factor()),
             far_off,
-            begins: begins.map(|_| pairs[0].0),
+            begins: begins.map(|_| clock(pairs[0].0, spacing)),
             duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),

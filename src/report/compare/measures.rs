@@ -32,7 +32,7 @@ pub struct Measures {
     pub parameters: usize,
     /// Part of J from the readings, in `misfit_unit`.
     pub misfit: f64,
-    /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error.
+    /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error; of a rotation `rad^2 s` and `N^2 m^2 s`.
     pub misfit_unit: &'static str,
     /// Fit of the channel that is matched worst, per cent; `None` where there is none.
     pub worst_fit: Option<f64>,
@@ -83,10 +83,12 @@ impl Measures {
             nodes: document.model.nodes,
             parameters: document.model.parameters,
             misfit: document.cost.misfit,
-            misfit_unit: match document.model.cost_kind {
-                CostKind::ChiSquare => "1",
-                CostKind::EquationError => "N^2 s",
-                CostKind::Integral | CostKind::Mixed => "m^2 s",
+            misfit_unit: match (document.model.cost_kind, document.is_rotation()) {
+                (CostKind::ChiSquare, _) => "1",
+                (CostKind::EquationError, false) => "N^2 s",
+                (CostKind::EquationError, true) => "N^2 m^2 s",
+                (CostKind::Integral | CostKind::Mixed, false) => "m^2 s",
+                (CostKind::Integral | CostKind::Mixed, true) => "rad^2 s",
             },
             worst_fit: worst_fit(document),
             is_rotation: document.is_rotation(),

@@ -99,7 +99,7 @@ fn rows(runs: &[Measures]) -> Vec<Row> {
         text("method", "method", |m| m.method.clone()),
         count("nodes", "nodes", |m| m.nodes as u64),
         count("free values", "parameters", |m| m.parameters as u64),
-        number(misfit_label(runs), "misfit", |m| Some(m.misfit)),
+        number(&misfit_label(runs, metre), "misfit", |m| Some(m.misfit)),
         number("worst fit of a channel (%)", "worst_fit_percent", |m| {
             m.worst_fit
         }),
@@ -246,12 +246,12 @@ impl Units {
     }
 }
 
-fn misfit_label(runs: &[Measures]) -> &'static str {
+fn misfit_label(runs: &[Measures], metre: &str) -> String {
     let chi_square = |m: &Measures| m.misfit_unit == "1";
     match (runs.iter().any(chi_square), runs.iter().all(chi_square)) {
-        (_, true) => "misfit (chi-square)",
-        (false, _) => "misfit (m² s)",
-        _ => "misfit (m² s or chi-square)",
+        (_, true) => "misfit (chi-square)".into(),
+        (false, _) => format!("misfit ({metre}² s)"),
+        _ => format!("misfit ({metre}² s or chi-square)"),
     }
 }
 

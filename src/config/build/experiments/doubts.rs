@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
 use crate::diagnostics::far_off;
-use crate::digits::significant;
+use crate::digits::{clock, significant};
 use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
@@ -27,9 +27,13 @@ const SUSPICIOUS: [(f64, &str); 8] = [
 /// How near a ratio must be to such a factor, as a ratio of the two: channels of one motion agree
 /// within some ten per cent, for its frequency is not single.
 const NEAR: f64 = 1.5;
-/// Channels whose correlation is below minus this go against each other: noise brings it nearer to zero, no motion
+/// Channels whose correlation is below minus this go against each other: noise brings it nearer to zero, no swing
 /// turns it.
 const AGAINST: f64 = 0.7;
+/// Fewest periods of a swing, and fewest readings in one of them: what only falls has an acceleration of the sign of the
+/// displacement, and slopes between readings that are too far apart have any.
+const FEWEST_PERIODS: f64 = 3.0;
+const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
 /// Warns where channels of one motion, or a reading and the known state, disagree by a factor that
 /// looks like a wrong unit.
@@ -125,6 +129,13 @@ fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
 /// The correlation of the readings of a channel with what a lower derivative of the motion says of them: its own slope, or
 /// for the acceleration beside the displacement the displacement turned, as both are those of a swing.
 fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
+    let frequency = Spectrum::of(&high.values, high.median_spacing)?.dominant();
+    let duration = high.times[high.times.len() - 1] - high.times[0];
+    if frequency * duration < FEWEST_PERIODS
+        || frequency * low.median_spacing * FEWEST_IN_A_PERIOD > 1.0
+    {
+        return None;
+    }
     let values = Signal::new(
         high.times.clone(),
         high.values.clone(),
@@ -175,25 +186,37 @@ pub fn stillness(
     let is_free = record.excitation.is_empty() && spec.force.is_none() && spec.base.is_none();
     // The equation error asks for no motion from a start.
     let is_free = is_free && !is_equation_error(file);
-    let begins = record.channels.iter().find_map(|channel| {
-        let spacing = channel.spacing?;
-        Some((channel, onset(&channel.values, spacing)?))
-    });
+    let begins = record
+        .channels
+        .iter()
+        .find_map(|channel| Some((channel, onset(&channel.values, channel.median_spacing)?)));
     if let (true, Some((channel, first))) = (is_free, begins) {
-        let from = channel.times[first] + spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
+        let from = in_file(spec, channel, first);
         warnings.push(format!(
             "experiments[{i}] ({}): the {} stands still before {} s: a free motion begins where nothing holds or strikes the \
              device any more: `window: {{min: {}}}`",
             name(file, i),
             channel.kind.name(),
-            significant(from, 6),
-            significant(from, 6),
+            from,
+            from,
         ));
     }
 }
 
+/// The time of a reading, s, as its file counts.
+fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
+    let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
+    clock(channel.times[reading] + zero, channel.median_spacing)
+}
+
 /// Warns of single readings that lie far off the others, where their squares count in full.
-pub fn outliers(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<String>) {
+pub fn outliers(
+    file: &ModelFile,
+    i: usize,
+    spec: &ExperimentSpec,
+    record: &Record,
+    warnings: &mut Vec<String>,
+) {
     for channel in record.channels.iter().filter(|c| c.is_squared()) {
         let mut sorted = channel.values.clone();
         sorted.sort_by(f64::total_cmp);
@@ -208,11 +231,15 @@ pub fn outliers(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<
         };
         warnings.push(format!(
             "experiments[{i}] ({}): {lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: \
-             huber}}`)",
+             huber}}`{})",
             name(file, i),
             significant(channel.values[*first] / channel.unit.factor(), 4),
             channel.unit.symbol(),
-            significant(channel.times[*first], 6),
+            in_file(spec, channel, *first),
+            match channel.weighting {
+                Some(_) => "",
+                None => ", with `sigma`",
+            },
         ));
     }
 }

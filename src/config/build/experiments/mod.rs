@@ -175,7 +175,7 @@ fn read_one(
     doubts::sizes(file, i, spec, &record, warnings);
     doubts::signs(file, i, spec, &record, warnings);
     doubts::ranges(file, i, &record, warnings);
-    doubts::outliers(file, i, &record, warnings);
+    doubts::outliers(file, i, spec, &record, warnings);
     doubts::stillness(file, i, spec, &record, warnings);
     Ok(record)
 }
