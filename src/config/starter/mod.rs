@@ -55,8 +55,12 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
     }
     found.extend(columns.in_words(&table));
     if let Some((count, first)) = motion.far_off {
+        let lie = match count {
+            1 => "1 reading lies".to_owned(),
+            _ => format!("{count} readings lie"),
+        };
         found.push(format!(
-            "{count} readings lie far off ({}): empty fields are better; the model has a robust loss",
+            "{lie} far off ({}): empty fields are better; the model has a robust loss",
             significant(first / motion.channel.1, 4)
         ));
     }
