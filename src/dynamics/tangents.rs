@@ -237,8 +237,8 @@ impl Kernel for Advance<'_> {
                 }
                 let held = match holds {
                     true => Aligned([
-                        arithmetic.transpose(&held[0]),
-                        arithmetic.transpose(&held[1]),
+                        lanes::transposed(arithmetic, &held[0]),
+                        lanes::transposed(arithmetic, &held[1]),
                     ]),
                     false => *held,
                 };

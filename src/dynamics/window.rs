@@ -40,10 +40,15 @@ pub(crate) fn stepwise<A: Arithmetic>(
         return [Eight::splat(arithmetic, 0.0); 3];
     };
     let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);
-    match inside {
-        Some(steps) => columns(steps).map(|row| Eight::load(arithmetic, &row)),
-        None => padded_steps(steps, i).map(|row| Eight::load(arithmetic, &row)),
-    }
+    let [left, middle, right] = match inside {
+        Some(steps) => columns(steps),
+        None => padded_steps(steps, i),
+    };
+    [
+        Eight::load(arithmetic, &left),
+        Eight::load(arithmetic, &middle),
+        Eight::load(arithmetic, &right),
+    ]
 }
 
 #[inline(always)]

@@ -67,7 +67,7 @@ pub(crate) trait Arithmetic: Copy {
         [self.div(a, d), self.div(b, d)]
     }
     /// Rows to columns.
-    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES];
+    fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES];
 }
 
 /// Eight numbers with operators.
@@ -99,6 +99,20 @@ impl<A: Arithmetic> Eight<A> {
         self.arithmetic.store(self.registers)
     }
 
+    /// Rows to columns.
+    #[inline(always)]
+    pub fn transpose(arithmetic: A, rows: [Self; LANES]) -> [Self; LANES] {
+        let mut registers = [rows[0].registers; LANES];
+        for (registers, row) in registers.iter_mut().zip(rows) {
+            *registers = row.registers;
+        }
+        let mut columns = rows;
+        for (column, registers) in columns.iter_mut().zip(arithmetic.transpose(registers)) {
+            column.registers = registers;
+        }
+        columns
+    }
+
     /// `a / d` and `b / d`, with one division and multiplications where that is faster: with the bits of two divisions, but
     /// for the sign of a zero, if the divisors are between `2^-300` and `2^300` and the numerators zero or between
     /// `2^-600` and `2^600` in size. Of smaller numerators the last bits may differ, of larger ones what is not finite.
@@ -107,6 +121,20 @@ impl<A: Arithmetic> Eight<A> {
         let [a, b] = (d.arithmetic).quotients([a.registers, b.registers], d.registers);
         [Self { registers: a, ..d }, Self { registers: b, ..d }]
     }
+}
+
+/// Rows to columns, in memory.
+#[inline(always)]
+pub(crate) fn transposed<A: Arithmetic>(arithmetic: A, rows: &[Row; LANES]) -> [Row; LANES] {
+    let mut eights = [Eight::splat(arithmetic, 0.0); LANES];
+    for (eight, row) in eights.iter_mut().zip(rows) {
+        *eight = Eight::load(arithmetic, row);
+    }
+    let mut columns = [[0.0; LANES]; LANES];
+    for (column, eight) in columns.iter_mut().zip(Eight::transpose(arithmetic, eights)) {
+        *column = eight.row();
+    }
+    columns
 }
 
 macro_rules! operator {

@@ -46,7 +46,7 @@ impl Arithmetic for Portable {
     }
 
     #[inline(always)]
-    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES] {
+    fn transpose(self, rows: [Row; LANES]) -> [Row; LANES] {
         from_fn(|i| from_fn(|j| rows[j][i]))
     }
 }

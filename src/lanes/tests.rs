@@ -11,7 +11,7 @@ impl Kernel for Everything {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<u64> {
-        let mut rows = arithmetic.transpose(&self.a).to_vec();
+        let mut rows = transposed(arithmetic, &self.a).to_vec();
         let b = Eight::load(arithmetic, &self.b);
         for row in self.a {
             let a = Eight::load(arithmetic, &row);

@@ -106,8 +106,7 @@ impl Arithmetic for Avx512 {
 
     /// Pairs within 128 bits, then the 128-bit parts in two rounds.
     #[inline(always)]
-    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES] {
-        let r: &[__m512d; LANES] = &cast(*rows);
+    fn transpose(self, r: [__m512d; LANES]) -> [__m512d; LANES] {
         // Even and odd columns of two rows each.
         let (e0, o0) = self.pair(r[0], r[1]);
         let (e1, o1) = self.pair(r[2], r[3]);
@@ -118,7 +117,7 @@ impl Arithmetic for Avx512 {
         let ((f04, f26), (p15, p37)) = (self.sort(e2, e3), self.sort(o2, o3));
         let ((c0, c4), (c2, c6)) = (self.sort(e04, f04), self.sort(e26, f26));
         let ((c1, c5), (c3, c7)) = (self.sort(o15, p15), self.sort(o37, p37));
-        cast([c0, c1, c2, c3, c4, c5, c6, c7])
+        [c0, c1, c2, c3, c4, c5, c6, c7]
     }
 }
 
@@ -215,13 +214,12 @@ impl Arithmetic for Avx2 {
 
     /// Four squares of four: each is transposed, and the two off the diagonal change places.
     #[inline(always)]
-    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES] {
-        let r: &[[__m256d; 2]; LANES] = &cast(*rows);
+    fn transpose(self, r: [[__m256d; 2]; LANES]) -> [[__m256d; 2]; LANES] {
         let a = self.transpose_four([r[0][0], r[1][0], r[2][0], r[3][0]]);
         let b = self.transpose_four([r[4][0], r[5][0], r[6][0], r[7][0]]);
         let c = self.transpose_four([r[0][1], r[1][1], r[2][1], r[3][1]]);
         let d = self.transpose_four([r[4][1], r[5][1], r[6][1], r[7][1]]);
-        cast([
+        [
             [a[0], b[0]],
             [a[1], b[1]],
             [a[2], b[2]],
@@ -230,6 +228,6 @@ impl Arithmetic for Avx2 {
             [c[1], d[1]],
             [c[2], d[2]],
             [c[3], d[3]],
-        ])
+        ]
     }
 }

@@ -293,7 +293,7 @@ impl Reflector<'_> {
         for j in 0..J {
             rows[j] = sums[j].row();
         }
-        let lanes = arithmetic.transpose(&rows);
+        let lanes = lanes::transposed(arithmetic, &rows);
         let mut sum = Eight::load(arithmetic, &lanes[0]);
         for lane in &lanes[1..] {
             sum += Eight::load(arithmetic, lane);

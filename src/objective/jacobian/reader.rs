@@ -2,7 +2,7 @@
 
 use crate::dynamics::{Accelerations, Change, FUNCTIONS, Sensed, Steady, TILE, Tangents};
 use crate::lanes::tall::Piece;
-use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::objective::{Channel, View};
 use std::ops::Range;
 
@@ -174,41 +174,40 @@ impl Answer<'_> {
         piece.widen(places);
         piece.count += count;
         for (g, first) in (0..places).step_by(LANES).enumerate() {
-            let mut answers = Aligned([[0.0; LANES]; LANES]);
+            let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
                 // Of lanes without a reading nobody wants to know.
                 match self.kind {
                     Kind::Displacements => {
                         let states = self.tangents.states(g);
                         for (answer, node) in answers.iter_mut().zip(self.glance.nodes) {
-                            *answer = states[node][0];
+                            *answer = Eight::load(arithmetic, &states[node][0]);
                         }
                     }
                     Kind::Accelerations => {
                         let varies = self.tangents.changes(g).any(|change| change.varies());
                         for (l, answer) in answers.iter_mut().enumerate() {
-                            *answer = self.at_acceleration(arithmetic, g, l, varies).row();
+                            *answer = self.at_acceleration(arithmetic, g, l, varies);
                         }
                     }
                     Kind::Any => {
                         for (l, answer) in answers.iter_mut().enumerate().take(count) {
-                            *answer = self.at_step(arithmetic, g, l).row();
+                            *answer = self.at_step(arithmetic, g, l);
                         }
                     }
                 }
-                *answers = arithmetic.transpose(&answers);
+                answers = Eight::transpose(arithmetic, answers);
                 if self.kind == Kind::Accelerations {
                     self.add_constants(arithmetic, g, &mut answers);
                 }
-                for answer in answers.iter_mut().take(places - first) {
-                    *answer = (gain * Eight::load(arithmetic, answer)).row();
-                }
             }
-            for (place, answer) in (first..places).zip(answers.iter()) {
-                let rows = &mut piece.column_mut(place)[row..row + count];
+            for (place, answer) in (first..places).zip(&answers) {
+                let answer = (gain * *answer).row();
+                let rows = &mut piece.column_mut(place)[row..];
                 match rows.first_chunk_mut::<LANES>() {
-                    Some(rows) => *rows = *answer,
-                    None => rows.copy_from_slice(&answer[..count]),
+                    // What is below the rows means nothing.
+                    Some(rows) => *rows = answer,
+                    None => rows[..count].copy_from_slice(&answer[..count]),
                 }
             }
         }
@@ -216,12 +215,16 @@ impl Answer<'_> {
 
     /// What accelerations answer to constants, for one direction a row.
     #[inline(always)]
-    fn add_constants<A: Arithmetic>(&self, arithmetic: A, g: usize, answers: &mut [Row; LANES]) {
+    fn add_constants<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        g: usize,
+        answers: &mut [Eight<A>; LANES],
+    ) {
         for change in self.tangents.changes(g) {
             if let Some(Steady { lane, value }) = change.steady {
                 let slopes = Eight::load(arithmetic, &self.glance.seen.functions[change.function]);
-                let push = slopes * Eight::splat(arithmetic, value);
-                answers[lane] = (Eight::load(arithmetic, &answers[lane]) + push).row();
+                answers[lane] += slopes * Eight::splat(arithmetic, value);
             }
         }
     }
