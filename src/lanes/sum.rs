@@ -37,6 +37,57 @@ impl Kernel for Dot<'_> {
     }
 }
 
+/// `sum_i (factor (a_i - b_i))^2`, each lane by itself and then the lanes.
+pub(crate) fn squared_distance(a: &[f64], b: &[f64], factor: f64) -> f64 {
+    super::run(SquaredDistance(a, b, factor))
+}
+
+struct SquaredDistance<'a>(&'a [f64], &'a [f64], f64);
+
+impl Kernel for SquaredDistance<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> f64 {
+        let Self(a, b, factor) = self;
+        let (a, a_rest) = a.as_chunks::<{ AT_ONCE * LANES }>();
+        let (b, b_rest) = b.as_chunks::<{ AT_ONCE * LANES }>();
+        let each = Eight::splat(arithmetic, factor);
+        let mut sums = [Eight::splat(arithmetic, 0.0); AT_ONCE];
+        for (a, b) in a.iter().zip(b) {
+            let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
+            for q in 0..AT_ONCE {
+                let difference = Eight::load(arithmetic, &a[q]) - Eight::load(arithmetic, &b[q]);
+                let part = each * difference;
+                sums[q] += part * part;
+            }
+        }
+        let mut sum = 0.0;
+        for lane in ((sums[0] + sums[1]) + (sums[2] + sums[3])).row() {
+            sum += lane;
+        }
+        for (a, b) in a_rest.iter().zip(b_rest) {
+            let part = factor * (a - b);
+            sum += part * part;
+        }
+        sum
+    }
+}
+
+/// Whether all numbers are positive, and are numbers.
+pub(crate) fn are_positive(values: &[f64]) -> bool {
+    let (parts, rest) = values.as_chunks::<{ AT_ONCE * LANES }>();
+    let mut others = [0.0; AT_ONCE * LANES];
+    super::run(super::Elementwise(|| {
+        for part in parts {
+            for (others, value) in others.iter_mut().zip(part) {
+                *others += if *value > 0.0 { 0.0 } else { 1.0 };
+            }
+        }
+    }));
+    others == [0.0; AT_ONCE * LANES] && rest.iter().all(|value| *value > 0.0)
+}
+
 /// Whether all numbers are finite.
 pub(crate) fn are_finite(values: &[f64]) -> bool {
     super::run(Finite(values))
@@ -76,6 +127,23 @@ mod tests {
             let product: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             // Multiples of a half below 2^53: no sum is rounded.
             assert_eq!(dot(&a, &b), product, "{count}");
+            let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum();
+            assert_eq!(squared_distance(&a, &b, 2.0), 4.0 * squares, "{count}");
+        }
+    }
+
+    #[test]
+    fn one_number_that_is_not_positive_is_found_anywhere() {
+        for count in 1..100 {
+            let mut values = vec![1e-300; count];
+            assert!(are_positive(&values), "{count}");
+            for i in 0..count {
+                for odd in [f64::NAN, 0.0, -0.0, -1.0, f64::NEG_INFINITY] {
+                    let kept = std::mem::replace(&mut values[i], odd);
+                    assert!(!are_positive(&values), "{odd} at {i} of {count}");
+                    values[i] = kept;
+                }
+            }
         }
     }
 

@@ -85,7 +85,10 @@ impl Kernel for Predict<'_> {
                     *value = *value + offset + drift * channel.age(from + l);
                 }
             }
-            out.extend_from_slice(&row[..count]);
+            match count {
+                LANES => out.extend(row),
+                _ => out.extend_from_slice(&row[..count]),
+            }
         }
     }
 }

@@ -7,7 +7,8 @@
 //! reducing them, finds the natural sizes. Who does what changes no bit.
 //!
 //! Otherwise with a long record and few parameters: it is cut in two, and each thread goes along the tangents of one half.
-//! Nothing more is needed for the discrete gradient, so there is no adjoint solve, on one thread either.
+//! Nothing more is needed for the discrete gradient, so there is no adjoint solve, on one thread either. After a step so
+//! short that the Jacobian hardly changes the tangents are left out, and there is an adjoint solve in their place.
 
 use super::gauss_newton::{FEW_PARAMETERS, Half, Reduced, halfway, is_wide};
 use super::{FitSettings, Point, Solver, Timings};
@@ -34,6 +35,8 @@ pub(crate) struct Ahead<'s, 'p> {
     halfway: Option<usize>,
     /// Readings linearised at these parameters.
     linearised: Option<(Vec<f64>, Reduced)>,
+    /// Those that the latest step was made of, if the record is cut in two.
+    before: Option<Reduced>,
 }
 
 /// A point to be completed.
@@ -76,6 +79,8 @@ struct Job<'p> {
     /// Where the record is cut in two, of which the second thread has the second half.
     halfway: Option<usize>,
     half: Option<Half>,
+    /// Whether it is asked for the natural sizes alone.
+    is_nearby: bool,
     handed: Option<Receiver<Handed>>,
     /// The way back for pieces without rows.
     empty: Option<Sender<Piece>>,
@@ -90,6 +95,10 @@ impl Job<'_> {
         let Some(input) = self.input.take() else {
             return;
         };
+        if std::mem::take(&mut self.is_nearby) {
+            self.sizes = Some(self.problem.natural_sizes(&input.evaluation));
+            return;
+        }
         if let Some(halfway) = self.halfway {
             self.half = Some(Half::second(self.problem, &input.evaluation, halfway));
             return;
@@ -164,6 +173,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
             input: None,
             halfway,
             half: None,
+            is_nearby: false,
             handed: None,
             empty: None,
             gradient: None,
@@ -176,6 +186,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
             companion: scope.and_then(|scope| Companion::within(scope, job, Job::run)),
             halfway,
             linearised: None,
+            before: None,
         }
     }
 
@@ -271,8 +282,68 @@ impl<'s, 'p> Ahead<'s, 'p> {
 
     /// The readings linearised at the point with these parameters, if they are.
     pub fn linearised(&mut self, parameters: &[f64]) -> Option<Reduced> {
-        let (at, reduced) = self.linearised.take()?;
-        (at == parameters).then_some(reduced)
+        let (_, reduced) = self.linearised.take_if(|(at, _)| at == parameters)?;
+        if self.is_halved() {
+            self.before = Some(reduced.clone());
+        }
+        Some(reduced)
+    }
+
+    /// Whether there is a Jacobian that [`Ahead::point_nearby`] can take.
+    pub fn can_stay(&self) -> bool {
+        self.before.is_some()
+    }
+
+    /// The point that an evaluation belongs to, so near to the one that was linearised last that the Jacobian is the same:
+    /// the adjoint solve for its gradient, beside the natural sizes. `Err` if it is not, as far as can be told.
+    pub fn point_nearby(
+        &mut self,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+        timings: &mut Timings,
+    ) -> Result<Point, (Vec<f64>, Evaluation)> {
+        let Some(before) = self.before.take() else {
+            return Err((parameters, evaluation));
+        };
+        let clock = Instant::now();
+        let problem = self.problem;
+        let input = Input::new(parameters, evaluation);
+        let own = || problem.gradient(&input.parameters, &input.evaluation, GradientKind::Discrete);
+        let (gradient, sizes) = match &mut self.companion {
+            None => (own(), None),
+            Some(companion) => companion.with(
+                |job| (job.input, job.is_nearby) = (Some(Arc::clone(&input)), true),
+                own,
+                |own, job| (own, job.sizes.take()),
+            ),
+        };
+        let (parameters, evaluation) = Input::back(input);
+        let sizes = sizes.unwrap_or_else(|| problem.natural_sizes(&evaluation));
+        timings.adjoint += clock.elapsed();
+        let Some(reduced) = before.nearby(evaluation.misfit, &gradient.euclidean) else {
+            return Err((parameters, evaluation));
+        };
+        self.linearised = Some((parameters.clone(), reduced));
+        Ok(Point::new(parameters, evaluation, gradient).with_sizes(sizes))
+    }
+
+    /// Linearises the readings at a `point`, or `made_at` other parameters nearby, as if it was made by
+    /// [`Ahead::point_nearby`].
+    pub fn linearise_again(
+        &mut self,
+        point: &Point,
+        made_at: Option<&[f64]>,
+        timings: &mut Timings,
+    ) {
+        let problem = self.problem;
+        let reduced = match made_at {
+            None => Some(Reduced::at(problem, &point.evaluation, timings)),
+            Some(at) => problem.evaluate(at).ok().and_then(|evaluation| {
+                let reduced = Reduced::at(problem, &evaluation, timings);
+                reduced.nearby(point.evaluation.misfit, &point.gradient.euclidean)
+            }),
+        };
+        self.linearised = reduced.map(|reduced| (point.parameters.clone(), reduced));
     }
 }
 

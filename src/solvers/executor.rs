@@ -219,10 +219,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
             false => None,
         };
         let recorder = Recorder::recalled(rows, &standing, motions)?;
-        let point = work.again(standing.parameters.0).ok()?;
-        if point.fingerprint() != standing.fingerprint {
-            return None;
-        }
+        let point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
             && !(self.method).recall(standing.memory, work.problem(), &point)
         {

@@ -70,6 +70,9 @@ pub enum Memory {
     GaussNewton {
         /// Weight of the proximal term, and the cost at the first point, if there was one.
         numbers: Bits,
+        /// Parameters of the point whose Jacobian is used, if it is not the one where the search stands.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        made_at: Option<Bits>,
     },
 }
 

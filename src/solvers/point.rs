@@ -5,7 +5,7 @@ use super::gauss_newton::Reduced;
 use super::timings::{Timings, timed};
 use super::{FitSettings, Solver};
 use crate::dynamics::{Breakdown, Trajectory};
-use crate::objective::{Evaluation, Gradient, GradientKind};
+use crate::objective::{Channel, Evaluation, Gradient, GradientKind, Loss};
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -124,25 +124,29 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             .expect("the executor holds the problem")
     }
 
-    /// A point that was there before, computed again without counting.
-    pub fn again(&self, parameters: Vec<f64>) -> Result<Point, Breakdown> {
+    /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
+    /// the `fingerprint`. `None` if there is no such point.
+    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Point> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
-        match self.in_order {
-            true => problem.evaluate_in_order_into(&parameters, &mut evaluation)?,
-            false => problem.evaluate_into(&parameters, &mut evaluation)?,
-        }
-        let by_halves = || {
-            let reduced = Reduced::at(problem, &evaluation, &mut Timings::default());
-            let misfit = reduced.misfit_gradient()?;
-            Some(problem.gradient_of_misfit(&parameters, misfit))
+        let evaluated = match self.in_order {
+            true => problem.evaluate_in_order_into(&parameters, &mut evaluation),
+            false => problem.evaluate_into(&parameters, &mut evaluation),
         };
-        let gradient = (self.is_halved().then(by_halves).flatten())
-            .unwrap_or_else(|| problem.gradient(&parameters, &evaluation, self.kind));
-        Ok(Point::new(parameters, evaluation, gradient))
+        evaluated.ok()?;
+        let by_adjoint = problem.gradient(&parameters, &evaluation, self.kind);
+        let point = Point::new(parameters, evaluation, by_adjoint);
+        if point.fingerprint() == fingerprint || !self.is_halved() {
+            return Some(point).filter(|point| point.fingerprint() == fingerprint);
+        }
+        let reduced = Reduced::at(problem, &point.evaluation, &mut Timings::default());
+        let misfit = reduced.misfit_gradient()?;
+        let gradient = problem.gradient_of_misfit(&point.parameters, misfit);
+        let point = Point { gradient, ..point };
+        (point.fingerprint() == fingerprint).then_some(point)
     }
 
-    /// Whether points are completed by tangents, and not by an adjoint.
+    /// Whether points are completed by tangents, and only after short steps by an adjoint.
     fn is_halved(&self) -> bool {
         self.ahead.as_ref().is_some_and(Ahead::is_halved)
     }
@@ -213,6 +217,39 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
     /// Linear algebra between the solves.
     pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
         timed(&mut self.timings.linear_algebra, work)
+    }
+
+    /// [`Work::complete`] after a short step: the Jacobian of the point before is taken for that of this one where that can
+    /// be done, and whether it was.
+    pub fn complete_nearby(
+        &mut self,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+    ) -> (Point, bool) {
+        let problem = self.problem();
+        let is_squares = |c: &Channel| c.loss() == Loss::Squares;
+        let (mut parameters, mut evaluation) = (parameters, evaluation);
+        if let Some(ahead) = &mut self.ahead
+            && ahead.can_stay()
+            && !problem.is_regularised()
+            && problem.channels().all(is_squares)
+        {
+            *self.problem.counts.entry(ADJOINT).or_insert(0) += 1;
+            match ahead.point_nearby(parameters, evaluation, &mut self.timings) {
+                Ok(point) => return (point, true),
+                Err(back) => (parameters, evaluation) = back,
+            }
+        }
+        (self.complete(parameters, evaluation), false)
+    }
+
+    /// Linearises the readings at a `point` of a record that is cut in two, or `made_at` other parameters nearby, without
+    /// counting.
+    pub fn linearise_again(&mut self, point: &Point, made_at: Option<&[f64]>) {
+        let timings = &mut self.timings;
+        if let Some(ahead) = self.ahead.as_mut().filter(|ahead| ahead.is_halved()) {
+            ahead.linearise_again(point, made_at, timings);
+        }
     }
 
     /// The point that an evaluation belongs to, completed by its gradient.

@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 const WIDE: usize = LANES;
 
 /// `|D A x - d|^2 = |R x - b|^2 + rest^2` with diagonal `D`.
+#[derive(Clone)]
 pub(crate) struct Triangle {
     /// Rows of `R`, each with its `b` behind the columns that have begun.
     rows: Vec<Vec<f64>>,
@@ -150,6 +151,22 @@ impl Triangle {
             }
         }
         products
+    }
+
+    /// The triangle of the same matrix beside another right-hand side, of which the products `(D A)' d` and the square
+    /// `|d|^2` are known; `None` if there is no such side, as far as rounding can tell, or a column is zero beside those
+    /// before it.
+    pub fn beside(mut self, products: &[f64], square: f64) -> Option<Self> {
+        let n = self.rows.len();
+        let mut explained = 0.0;
+        for i in 0..n {
+            let above = self.rows[..i].iter().map(|row| row[i] * row[n]);
+            let b = (products[i] - above.sum::<f64>()) / self.rows[i][i];
+            self.rows[i][n] = b;
+            explained += b * b;
+        }
+        self.rest = square - explained;
+        (self.begun == n && self.is_finite() && self.rest >= 0.0).then_some(self)
     }
 
     /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
@@ -367,6 +384,25 @@ mod tests {
         let rest = (weighted * expected - right).norm();
         assert!((triangle.rest() - rest).abs() <= 1e-13 * rest);
         assert!(triangle.is_finite());
+    }
+
+    /// The right-hand side by its products and its square; no side explains more than its square.
+    #[test]
+    fn another_side_of_the_same_matrix() {
+        let (matrix, roots, right) = problem();
+        let other: Vec<f64> = right.iter().map(|x| x * x - 0.3).collect();
+        let (expected, order) = Triangle::of(&matrix, &roots, &other);
+        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        let square: f64 = other.iter().map(|x| x * x).sum();
+        let found = (triangle.clone().beside(&expected.products(), square)).expect("such a side");
+        let pairs = |t: &Triangle| t.solve(1e-14).expect("five independent columns");
+        for (found, expected) in pairs(&found).iter().zip(pairs(&expected)) {
+            assert!((found - expected).abs() <= 1e-13, "{found} {expected}");
+        }
+        assert!((found.rest() - expected.rest()).abs() <= 1e-12 * expected.rest());
+        assert!(triangle.clone().beside(&expected.products(), 0.0).is_none());
+        let wider = Triangle::new(order.len());
+        assert!(wider.beside(&expected.products(), square).is_none());
     }
 
     /// However the rows are cut into pieces, to rounding.

@@ -2,7 +2,9 @@
 
 use super::Channel;
 use crate::dynamics::quadrature::trapezoid_weights_at;
+use crate::lanes::sum::squared_distance;
 use crate::objective::{Loss, Weighting};
+use crate::problem::LONG;
 use std::ops::Range;
 
 impl Channel {
@@ -25,7 +27,7 @@ impl Channel {
     /// `sum rho(r / sigma)`.
     ///
     /// The equally spaced integral sums in the paper's order, both ends first: its run depends on
-    /// every bit.
+    /// every bit. Many squares are summed in lanes.
     pub fn cost(&self, predicted: &[f64]) -> f64 {
         if let Weighting::Integral { spacing } = self.weighting {
             let square = |i: usize| {
@@ -35,6 +37,12 @@ impl Channel {
             let last = self.len() - 1;
             let ends = spacing * 0.5 * (square(0) + square(last));
             return (1..last).fold(ends, |sum, i| sum + spacing * 0.5 * (2.0 * square(i)));
+        }
+        if let Weighting::Sigma(sigma) | Weighting::Estimated { sigma } = self.weighting
+            && self.loss == Loss::Squares
+            && self.len() >= LONG
+        {
+            return squared_distance(predicted, &self.observed, 1.0 / sigma);
         }
         let terms = self.residuals(predicted).enumerate();
         terms

@@ -11,6 +11,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// How the residuals of the readings of all channels are weighed.
+#[derive(Clone)]
 struct Residuals {
     /// `sqrt(w)`.
     roots: Vec<f64>,
@@ -74,6 +75,7 @@ pub(crate) fn is_wide(columns: usize) -> bool {
 
 /// The readings, linearised and reduced to as many rows as there are parameters:
 /// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
+#[derive(Clone)]
 pub(crate) struct Reduced {
     triangle: Triangle,
     /// The parameter of each column.
@@ -134,6 +136,14 @@ impl Reduced {
         timings.linear_algebra += reduced.took;
         timings.tangent += clock.elapsed().saturating_sub(reduced.took);
         reduced
+    }
+
+    /// The same Jacobian at a point nearby, where the misfit, a sum of squares, and its gradient are known; `None` if it
+    /// cannot be the Jacobian there.
+    pub fn nearby(self, misfit: f64, gradient: &[f64]) -> Option<Self> {
+        let products: Vec<f64> = self.order.iter().map(|j| 0.5 * gradient[*j]).collect();
+        let triangle = self.triangle.beside(&products, misfit)?;
+        Some(Self { triangle, ..self })
     }
 
     /// The step to the minimum, less the sign, in the order of the columns.

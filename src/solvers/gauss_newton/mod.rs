@@ -46,11 +46,16 @@ const PROGRAM_ACCURACY: f64 = 1e-9;
 const MOTION_ROUNDING: f64 = 1000.0;
 /// A relative change of the functions below this is not a step but rounding.
 const SMALLEST_CHANGE: f64 = 1e-9;
+/// A step that changes no function by more than this, relative to its size, changes the Jacobian by about as much: the
+/// next step may be made with it. It then leaves about this share of the error, which the last one squared.
+const NEARBY: f64 = 1e-2;
 
 /// The method and its damping.
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
+    /// Where the Jacobian was made, if not at the point itself but at one nearby.
+    made_at: Option<Vec<f64>>,
     /// Storage for the next trial.
     spare: Option<Evaluation>,
 }
@@ -60,6 +65,7 @@ impl Default for GaussNewton {
         Self {
             damping: FIRST_DAMPING,
             first_cost: None,
+            made_at: None,
             spare: None,
         }
     }
@@ -85,7 +91,7 @@ impl Descend for GaussNewton {
         if point.evaluation.cost <= NO_DECREASE * first_cost {
             return Step::Minimum("the cost is zero to rounding".into());
         }
-        let mut sub = linearise(work, point);
+        let mut sub = self.linearise(work, point);
         // Diagonal of the proximal term.
         let scales = point.relative_metric(problem);
         let mut evaluation = self.spare.take().unwrap_or_else(|| problem.workspace());
@@ -117,8 +123,10 @@ impl Descend for GaussNewton {
                     // The next programs are others: they get the chance to be solved with less.
                     self.damping = before;
                 }
+                let is_nearby = gain > GOOD && change(problem, point, &proposal) <= NEARBY;
+                let moved = self.moved(work, point, proposal.parameters, evaluation, is_nearby);
                 return Step::Moved {
-                    point: Box::new(work.complete(proposal.parameters, evaluation)),
+                    point: Box::new(moved),
                     length: 1.0,
                     hindered: trouble.is_some(),
                 };
@@ -127,6 +135,13 @@ impl Descend for GaussNewton {
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
                 return Step::Minimum(reason);
+            }
+            if self.made_at.take().is_some() {
+                // The Jacobian of another point may be to blame.
+                work.count_tangents(linearisation_tangents(problem));
+                work.linearise_again(point, None);
+                sub = self.linearise(work, point);
+                continue;
             }
             self.damping *= 8.0;
         }
@@ -145,13 +160,21 @@ impl Descend for GaussNewton {
         let numbers = std::iter::once(self.damping).chain(self.first_cost);
         Memory::GaussNewton {
             numbers: Bits(numbers.collect()),
+            made_at: self.made_at.clone().map(Bits),
         }
     }
 
-    fn recall(&mut self, memory: Memory, _: &Problem, _: &Point) -> bool {
-        let Memory::GaussNewton { numbers } = memory else {
+    fn recall(&mut self, memory: Memory, problem: &Problem, _: &Point) -> bool {
+        let Memory::GaussNewton { numbers, made_at } = memory else {
             return false;
         };
+        if made_at
+            .as_ref()
+            .is_some_and(|at| at.0.len() != problem.parameters())
+        {
+            return false;
+        }
+        self.made_at = made_at.map(|at| at.0);
         let [damping, first_cost @ ..] = numbers.0.as_slice() else {
             return false;
         };
@@ -162,6 +185,47 @@ impl Descend for GaussNewton {
 }
 
 impl GaussNewton {
+    /// The subproblem at a point: readings, penalties, constraints, without the proximal term.
+    fn linearise(&mut self, work: &mut Work, point: &Point) -> Subproblem {
+        let problem = work.problem();
+        if self.made_at.is_none() {
+            work.count_linearisation(linearisation_tangents(problem));
+        }
+        let made_at = self.made_at.as_deref();
+        let ahead = work.linearised(&point.parameters).or_else(|| {
+            // The search was ended from outside when it stood here.
+            work.linearise_again(point, made_at);
+            work.linearised(&point.parameters)
+        });
+        linearise_from(problem, point, ahead, &mut work.timings).0
+    }
+
+    /// The point that a step from `before` leads to; if that is nearby, with the same Jacobian.
+    fn moved(
+        &mut self,
+        work: &mut Work,
+        before: &Point,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+        is_nearby: bool,
+    ) -> Point {
+        if !is_nearby {
+            self.made_at = None;
+            return work.complete(parameters, evaluation);
+        }
+        let (point, has_stayed) = work.complete_nearby(parameters, evaluation);
+        match has_stayed {
+            true => {
+                self.made_at = self
+                    .made_at
+                    .take()
+                    .or_else(|| Some(before.parameters.clone()))
+            }
+            false => self.made_at = None,
+        }
+        point
+    }
+
     fn learn(&mut self, gain: f64) {
         if gain > GOOD {
             self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
@@ -292,14 +356,6 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
         }
     }
     misfit
-}
-
-/// The subproblem at a point: readings, penalties, constraints, without the proximal term.
-fn linearise(work: &mut Work, point: &Point) -> Subproblem {
-    let problem = work.problem();
-    work.count_linearisation(linearisation_tangents(problem));
-    let ahead = work.linearised(&point.parameters);
-    linearise_from(problem, point, ahead, &mut work.timings).0
 }
 
 /// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
