@@ -1,5 +1,6 @@
 //! Eight steps linearised at once: the motion is known, so no step waits for the one before.
 
+use super::rates::is_constant;
 use super::stages::Rhs;
 use super::tableau::{MIDPOINT, Position, RK4, Tableau};
 use super::term::with_known;
@@ -19,6 +20,8 @@ pub(super) struct Maps {
     pub left: [[Row; 2]; FUNCTIONS],
     /// To each function's value at the right node.
     pub right: [[Row; 2]; FUNCTIONS],
+    /// To each function that has the same value everywhere.
+    pub sum: [[Row; 2]; FUNCTIONS],
 }
 
 impl Maps {
@@ -26,7 +29,22 @@ impl Maps {
         growth: [[[0.0; LANES]; 2]; 2],
         left: [[[0.0; LANES]; 2]; FUNCTIONS],
         right: [[[0.0; LANES]; 2]; FUNCTIONS],
+        sum: [[[0.0; LANES]; 2]; FUNCTIONS],
     };
+}
+
+/// Which answers are asked for, mass first.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Wanted {
+    /// To the values at both nodes.
+    pub ends: [bool; FUNCTIONS],
+    /// To one value for both.
+    pub sum: [bool; FUNCTIONS],
+}
+
+/// The mass over some nodes, if it is constant there: steps then share a division.
+pub(super) fn constant_mass(mass: &[f64]) -> Option<f64> {
+    is_constant(mass).then(|| mass.first().copied()).flatten()
 }
 
 /// Where the functions are looked at: the three [`Position`]s.
@@ -50,24 +68,30 @@ impl<A: Arithmetic> Places<A> {
     }
 }
 
-/// Linearises the steps `i` to `i + 7` of a motion, for the functions that are `wanted`.
+/// Linearises the steps `i` to `i + 7` of a motion, over which the mass may be known to be constant, for the functions that
+/// are `wanted`.
 #[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "all of it is laid out for each method"
+)]
 pub(super) fn linearise<A: Arithmetic>(
     arithmetic: A,
     method: Method,
     rhs: &Rhs,
     motion: &Trajectory,
     i: usize,
-    wanted: &[bool; FUNCTIONS],
+    constant_mass: Option<f64>,
+    wanted: &Wanted,
     maps: &mut Maps,
 ) {
     let terms = rhs.terms;
     with_known!(terms, terms, TERMS => match method {
         Method::Midpoint => {
-            by::<A, 2, TERMS>(arithmetic, &MIDPOINT, terms, rhs, motion, i, wanted, maps);
+            by::<A, 2, TERMS>(arithmetic, &MIDPOINT, terms, rhs, motion, i, constant_mass, wanted, maps);
         }
         Method::Rk4 => {
-            by::<A, 4, TERMS>(arithmetic, &RK4, terms, rhs, motion, i, wanted, maps);
+            by::<A, 4, TERMS>(arithmetic, &RK4, terms, rhs, motion, i, constant_mass, wanted, maps);
         }
     });
 }
@@ -84,15 +108,22 @@ fn by<A: Arithmetic, const S: usize, const TERMS: usize>(
     rhs: &Rhs,
     motion: &Trajectory,
     i: usize,
-    wanted: &[bool; FUNCTIONS],
+    constant_mass: Option<f64>,
+    wanted: &Wanted,
     maps: &mut Maps,
 ) {
     let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
     let dt = rhs.dt;
-    let mut per_mass = Places::of(arithmetic, &rhs.device.mass, i);
-    for place in &mut per_mass.0 {
-        *place = one / *place;
-    }
+    let per_mass = match constant_mass {
+        Some(mass) => Places([Eight::splat(arithmetic, 1.0 / mass); 3]),
+        None => {
+            let mut places = Places::of(arithmetic, &rhs.device.mass, i);
+            for place in &mut places.0 {
+                *place = one / *place;
+            }
+            places
+        }
+    };
     let force = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
     let base = Places::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
 
@@ -162,15 +193,25 @@ fn by<A: Arithmetic, const S: usize, const TERMS: usize>(
         }
         maps.growth[end] = [to_y.row(), to_v.row()];
         for f in 0..=terms.len().min(TERMS) {
-            if !wanted[f] {
-                continue;
-            }
-            let [mut left, mut middle, mut right] = [zero; 3];
+            let mut answer = [zero; S];
             for s in 0..S {
-                let answer = match f {
+                answer[s] = match f {
                     0 => a_bar[s] * inertias[s],
                     _ => a_bar[s] * answers[s][f - 1],
                 };
+            }
+            if wanted.sum[f] {
+                let mut sum = answer[0];
+                for part in &answer[1..] {
+                    sum += *part;
+                }
+                maps.sum[f][end] = sum.row();
+            }
+            if !wanted.ends[f] {
+                continue;
+            }
+            let [mut left, mut middle, mut right] = [zero; 3];
+            for (s, answer) in answer.into_iter().enumerate() {
                 match tableau.position[s] {
                     Position::Left => left += answer,
                     Position::Middle => middle += answer,

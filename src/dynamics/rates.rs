@@ -214,7 +214,7 @@ impl Steady {
 
 /// Whether all values are the same.
 #[inline(always)]
-fn is_constant(values: &[f64]) -> bool {
+pub(super) fn is_constant(values: &[f64]) -> bool {
     let first = values[0];
     // A part at a time, without a branch for each value.
     let mut parts = values.chunks(32 * LANES);

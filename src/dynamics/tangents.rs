@@ -4,7 +4,7 @@
 //! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
 //! are ever in memory as a whole.
 
-use super::maps::{self, FUNCTIONS, Maps};
+use super::maps::{self, FUNCTIONS, Maps, Wanted};
 use super::stages::Rhs;
 use super::{Device, Excitation, Method, Oscillator, Trajectory};
 use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
@@ -55,7 +55,6 @@ impl Change<'_> {
 pub(crate) struct Tangents {
     slots: Vec<Slot>,
     of_group: Vec<Range<usize>>,
-    wanted: [bool; FUNCTIONS],
     changes: Vec<Aligned<[Row; TILE_NODES]>>,
     /// Whether a slot's function changes in this tile.
     moves: Vec<bool>,
@@ -92,7 +91,6 @@ impl Tangents {
         }
         Self {
             of_group: groups.map(range).collect(),
-            wanted: std::array::from_fn(|f| slots.iter().any(|s| s.function == f)),
             changes: vec![Aligned([[0.0; LANES]; TILE_NODES]); slots.len()],
             moves: vec![false; slots.len()],
             steady: vec![None; slots.len()],
@@ -194,16 +192,26 @@ impl Kernel for Advance<'_> {
                 .any(|slot| tangents.moves[slot]);
         }
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
+        let mut wanted = Wanted::default();
+        for (slot, steady) in tangents.slots.iter().zip(&tangents.steady) {
+            match steady {
+                Some(_) => wanted.sum[slot.function] = true,
+                None => wanted.ends[slot.function] = true,
+            }
+        }
+        let mass = &self.rhs.device.mass;
+        // The last eight steps may reach beyond the tile, for lanes that nobody asks.
+        let constant_mass = maps::constant_mass(&mass[first..=first + count]);
         let mut from = 0;
         while from < count {
-            let (rhs, wanted) = (&self.rhs, &tangents.wanted);
             maps::linearise(
                 arithmetic,
                 self.method,
-                rhs,
+                &self.rhs,
                 self.motion,
                 first + from,
-                wanted,
+                constant_mass,
+                &wanted,
                 &mut tangents.maps,
             );
             let to = (from + LANES).min(count);
@@ -266,9 +274,8 @@ fn hold<A: Arithmetic>(
 ) {
     let change = Eight::splat(arithmetic, steady.value);
     for (end, held) in held.iter_mut().enumerate() {
-        let left = Eight::load(arithmetic, &maps.left[function][end]);
-        let right = Eight::load(arithmetic, &maps.right[function][end]);
-        held[steady.lane] = (left * change + right * change).row();
+        let sum = Eight::load(arithmetic, &maps.sum[function][end]);
+        held[steady.lane] = (sum * change).row();
     }
 }
 

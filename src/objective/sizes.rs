@@ -6,7 +6,7 @@ use crate::dynamics::quadrature::curvature_into;
 use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
 use crate::functions::largest;
 use crate::lanes::sum::dot;
-use crate::problem::{Experiment, Problem};
+use crate::problem::{Experiment, LONG, Problem};
 use crate::signal::Spectrum;
 use std::f64::consts::TAU;
 
@@ -78,7 +78,7 @@ impl Problem {
     }
 }
 
-/// The sums over the nodes of `y''^2` and of `phi^2` of each term.
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term; of a long motion in lanes.
 fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     let Trajectory {
         displacement: y,
@@ -98,16 +98,22 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
                 values.for_each(|(phi, (y, v))| *phi = term.phi(*y, *v));
             }
         }
-        let (first, rest) = sums.split_at_mut(1);
-        let curvature = &acceleration[..range.len()];
-        first[0] += dot(curvature, curvature);
-        for ((term, phi), sum) in terms.iter().zip(&phi).zip(rest) {
-            let seen = match term {
-                Term::Damping => v,
-                Term::Stiffness => y,
-                _ => &phi[..range.len()],
-            };
-            *sum += dot(seen, seen);
+        let seen = terms.iter().zip(&phi).map(|(term, phi)| match term {
+            Term::Damping => v,
+            Term::Stiffness => y,
+            _ => &phi[..range.len()],
+        });
+        let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
+            .chain(seen)
+            .collect();
+        if motion.nodes() > LONG {
+            for (column, sum) in columns.iter().zip(&mut sums) {
+                *sum += dot(column, column);
+            }
+            continue;
+        }
+        for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {
+            add_squares(columns, sums);
         }
     }
     sums
@@ -115,6 +121,22 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
 
 /// Nodes whose terms are looked at together.
 const PART: usize = 256;
+
+/// Adds the squares of each column in their order: up to four sums side by side, as each waits for
+/// itself.
+fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
+    let column = |c: usize| columns[c.min(columns.len() - 1)];
+    let (zero, one, two, three) = (column(0), column(1), column(2), column(3));
+    let mut four = [0.0; 4];
+    four[..sums.len()].copy_from_slice(sums);
+    for (((a, b), c), d) in zero.iter().zip(one).zip(two).zip(three) {
+        four[0] += a * a;
+        four[1] += b * b;
+        four[2] += c * c;
+        four[3] += d * d;
+    }
+    sums.copy_from_slice(&four[..sums.len()]);
+}
 
 /// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
 /// (s) apart: their rms, and their dominant frequency.

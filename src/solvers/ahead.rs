@@ -383,7 +383,7 @@ mod tests {
     use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
     use crate::objective::{Channel, Weighting};
     use crate::problem::Experiment;
-    use crate::solvers::{Fit, fit};
+    use crate::solvers::{Counts, Fit, fit, fit_from};
 
     /// A decaying oscillator with so many knots for damping and stiffness each, and more readings than a piece holds.
     fn problem(knots: u32) -> Problem {
@@ -543,6 +543,43 @@ mod tests {
                 let off = (found - expected).abs();
                 assert!(off <= 1e-10 * expected.abs(), "{found} {expected}");
             }
+        }
+    }
+
+    /// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
+    /// adjoint, and the linearised readings ask for no further step.
+    #[test]
+    fn after_short_steps_the_jacobian_stays() {
+        let mut problem = long_problem(None);
+        let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
+        let motion = problem.evaluate(&truth).expect("a motion");
+        let channels = problem.experiments[0].channels.iter_mut();
+        for (channel, predicted) in channels.zip(&motion.predictions[0]) {
+            let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
+            *channel = channel.clone().with_simulated(predicted, &noise);
+        }
+        let settings = FitSettings::default();
+        let fit = fit_from(&problem, &problem.start(), &settings).expect("a motion");
+        let points = fit.history.len() as u64 + 1;
+        let parameters = problem.parameters() as u64;
+        let Counts {
+            adjoint, tangent, ..
+        } = fit.counts;
+        assert!(0 < adjoint && adjoint < points);
+        assert_eq!(tangent, (points - adjoint) * parameters);
+        let theta = &fit.best.parameters;
+        let expected = problem.gradient(theta, &fit.best.evaluation, GradientKind::Discrete);
+        assert_eq!(fit.best.gradient, expected);
+        let mut timings = Timings::default();
+        let reduced = Reduced::at(&problem, &fit.best.evaluation, &mut timings);
+        let step = reduced.solution().expect("independent columns");
+        let order = problem.places();
+        for (step, j) in step.iter().zip(order) {
+            assert!(
+                step.abs() <= 1e-9 * theta[j].abs(),
+                "{step} of {}",
+                theta[j]
+            );
         }
     }
 

@@ -4,7 +4,7 @@
 //! begin with: the many iterations from a rough start are then made on little, and the few that are left on
 //! all of it.
 
-use super::executor::search;
+use super::executor::{Prepared, search};
 use super::ladder::Before;
 use super::recorder::Reference;
 use super::timings::timed;
@@ -29,15 +29,10 @@ const TOLERANCE: f64 = 1e-6;
 /// What is known at the start values, and a better start.
 pub(super) struct Begun {
     pub reference: Option<Reference>,
-    pub start: Option<BetterStart>,
+    /// With what the whole problem says of it, if it has a motion there.
+    pub start: Option<Prepared>,
     /// What the fit of the beginning took, interrupts left out.
     pub elapsed: Duration,
-}
-
-/// What the beginning of the record says, and what the whole problem says of that, if it has a motion there.
-pub(super) struct BetterStart {
-    pub parameters: Vec<f64>,
-    pub evaluation: Option<Evaluation>,
 }
 
 /// How many steps the beginning of a problem's records has; `None` unless they are long, all functions constants, and
@@ -143,14 +138,15 @@ pub(super) fn begin(
         let fit = found.ok()?;
         let clock = Instant::now();
         let parameters = fit.best.parameters.clone();
-        let better = (parameters != start).then(|| BetterStart {
+        let better = (parameters != start).then(|| Prepared {
             evaluation: problem.evaluate(&parameters).ok(),
             parameters,
+            spare: None,
         });
         Some((fit, better, clock.elapsed()))
     };
     let clock = Instant::now();
-    let (found, (reference, mut timings)) = match threads::spare() {
+    let (found, (reference, mut timings, spare)) = match threads::spare() {
         true => std::thread::scope(|scope| {
             let whole = scope.spawn(|| reference(problem, start, settings));
             let found = threads::sharing(|| fit_part(watch));
@@ -174,7 +170,7 @@ pub(super) fn begin(
         let rest = clock.elapsed().saturating_sub(elapsed);
         timings.forward = timings.forward.min(rest);
         timings.adjoint = timings.adjoint.min(rest - timings.forward);
-        better = start;
+        better = start.map(|start| Prepared { spare, ..start });
     }
     before.timings += timings;
     Begun {
@@ -184,20 +180,20 @@ pub(super) fn begin(
     }
 }
 
-/// Cost and gradient at the start values.
+/// Cost and gradient at the start values, and the storage that they took.
 pub(super) fn reference(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-) -> (Option<Reference>, Timings) {
+) -> (Option<Reference>, Timings, Option<Evaluation>) {
     let mut timings = Timings::default();
-    let evaluation = timed(&mut timings.forward, || problem.evaluate(start));
-    let reference = evaluation.ok().map(|evaluation| Reference {
+    let evaluation = timed(&mut timings.forward, || problem.evaluate(start)).ok();
+    let reference = evaluation.as_ref().map(|evaluation| Reference {
         norm_squared: timed(&mut timings.adjoint, || {
-            problem.gradient(start, &evaluation, settings.gradient)
+            problem.gradient(start, evaluation, settings.gradient)
         })
         .norm_squared,
         cost: evaluation.cost,
     });
-    (reference, timings)
+    (reference, timings, evaluation)
 }

@@ -67,20 +67,38 @@ pub(super) fn search(
     reference: Option<Reference>,
     watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
-    search_evaluated(problem, start, None, settings, reference, watch)
+    let prepared = Prepared {
+        parameters: start.to_vec(),
+        evaluation: None,
+        spare: None,
+    };
+    search_prepared(problem, prepared, settings, reference, watch)
 }
 
-/// [`search`], where `start` may have been evaluated already.
-pub(super) fn search_evaluated(
+/// Where a search starts.
+pub(super) struct Prepared {
+    /// The parameters.
+    pub parameters: Vec<f64>,
+    /// Their evaluation, if there is one already.
+    pub evaluation: Option<Evaluation>,
+    /// Storage for the first trial, if there is some.
+    pub spare: Option<Evaluation>,
+}
+
+/// [`search`] from a start that is `prepared`.
+pub(super) fn search_prepared(
     problem: &Problem,
-    start: &[f64],
-    evaluation: Option<Evaluation>,
+    prepared: Prepared,
     settings: &FitSettings,
     reference: Option<Reference>,
     watch: &mut Watch,
 ) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
-        return Ok(equation_error::fit(problem, start, watch.observe()));
+        return Ok(equation_error::fit(
+            problem,
+            &prepared.parameters,
+            watch.observe(),
+        ));
     }
     // A part of a record has not a reading at every node of the grid.
     let mut settings = settings.clone();
@@ -89,12 +107,16 @@ pub(super) fn search_evaluated(
     }
     let settings = &settings;
     let kept = watch.begin_search();
+    let mut method = method(settings.solver);
+    if let Some(spare) = prepared.spare {
+        method.recycle(spare);
+    }
     std::thread::scope(|scope| {
         let run = Run {
-            method: method(settings.solver),
+            method,
             settings,
             reference,
-            at_start: evaluation,
+            at_start: prepared.evaluation,
             clock: Instant::now(),
             timings: Timings::default(),
             progress: Err(NOT_STARTED),
@@ -105,7 +127,7 @@ pub(super) fn search_evaluated(
             ahead: Ahead::new(scope, problem, settings),
         };
         let result = Executor::new(problem, run)
-            .configure(|state: SearchState| state.param(start.to_vec()))
+            .configure(|state: SearchState| state.param(prepared.parameters))
             .ctrlc(false)
             .timer(false)
             .run()

@@ -7,8 +7,8 @@
 //! functions together, from a motion near the readings.
 
 use super::all_at_once::all_at_once;
-use super::beginning::{BetterStart, begin, beginning, reference};
-use super::executor::{search, search_evaluated};
+use super::beginning::{begin, beginning, reference};
+use super::executor::{Prepared, search, search_prepared};
 use super::recorder::Reference;
 use super::timings::timed;
 use super::{
@@ -70,7 +70,7 @@ pub struct Rung {
 
 enum Attempt {
     /// From what the beginning of the record says.
-    Beginning(BetterStart),
+    Beginning(Box<Prepared>),
     Functions,
     Data,
     GrowingHorizon,
@@ -140,7 +140,7 @@ pub fn fit_watched(
         }
         (Initial::Functions, None) => (None, None, Duration::ZERO),
         (Initial::Data, _) => {
-            let (reference, timings) = reference(problem, start, settings);
+            let (reference, timings, _) = reference(problem, start, settings);
             before.counts.forward += 1;
             before.counts.adjoint += u64::from(reference.is_some());
             before.timings += timings;
@@ -149,7 +149,11 @@ pub fn fit_watched(
     };
     // What was done before an interrupt is part of it.
     let lead = clock.elapsed().max(begun_in);
-    let attempts = begun.map(Attempt::Beginning).into_iter().chain(attempts);
+    let attempts = begun
+        .map(Box::new)
+        .map(Attempt::Beginning)
+        .into_iter()
+        .chain(attempts);
     // A rung that gets stuck in a false valley creeps: the others are tried before it goes on.
     let mut probing = settings.clone();
     let capped = climbs && settings.stopping.has_test();
@@ -334,11 +338,8 @@ fn run(
 ) -> Result<Fit, Breakdown> {
     let clock = &mut before.timings.start;
     let parameters = match attempt {
-        Attempt::Beginning(BetterStart {
-            parameters,
-            evaluation,
-        }) => {
-            return search_evaluated(problem, &parameters, evaluation, settings, reference, watch);
+        Attempt::Beginning(prepared) => {
+            return search_prepared(problem, *prepared, settings, reference, watch);
         }
         Attempt::Functions => start.to_vec(),
         Attempt::Data => from_data(problem, start, clock),

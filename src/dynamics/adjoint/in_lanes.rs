@@ -1,7 +1,7 @@
 //! The discrete adjoint with its steps linearised eight at a time: the motion is known, so only two
 //! products of a step wait for the step after it.
 
-use crate::dynamics::maps::{self, FUNCTIONS, Maps};
+use crate::dynamics::maps::{self, FUNCTIONS, Maps, Wanted};
 use crate::dynamics::stages::Rhs;
 use crate::dynamics::{Device, DeviceTangent, Method, Slopes, State, Trajectory};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
@@ -55,8 +55,13 @@ impl Kernel for Back<'_> {
         let mut gradient = self.gradient;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
-        let mut wanted = [false; FUNCTIONS];
-        wanted[..=rhs.terms.len()].fill(true);
+        let mut wanted = Wanted::default();
+        let asked = match &gradient {
+            Slopes::AtNodes(_) => &mut wanted.ends,
+            Slopes::Summed(_) => &mut wanted.sum,
+        };
+        asked[..=rhs.terms.len()].fill(true);
+        let constant_mass = maps::constant_mass(&rhs.device.mass[..=last]);
         let mut maps = Maps::NOTHING;
         let mut x = [source.displacement[last], source.velocity[last]];
         let mut to = last;
@@ -68,6 +73,7 @@ impl Kernel for Back<'_> {
                 rhs,
                 self.trajectory,
                 from,
+                constant_mass,
                 &wanted,
                 &mut maps,
             );
@@ -88,14 +94,16 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[1]),
             ];
             for (f, sum) in sums.iter_mut().enumerate().take(1 + rhs.terms.len()) {
-                let [left, right] = shares(arithmetic, &maps.left[f], &maps.right[f], ends);
                 match &mut gradient {
                     Slopes::AtNodes(device) => {
+                        let left = share(arithmetic, &maps.left[f], ends);
+                        let right = share(arithmetic, &maps.right[f], ends);
                         let values = &mut device.function_mut(f)[from..];
                         set(arithmetic, left, right, to - from, values);
                     }
                     Slopes::Summed(_) => {
-                        *sum = (Eight::load(arithmetic, sum) + (left + right)).row();
+                        let share = share(arithmetic, &maps.sum[f], ends);
+                        *sum = (Eight::load(arithmetic, sum) + share).row();
                     }
                 }
             }
@@ -113,18 +121,10 @@ impl Kernel for Back<'_> {
     }
 }
 
-/// The shares of eight steps in the gradient of a function, at their left and at their right nodes.
+/// The shares of eight steps in the gradient of a function, from the answers to it.
 #[inline(always)]
-fn shares<A: Arithmetic>(
-    arithmetic: A,
-    left: &[Row; 2],
-    right: &[Row; 2],
-    ends: [Eight<A>; 2],
-) -> [Eight<A>; 2] {
-    [
-        Eight::load(arithmetic, &left[0]) * ends[0] + Eight::load(arithmetic, &left[1]) * ends[1],
-        Eight::load(arithmetic, &right[0]) * ends[0] + Eight::load(arithmetic, &right[1]) * ends[1],
-    ]
+fn share<A: Arithmetic>(arithmetic: A, answers: &[Row; 2], ends: [Eight<A>; 2]) -> Eight<A> {
+    Eight::load(arithmetic, &answers[0]) * ends[0] + Eight::load(arithmetic, &answers[1]) * ends[1]
 }
 
 /// Writes the shares of up to eight steps to the gradient of a function, from their first node on. It is called from

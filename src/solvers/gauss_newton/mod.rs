@@ -214,15 +214,8 @@ impl GaussNewton {
             return work.complete(parameters, evaluation);
         }
         let (point, has_stayed) = work.complete_nearby(parameters, evaluation);
-        match has_stayed {
-            true => {
-                self.made_at = self
-                    .made_at
-                    .take()
-                    .or_else(|| Some(before.parameters.clone()))
-            }
-            false => self.made_at = None,
-        }
+        let made_at = self.made_at.take();
+        self.made_at = has_stayed.then(|| made_at.unwrap_or_else(|| before.parameters.clone()));
         point
     }
 
