@@ -334,7 +334,7 @@ impl Work<'_> {
         }
         self.document.equivalents = piece!(
             "equivalents",
-            gather::equivalents(&problem, &evaluation, plan)
+            gather::equivalents(&problem, &evaluation, &plan.equivalents)
         );
         if plan.starts > 0 {
             let found = piece!(

@@ -76,6 +76,29 @@ fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
     largest * values.map(|v| (v / largest).powi(2)).sum::<f64>().sqrt()
 }
 
+/// Standard deviation, 0 of none.
+pub(crate) fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
+}
+
+/// What is left of values without their straight line over the times.
+pub(crate) fn without_line(times: &[f64], values: &[f64]) -> Vec<f64> {
+    let n = values.len() as f64;
+    let [middle, level] = [times, values].map(|x| x.iter().sum::<f64>() / n);
+    let (mut along, mut spread) = (0.0, 0.0);
+    for (t, y) in times.iter().zip(values) {
+        along += (t - middle) * (y - level);
+        spread += (t - middle) * (t - middle);
+    }
+    let slope = along / spread;
+    let pairs = times.iter().zip(values);
+    pairs
+        .map(|(t, y)| y - (level + slope * (t - middle)))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,5 +158,19 @@ mod tests {
             5.0 / 1.5,
         );
         assert_eq!(reduced_chi_square(&[1.0, 2.0], 2.0), None);
+    }
+
+    #[test]
+    fn a_line_and_what_is_left_of_it() {
+        let times: Vec<f64> = (0..5).map(f64::from).collect();
+        let wiggle = [1.0, -2.0, 2.0, -2.0, 1.0];
+        let values: Vec<f64> = times
+            .iter()
+            .zip(wiggle)
+            .map(|(t, w)| 3.0 + 0.5 * t + w)
+            .collect();
+        assert_eq!(without_line(&times, &values), wiggle);
+        assert_eq!(spread(&wiggle), (14.0f64 / 5.0).sqrt());
+        assert_eq!(spread(&[]), 0.0);
     }
 }

@@ -3,6 +3,7 @@
 use super::document::{ExperimentSummary, ResultDocument};
 use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
 use super::measured::{ChannelSummary, PatternSummary};
+use crate::diagnostics::SIGNIFICANCE;
 use crate::digits::significant;
 use crate::dynamics::Method;
 use crate::solvers::{Solver, Status};
@@ -181,11 +182,18 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
     match named.find(|(_, channel)| poor(channel)) {
-        Some((_, channel)) if told(channel) && !is_coloured(&channel) => Some(format!(
-            "the {} is matched to {} only, but what is left looks like noise: no other device would do much better",
-            channel.kind,
-            percent(channel.fit_percent, 0)
-        )),
+        Some((_, channel)) if told(channel) && !is_coloured(&channel) => {
+            let is_white = |p: f64| p >= SIGNIFICANCE;
+            let left = match channel.whiteness_p_value.is_some_and(is_white) {
+                true => "looks like noise",
+                false => "is nearly noise",
+            };
+            Some(format!(
+                "the {} is matched to {} only, but what is left {left}: no other device would do much better",
+                channel.kind,
+                percent(channel.fit_percent, 0)
+            ))
+        }
         Some((record, channel)) => {
             let matched = percent(channel.fit_percent, 0);
             let what = match channels().count() {

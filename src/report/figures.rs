@@ -446,3 +446,27 @@ pub fn weight_path(path: &WeightPath) -> Figure {
         ),
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::svg;
+
+    /// Of a single iteration there is no line: both curves are dots, three times as wide.
+    #[test]
+    fn a_single_iteration_shows() {
+        let one = svg::render(&convergence(&[1.0], &[1e-3], &[1e-4]));
+        let two = svg::render(&convergence(&[1.0, 2.0], &[1e-3, 1e-4], &[1e-4, 1e-6]));
+        for (dot, line) in [("66", "22"), ("27", "9")] {
+            let width = |w: &str| format!("stroke-width=\"{w}\"");
+            assert!(
+                one.contains(&width(dot)) && !one.contains(&width(line)),
+                "{one}"
+            );
+            assert!(
+                two.contains(&width(line)) && !two.contains(&width(dot)),
+                "{two}"
+            );
+        }
+    }
+}

@@ -17,7 +17,6 @@ use super::render;
 use super::seen::SeenChannel;
 use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
-use crate::diagnostics::rms;
 use crate::dynamics::{Excitation, Term};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
@@ -350,14 +349,14 @@ impl FittedModel<'_> {
                 let channels: Vec<ChannelSummary> = channels
                     .map(|(i, (c, predicted))| measured::channel(c, self.note(e, i), predicted))
                     .collect();
-                let first = experiment.channels.iter().zip(predictions).next();
+                let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
                     readings: experiment.reading_count(),
-                    rms_residual: first.map_or(f64::NAN, |(c, predicted)| {
-                        rms(&c.residuals(predicted).collect::<Vec<f64>>())
-                    }),
+                    rms_residual: channels
+                        .first()
+                        .map_or(f64::NAN, |first| factor * first.rms_residual),
                     channels,
                 }
             })

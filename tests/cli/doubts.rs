@@ -823,3 +823,42 @@ fn a_tone_in_the_residuals_is_named() {
     };
     assert!(fit(&better) > fit(&summary) + 10.0, "{better}{stderr}");
 }
+
+/// What swings on by itself, at a phase that wanders, is no ring-down: motions are hardly matched, accelerations are.
+#[test]
+fn something_unknown_keeps_it_moving() {
+    let bench = Workbench::empty();
+    let rows: String = (0..2000)
+        .map(|i| {
+            let t = 0.05 * f64::from(i);
+            let y = (6.2 * t + 3.0 * (0.31 * t).sin() + 2.0 * (0.17 * t).sin()).cos();
+            format!("{t},{y}\n")
+        })
+        .collect();
+    bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
+    let columns = "    columns: {time: t_s, displacement: y_m}\n";
+    bench.write("model.yaml", &starter("{nodes: 2000}", columns));
+    let advice = "if something unknown keeps it moving, compare accelerations instead of motions (fit.method=equation-error)";
+    let fit = ["fit", "model.yaml", "--no-report"];
+    let (_, summary, stderr) = bench.run(&fit);
+    assert!(summary.contains(advice), "{summary}{stderr}");
+    bench.run_to(
+        0,
+        &[
+            "fit",
+            "model.yaml",
+            "--no-report",
+            "--set",
+            "fit.method=equation-error",
+            "--out",
+            "again",
+        ],
+    );
+    let again = bench.read("again/result.json");
+    let result: Value = serde_json::from_str(&again).expect("JSON");
+    let stiffness = result["functions"]["stiffness"]["max"]
+        .as_f64()
+        .expect("a number");
+    // The frequency wanders from 4.9 to 7.5 rad/s about 6.2.
+    assert!((24.0..56.0).contains(&stiffness), "{stiffness}");
+}

@@ -1,7 +1,7 @@
 //! Which column of a table is what.
 
-use super::motion::spread;
 use super::quoted;
+use crate::diagnostics::spread;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use crate::units::{Kind, Unit};
@@ -36,9 +36,9 @@ const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
 /// Names that are no beginnings: a roller does not roll.
 const WHOLE: [&str; 2] = ["roll", "pitch"];
 /// Units at the end of names that no role has, in small letters.
-const FOREIGN: [&str; 16] = [
+const FOREIGN: [&str; 18] = [
     "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
-    "bar", "ohm", "ma", "db",
+    "bar", "ohm", "ma", "db", "kg", "volt",
 ];
 /// Of two sensors the later one is taken if it moves so many times as much: with less there is no telling.
 const MUCH: f64 = 3.0;
@@ -157,7 +157,8 @@ impl Columns {
         };
         let size = |c: &Column| -> Result<f64, InputError> {
             let readings = table.readings(c.index)?.iter().copied();
-            Ok(c.unit.factor() * spread(readings.filter(|x| x.is_finite())))
+            let readings: Vec<f64> = readings.filter(|x| x.is_finite()).collect();
+            Ok(c.unit.factor() * spread(&readings))
         };
         let there = &self.used[place];
         let alike = column.has_unit == there.has_unit
@@ -186,7 +187,8 @@ impl Columns {
                 .found(format!("no number in the column `{label}`"))
                 .expected("at least some readings"));
         }
-        if self.unused.is_empty() {
+        let is_open = |i: &usize| !is_foreign(table.headers().get(*i).map_or("", String::as_str));
+        let Some(place) = self.unused.iter().position(is_open) else {
             let names = (0..table.width()).map(|i| table.label(i));
             return Err(InputError::file(
                 table.path(),
@@ -197,9 +199,9 @@ impl Columns {
                 names.collect::<Vec<_>>().join(", ")
             ))
             .expected("a column of readings beside the times"));
-        }
+        };
         self.used.push(Column {
-            index: self.unused.remove(0),
+            index: self.unused.remove(place),
             role: Role::Displacement,
             unit: Unit::si(Kind::Displacement),
             tell_unit: false,

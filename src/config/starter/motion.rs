@@ -1,7 +1,7 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
 use super::columns::{Column, Columns, Role};
-use crate::diagnostics::{far_off, offset_and_drift};
+use crate::diagnostics::{far_off, offset_and_drift, spread, without_line};
 use crate::digits::clock;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
@@ -98,7 +98,7 @@ impl Motion {
         let drive = drive.map(|c| in_si(table, c)).transpose()?;
         let missing = times.len() - pairs.len();
         let far_off = leave_out_far_off(&mut pairs);
-        let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
+        let values = values_of(&pairs);
         // What drives a motion may begin late, too.
         let begins = match drive {
             Some(_) => None,
@@ -107,7 +107,7 @@ impl Motion {
         let pairs = &pairs[begins.unwrap_or(0)..];
         // The line is a drift where the readings swing about it, and not the swing itself.
         let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
-        let beside_line = without_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
+        let beside_line = beside_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
         let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
         Ok(Self {
             between: between(&drive.unwrap_or_default()),
@@ -122,8 +122,14 @@ impl Motion {
             frequency: beside_line.or_else(|| frequency(pairs, spacing)),
             is_off_centre: off_centre(pairs),
             drifts: beside_line.is_some(),
-            force: force.map(|f| spread(f.into_iter().filter(|x| x.is_finite()))),
-            motion: spread(pairs.iter().map(|(_, value)| *value)),
+            force: force.map(|f| {
+                spread(
+                    &f.into_iter()
+                        .filter(|x| x.is_finite())
+                        .collect::<Vec<f64>>(),
+                )
+            }),
+            motion: spread(&values_of(pairs)),
             power,
         })
     }
@@ -165,26 +171,14 @@ fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
 }
 
 /// Readings without their straight line, if that is a good part of them.
-fn without_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     let (times, values): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
     let [mean, line] = offset_and_drift(&times, &values);
     if line <= DRIFT * (1.0 - mean) {
         return None;
     }
-    let n = pairs.len() as f64;
-    let [middle, level] = [&times, &values].map(|x| x.iter().sum::<f64>() / n);
-    let along: f64 = pairs.iter().map(|(t, y)| (t - middle) * (y - level)).sum();
-    let slope = along
-        / times
-            .iter()
-            .map(|t| (t - middle) * (t - middle))
-            .sum::<f64>();
-    Some(
-        pairs
-            .iter()
-            .map(|(t, y)| (*t, y - slope * (t - middle)))
-            .collect(),
-    )
+    let left = without_line(&times, &values);
+    Some(times.into_iter().zip(left).collect())
 }
 
 /// How a drive goes on between its samples, as far as they say: those that are left out tell, every second of them.
@@ -255,6 +249,10 @@ fn frequency(pairs: &[(f64, f64)], spacing: f64) -> Option<f64> {
     (frequency.is_finite() && frequency > 0.0).then_some(frequency)
 }
 
+fn values_of(pairs: &[(f64, f64)]) -> Vec<f64> {
+    pairs.iter().map(|(_, value)| *value).collect()
+}
+
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -263,13 +261,5 @@ fn median(values: &[f64]) -> f64 {
 
 fn off_centre(pairs: &[(f64, f64)]) -> bool {
     let mean = pairs.iter().map(|(_, value)| value).sum::<f64>() / pairs.len() as f64;
-    mean.abs() > spread(pairs.iter().map(|(_, value)| *value))
-}
-
-/// Standard deviation.
-pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.collect();
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
+    mean.abs() > spread(&values_of(pairs))
 }

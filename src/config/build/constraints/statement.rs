@@ -5,6 +5,7 @@ use crate::config::build::functions::values;
 use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
 use crate::constraints::{Limit, Shape, Statement};
+use crate::digits::clock;
 use crate::dynamics::Grid;
 use crate::error::InputError;
 use crate::functions::Quantity;
@@ -298,7 +299,10 @@ impl Reader<'_> {
                 return Err(self
                     .error(&below, "this time lies outside the record")
                     .found(time.0)
-                    .expected(format!("a time from {start} s to {end} s")));
+                    .expected(format!(
+                        "a time from {start} s to {} s",
+                        clock(end, self.grid.step())
+                    )));
             }
             let held = Statement::Value {
                 of: self.of(),

@@ -4,7 +4,7 @@ use super::{RawChannel, Record, is_equation_error, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::diagnostics::far_off;
+use crate::diagnostics::{far_off, spread, without_line};
 use crate::digits::{clock, significant};
 use crate::dynamics::{ChannelKind, Term};
 use crate::error::InputError;
@@ -152,26 +152,12 @@ fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
             _ => -y[1],
         });
     }
-    let [said, read] = [said, read].map(|values| without_line(&times, values));
+    // Sensors drift.
+    let [said, read] = [said, read].map(|values| without_line(&times, &values));
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let correlation =
         product(&said, &read) / (product(&said, &said) * product(&read, &read)).sqrt();
     correlation.is_finite().then_some(correlation)
-}
-
-/// Values without the straight line through them: sensors drift.
-fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
-    let n = values.len() as f64;
-    let [middle, level] = [times, &values].map(|x| x.iter().sum::<f64>() / n);
-    let (mut along, mut spread) = (0.0, 0.0);
-    for (t, y) in times.iter().zip(&values) {
-        along += (t - middle) * (y - level);
-        spread += (t - middle) * (t - middle);
-    }
-    for (t, y) in times.iter().zip(&mut values) {
-        *y -= level + along / spread * (t - middle);
-    }
-    values
 }
 
 /// Warns of a record without a drive that stands still before its motion begins: a free motion begins where nothing holds
@@ -258,12 +244,6 @@ pub fn ranges(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<St
             ));
         }
     }
-}
-
-/// Standard deviation about the mean.
-fn spread(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 /// Refuses a force offset beside sensor offsets: a motion that is shifted by `d`, a sensor that reads `d`

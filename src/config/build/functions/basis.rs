@@ -3,6 +3,7 @@
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Knots, Number};
 use crate::config::spec::{Basis as Kind, FunctionSpec};
+use crate::digits::clock;
 use crate::dynamics::Grid;
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::error::InputError;
@@ -149,8 +150,10 @@ fn listed(
     let mut times: Vec<f64> = given.iter().map(|t| t.0).collect();
     for (i, &t) in times.iter().enumerate() {
         if t < start - slack || t > end + slack {
-            return Err(at(i, "this knot lies outside the record")
-                .expected(format!("a time from {start} s to {end} s")));
+            return Err(at(i, "this knot lies outside the record").expected(format!(
+                "a time from {start} s to {} s",
+                clock(end, grid.step())
+            )));
         }
         if i > 0 && t <= times[i - 1] {
             let before = times[i - 1];

@@ -106,12 +106,12 @@ fn ended(extreme: &Extreme, level: f64) -> &'static str {
     }
 }
 
-/// Devices with the same motion as the fit's: those that the plan asks for, or some whose mass is the
+/// Devices with the same motion as the fit's: those that are `asked` for, or some whose mass is the
 /// fit's times a factor over time.
 pub fn equivalents(
     problem: &Problem,
     evaluation: &Evaluation,
-    plan: &StudyPlan,
+    asked: &[Equivalent],
 ) -> Vec<EquivalentRecord> {
     let grid = &problem.oscillator.grid;
     let Some(experiment) = problem.experiments.first() else {
@@ -123,9 +123,9 @@ pub fn equivalents(
     }
     let motion = Motion::of(problem, evaluation, 0);
     let device = evaluation.device_of(experiment.device);
-    let asked = match plan.equivalents.is_empty() {
+    let asked = match asked.is_empty() {
         true => factors(&device.mass),
-        false => plan.equivalents.clone(),
+        false => asked.to_vec(),
     };
     let mut records = vec![record(grid, "the fit", device, 0.0)];
     for Equivalent {
@@ -197,5 +197,46 @@ fn record(grid: &Grid, name: &str, device: &Device, motion_error: f64) -> Equiva
         damping: device.coefficients[0].clone(),
         stiffness: device.coefficients[1].clone(),
         motion_error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+
+    /// What is listed of a ring-down of six periods by the midpoint rule, on 61 nodes.
+    fn listed(asked: impl Fn(usize) -> Option<f64>) -> Vec<EquivalentRecord> {
+        let times = Grid::new(0.0, 20.0, 61).unwrap().times();
+        let readings: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
+        let record = Record::new("ring-down")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let problem = Builder::new([1.0, 0.1, 4.0].map(Part::constant))
+            .record(record)
+            .build()
+            .unwrap();
+        let evaluation = problem.evaluate(&problem.start()).unwrap();
+        let mass: Option<Vec<f64>> = (0..61).map(asked).collect();
+        let asked = mass.map(|mass| Equivalent {
+            name: "asked for".into(),
+            mass,
+            damping: None,
+        });
+        equivalents(&problem, &evaluation, asked.as_slice())
+    }
+
+    /// Three devices beside the fit share its motion, and so does one that is asked for; one whose mass jumps to next to
+    /// nothing at every other node, too fast for the steps, does not and is not listed.
+    #[test]
+    fn what_leaves_the_motion_is_no_equivalent() {
+        let own = listed(|_| None);
+        assert_eq!(own.len(), 4);
+        assert!(own.iter().all(|device| device.motion_error <= SAME_MOTION));
+        let slow = listed(|i| Some(1.0 + 0.01 * i as f64));
+        assert_eq!(slow.len(), 2);
+        let fast = listed(|i| Some(if i % 2 == 0 { 1.0 } else { 0.01 }));
+        assert!(fast.is_empty(), "{}", fast[1].motion_error);
     }
 }
