@@ -383,7 +383,8 @@ mod tests {
     use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
     use crate::objective::{Channel, Weighting};
     use crate::problem::Experiment;
-    use crate::solvers::{Counts, Fit, fit, fit_from};
+    use crate::solvers::gauss_newton::GaussNewton;
+    use crate::solvers::{Bits, Counts, Descend, Fit, Memory, Step, Work, fit, fit_from};
 
     /// A decaying oscillator with so many knots for damping and stiffness each, and more readings than a piece holds.
     fn problem(knots: u32) -> Problem {
@@ -581,6 +582,43 @@ mod tests {
                 theta[j]
             );
         }
+    }
+
+    /// A step that the Jacobian of another point leads astray is made again with the one of its own.
+    #[test]
+    fn a_jacobian_that_leads_astray_is_made_anew() {
+        let problem = long_problem(None);
+        let settings = FitSettings::default();
+        let start = problem.start();
+        let stepped = |elsewhere: Option<&[f64]>| {
+            std::thread::scope(|scope| {
+                let mut counted = argmin::core::Problem::new(&problem);
+                let ahead = Ahead::new(scope, &problem, &settings);
+                let mut work = Work::new(&mut counted, ahead, &settings);
+                let evaluation = problem.evaluate(&start).expect("a motion");
+                let point = work.complete(start.clone(), evaluation);
+                let mut method = GaussNewton::default();
+                let memory = Memory::GaussNewton {
+                    numbers: Bits(vec![1e-10]),
+                    made_at: elsewhere.map(|at| Bits(at.to_vec())),
+                };
+                assert!(method.recall(memory, &problem, &point));
+                if elsewhere.is_some() {
+                    work.linearise_again(&point, elsewhere);
+                }
+                let Step::Moved { point, .. } = method.step(&mut work, &point) else {
+                    panic!("no step");
+                };
+                drop(work);
+                (point.parameters, Counts::of(&counted))
+            })
+        };
+        let (expected, before) = stepped(None);
+        let elsewhere = [2.0, 1.0, 3.0, 1.0].iter().zip(&start);
+        let elsewhere: Vec<f64> = elsewhere.map(|(factor, p)| factor * p).collect();
+        let (found, after) = stepped(Some(&elsewhere));
+        assert_eq!(found, expected);
+        assert_eq!(after.tangent, before.tangent + problem.parameters() as u64);
     }
 
     /// On one thread and on two the same, to the last bit.
