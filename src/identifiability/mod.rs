@@ -23,6 +23,13 @@ mod sensitivity;
 mod verdict;
 pub(crate) use verdict::is_rounding;
 
+use crate::problem::Problem;
+
+/// Whether the readings alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
+pub(crate) fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
+    !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
+}
+
 pub use anchors::{Anchors, anchors};
 pub use bands::{Band, BandSettings, Bands, Side};
 pub use counting::{Count, Statement, Symmetry, count};

@@ -37,6 +37,7 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     if wanders(document) {
         steps.rotate_left(1);
     }
+    steps.extend(about_constants(document));
     let known = &document.identifiability;
     let is_simulated = document.model.method != Solver::EquationError.name();
     if is_simulated && document.model.parameters > 0 {
@@ -59,6 +60,19 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     }
     steps.truncate(MOST);
     steps
+}
+
+/// A function that varies no more than noise lets a constant vary.
+fn about_constants(document: &ResultDocument) -> Option<String> {
+    let functions = document.functions.iter();
+    let probable = functions.filter_map(|(name, f)| Some((name, f.constant_p_value?)));
+    let (name, p) = probable.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (p >= SIGNIFICANCE).then(|| {
+        format!(
+            "a constant {name} would match as well (p = {}): basis: constant",
+            significant(p, 1)
+        )
+    })
 }
 
 /// Whether the iterations ran out on a model that is wrong: where it is right, steps of Gauss and Newton need few.

@@ -233,6 +233,10 @@ pub struct FunctionSummary {
     /// priors, where the readings determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
+    /// The probability that noise alone lets the function vary as much, where the truth is constant; where the readings
+    /// determine all parameters, and nothing else has a say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub constant_p_value: Option<f64>,
     /// Largest distance from the truth at a node, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_max_error: Option<f64>,

@@ -8,13 +8,14 @@ use crate::diagnostics::{
     with_estimated_sigma, with_known_sigma,
 };
 use crate::dynamics::Breakdown;
-use crate::functions::CoefficientFunction;
+use crate::functions::{Basis, CoefficientFunction};
 use crate::objective::{Channel, Evaluation, Loss, Refined, Weighting};
 use crate::observations::times::even_spacing;
 use crate::problem::Problem;
 use crate::signal::Spectrum;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Residuals below this share of the largest reading are rounding.
 const ROUNDING: f64 = 1e-6;
@@ -411,7 +412,39 @@ pub fn standard_error(
     index: usize,
     covariance: Option<&DMatrix<f64>>,
 ) -> Option<f64> {
-    let constant = matches!(function.basis, Some(crate::functions::Basis::Constant));
+    let constant = matches!(function.basis, Some(Basis::Constant));
     let covariance = covariance.filter(|_| constant)?;
     Some(covariance[(index, index)].sqrt())
+}
+
+/// The probability that noise alone lets a function vary as much as it was found to, where the truth is constant: Wald's
+/// test of its values `theta` in the parameters, which begin at `index`. With their covariance `C` and the values `e` of
+/// the constant 1, `min_a (theta - a e)' C^-1 (theta - a e)` has the chi-square law with one degree of freedom less than
+/// there are values. `None` for a function that is no constant plus something free, or constant by its basis.
+pub fn constant_probability(
+    function: &CoefficientFunction,
+    theta: &[f64],
+    index: usize,
+    covariance: Option<&DMatrix<f64>>,
+) -> Option<f64> {
+    let n = theta.len();
+    let one = match function.basis.as_ref()? {
+        Basis::Constant => return None,
+        Basis::Polynomial { .. } => DVector::from_fn(n, |i, _| f64::from(i == 0)),
+        Basis::Nodal
+        | Basis::PiecewiseConstant { .. }
+        | Basis::PiecewiseLinear { .. }
+        | Basis::BSpline { .. } => DVector::from_element(n, 1.0),
+    };
+    let law = ChiSquared::new(n.checked_sub(1)? as f64).ok()?;
+    if function.offset.iter().any(|x| *x != 0.0) {
+        return None;
+    }
+    let block = covariance?.view((index, index), (n, n)).into_owned();
+    let root = block.cholesky()?.l();
+    let theta = root.solve_lower_triangular(&DVector::from_column_slice(theta))?;
+    let one = root.solve_lower_triangular(&one)?;
+    let along = theta.dot(&one) / one.norm_squared();
+    let distance = (theta - one * along).norm_squared();
+    distance.is_finite().then(|| law.sf(distance))
 }

@@ -20,7 +20,7 @@ use crate::config::{ChannelNote, Model};
 use crate::dynamics::{Excitation, Term};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding};
+use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding, is_unhindered};
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Rung, Solver, Status, WeightPath, WeightRule, active_constraints,
     timed,
@@ -303,10 +303,13 @@ impl FittedModel<'_> {
     fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let problem = &self.model.problem;
         let list = self.named_functions().into_iter().enumerate();
-        let sizes = problem.natural_sizes(&self.fit.best.evaluation);
+        let best = &self.fit.best;
+        let sizes = problem.natural_sizes(&best.evaluation);
+        let free = self.known.covariance.as_ref();
+        let free = free.filter(|_| is_unhindered(problem, &best.parameters));
         list.map(|(i, (function, values))| {
             let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-            let index = problem.functions.ranges()[i].start;
+            let range = problem.functions.ranges()[i].clone();
             // The judgements on the functions come first, in their order.
             let judged = self.known.judgements.get(i);
             let summary = FunctionSummary {
@@ -317,8 +320,14 @@ impl FittedModel<'_> {
                 powers: self.powers(i),
                 standard_error: measured::standard_error(
                     function,
-                    index,
+                    range.start,
                     self.known.covariance.as_ref(),
+                ),
+                constant_p_value: measured::constant_probability(
+                    function,
+                    &best.parameters[range.clone()],
+                    range.start,
+                    free,
                 ),
                 ..summarise(&values, self.true_function(i))
             };
@@ -440,6 +449,7 @@ fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
         known_range: None,
         powers: None,
         standard_error: None,
+        constant_p_value: None,
         truth_rms_error: errors
             .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
     }

@@ -3,6 +3,7 @@
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
 use serde_json::Value;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A record for a model that leaves its mass alone.
 fn starter(grid: &str, more: &str) -> String {
@@ -861,4 +862,69 @@ fn something_unknown_keeps_it_moving() {
         .expect("a number");
     // The frequency wanders from 4.9 to 7.5 rad/s about 6.2.
     assert!((24.0..56.0).contains(&stiffness), "{stiffness}");
+}
+
+/// A stiffness on knots, of a device that has a constant one or one that falls: the probability is that of the ratio of
+/// likelihoods of both fits, which is another way to it.
+#[test]
+fn whether_a_constant_would_do() {
+    let bench = Workbench::empty();
+    for (name, falls) in [("constant", 0.0), ("falling", 0.004)] {
+        // y" = -(0.1 y' + k(t) y) by steps of a thousandth, and noise of 0.01.
+        let (mut y, mut v) = (1.0f64, 0.0f64);
+        let mut rows = String::from("t_s,y_m\n");
+        let mut random = 17u64;
+        for i in 0..20_000 {
+            let t = 1e-3 * f64::from(i);
+            if i % 20 == 0 {
+                let mut sum = -6.0;
+                for _ in 0..12 {
+                    random = random
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    sum += (random >> 11) as f64 / (1u64 << 53) as f64;
+                }
+                rows += &format!("{t:.3},{}\n", y + 0.01 * sum);
+            }
+            let k = |t: f64| 4.0 * (1.0 - falls * t);
+            let (ym, vm) = (y + 5e-4 * v, v - 5e-4 * (0.1 * v + k(t) * y));
+            (y, v) = (y + 1e-3 * vm, v - 1e-3 * (0.1 * vm + k(t + 5e-4) * ym));
+        }
+        bench.write("record.csv", &rows);
+        let [knots, constant] = ["piecewise-linear, knots: 5", "constant"].map(|basis| {
+            let model = starter(
+                "{nodes: 2001}",
+                "    columns: {time: t_s, displacement: y_m}\n    sigma: {displacement: 0.01}\n",
+            )
+            .replace(
+                "stiffness: {basis: constant, start: 39}",
+                &format!("stiffness: {{basis: {basis}, start: 3.9}}"),
+            );
+            bench.write("model.yaml", &model);
+            let printed = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--json"]);
+            serde_json::from_str::<Value>(&printed).expect("JSON")
+        });
+        let misfit = |result: &Value| result["cost"]["misfit"].as_f64().expect("a number");
+        let law = ChiSquared::new(4.0).expect("degrees of freedom");
+        let expected = law.sf(misfit(&constant) - misfit(&knots));
+        let stiffness = &knots["functions"]["stiffness"];
+        let found = stiffness["constant_p_value"].as_f64().expect("a number");
+        // To the part of the noise by which the model is not linear in the knots.
+        assert!(
+            (found - expected).abs() <= 0.02,
+            "{name}: {found} {expected}"
+        );
+        assert!(constant["functions"]["stiffness"]["constant_p_value"].is_null());
+        let (_, summary, _) = bench.run(&[
+            "fit",
+            "model.yaml",
+            "--no-report",
+            "--set",
+            "functions.stiffness.basis=piecewise-linear",
+            "--set",
+            "functions.stiffness.knots=5",
+        ]);
+        let says = summary.contains("a constant stiffness would match as well");
+        assert_eq!(says, name == "constant", "{found}: {summary}");
+    }
 }
