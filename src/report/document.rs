@@ -233,8 +233,8 @@ pub struct FunctionSummary {
     /// priors, where the readings determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
-    /// The probability that noise alone lets the function vary as much, where the truth is constant; where the readings
-    /// determine all parameters, and nothing else has a say.
+    /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
+    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub constant_p_value: Option<f64>,
     /// Largest distance from the truth at a node, where the truth is known.

@@ -42,6 +42,8 @@ pub(super) struct Doubts {
     pub open: Vec<String>,
     /// Whether what the linearised fit says of the errors of the functions means anything.
     pub errors_hold: bool,
+    /// Whether the residuals of a channel are certainly no noise, so that errors are too small.
+    pub is_coloured: bool,
 }
 
 impl Doubts {
@@ -79,6 +81,7 @@ impl Doubts {
             open: open.chain(absurd(problem, evaluation)).collect(),
             no_device,
             errors_hold,
+            is_coloured: coloured,
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::problem::Problem;
 use crate::signal::Spectrum;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Residuals below this share of the largest reading are rounding.
 const ROUNDING: f64 = 1e-6;
@@ -417,17 +417,20 @@ pub fn standard_error(
     Some(covariance[(index, index)].sqrt())
 }
 
-/// The probability that noise alone lets a function vary as much as it was found to, where the truth is constant: Wald's
-/// test of its values `theta` in the parameters, which begin at `index`. With their covariance `C` and the values `e` of
-/// the constant 1, `min_a (theta - a e)' C^-1 (theta - a e)` has the chi-square law with one degree of freedom less than
-/// there are values. `None` for a function that is no constant plus something free, or constant by its basis.
+/// The probability that noise alone lets function `f` vary as much as it was found to, where the truth is constant: Wald's
+/// test of its values `p` in the parameters `theta`. With their `covariance` `C` and the values `e` of the constant 1,
+/// `min_a (p - a e)' C^-1 (p - a e)` has the chi-square law with one degree of freedom less than there are values; divided
+/// by that number the F law, where the noise is known by the residuals only. `None` for a function that is no constant plus
+/// something free, or constant by its basis, and under a robust loss, which leaves another covariance.
 pub fn constant_probability(
-    function: &CoefficientFunction,
+    problem: &Problem,
+    f: usize,
     theta: &[f64],
-    index: usize,
-    covariance: Option<&DMatrix<f64>>,
+    covariance: &DMatrix<f64>,
 ) -> Option<f64> {
-    let n = theta.len();
+    let function = problem.functions.get(f);
+    let range = problem.functions.ranges()[f].clone();
+    let n = range.len();
     let one = match function.basis.as_ref()? {
         Basis::Constant => return None,
         Basis::Polynomial { .. } => DVector::from_fn(n, |i, _| f64::from(i == 0)),
@@ -436,15 +439,26 @@ pub fn constant_probability(
         | Basis::PiecewiseLinear { .. }
         | Basis::BSpline { .. } => DVector::from_element(n, 1.0),
     };
-    let law = ChiSquared::new(n.checked_sub(1)? as f64).ok()?;
-    if function.offset.iter().any(|x| *x != 0.0) {
+    let is_robust = problem.channels().any(|c| c.loss() != Loss::Squares);
+    if is_robust || function.offset.iter().any(|x| *x != 0.0) {
         return None;
     }
-    let block = covariance?.view((index, index), (n, n)).into_owned();
-    let root = block.cholesky()?.l();
-    let theta = root.solve_lower_triangular(&DVector::from_column_slice(theta))?;
+    let block = covariance.view((range.start, range.start), (n, n));
+    let root = block.into_owned().cholesky()?.l();
+    let values = root.solve_lower_triangular(&DVector::from_column_slice(&theta[range]))?;
     let one = root.solve_lower_triangular(&one)?;
-    let along = theta.dot(&one) / one.norm_squared();
-    let distance = (theta - one * along).norm_squared();
-    distance.is_finite().then(|| law.sf(distance))
+    let along = values.dot(&one) / one.norm_squared();
+    let distance = (values - one * along).norm_squared();
+    let degrees = n.checked_sub(1)? as f64;
+    let is_given =
+        |c: &Channel| matches!(c.weighting(), Weighting::Sigma(_) | Weighting::Sigmas(_));
+    let p = match problem.channels().all(is_given) {
+        true => ChiSquared::new(degrees).ok()?.sf(distance),
+        false => {
+            let left = problem.reading_count().checked_sub(problem.parameters())?;
+            let law = FisherSnedecor::new(degrees, left as f64).ok()?;
+            law.sf(distance / degrees)
+        }
+    };
+    p.is_finite().then_some(p)
 }

@@ -305,8 +305,11 @@ impl FittedModel<'_> {
         let list = self.named_functions().into_iter().enumerate();
         let best = &self.fit.best;
         let sizes = problem.natural_sizes(&best.evaluation);
+        let is_white = self.known.doubts.as_ref().is_some_and(|d| !d.is_coloured);
+        let is_minimum = self.fit.outcome.status == Status::Converged;
         let free = self.known.covariance.as_ref();
-        let free = free.filter(|_| is_unhindered(problem, &best.parameters));
+        let free =
+            free.filter(|_| is_white && is_minimum && is_unhindered(problem, &best.parameters));
         list.map(|(i, (function, values))| {
             let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let range = problem.functions.ranges()[i].clone();
@@ -323,12 +326,9 @@ impl FittedModel<'_> {
                     range.start,
                     self.known.covariance.as_ref(),
                 ),
-                constant_p_value: measured::constant_probability(
-                    function,
-                    &best.parameters[range.clone()],
-                    range.start,
-                    free,
-                ),
+                constant_p_value: free.and_then(|covariance| {
+                    measured::constant_probability(problem, i, &best.parameters, covariance)
+                }),
                 ..summarise(&values, self.true_function(i))
             };
             (function.name(), summary)

@@ -294,7 +294,7 @@ impl<'s, 'p> Ahead<'s, 'p> {
         self.before.is_some()
     }
 
-    /// The point that an evaluation belongs to, so near to the one that was linearised last that the Jacobian is the same:
+    /// The point that an evaluation belongs to, so near to the one before that the Jacobian used there is kept:
     /// the adjoint solve for its gradient, beside the natural sizes. `Err` if it is not, as far as can be told.
     pub fn point_nearby(
         &mut self,
@@ -569,8 +569,17 @@ mod tests {
         assert!(0 < adjoint && adjoint < points);
         assert_eq!(tangent, (points - adjoint) * parameters);
         let theta = &fit.best.parameters;
+        // Of two ways to the gradient one may have been gone at the end: both have the rounding of the one at the start.
+        let at_start = problem.evaluate(&problem.start()).expect("a motion");
+        let at_start = problem.gradient(&problem.start(), &at_start, GradientKind::Discrete);
         let expected = problem.gradient(theta, &fit.best.evaluation, GradientKind::Discrete);
-        assert_eq!(fit.best.gradient, expected);
+        let gradients = fit.best.gradient.euclidean.iter().zip(&expected.euclidean);
+        for ((found, expected), size) in gradients.zip(&at_start.euclidean) {
+            assert!(
+                (found - expected).abs() <= 1e-11 * size.abs(),
+                "{found} {expected} {size}"
+            );
+        }
         let mut timings = Timings::default();
         let reduced = Reduced::at(&problem, &fit.best.evaluation, &mut timings);
         let step = reduced.solution().expect("independent columns");

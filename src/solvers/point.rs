@@ -63,7 +63,12 @@ impl Point {
 
     /// [`Problem::relative_change`] from here to the parameters `after`.
     pub(crate) fn relative_change(&self, problem: &Problem, after: &[f64]) -> f64 {
-        problem.change_in_sizes(self.natural_sizes(problem), &self.parameters, after)
+        self.distance(problem, &self.parameters, after)
+    }
+
+    /// [`Problem::relative_change`] between two lists of parameters, by the sizes here.
+    pub(crate) fn distance(&self, problem: &Problem, from: &[f64], to: &[f64]) -> f64 {
+        problem.change_in_sizes(self.natural_sizes(problem), from, to)
     }
 }
 

@@ -173,7 +173,7 @@ impl Columns {
         Ok(())
     }
 
-    /// The first column that nothing is known of is a displacement.
+    /// The first column that nothing is known of, and that has no unit of something else, is a displacement.
     fn guess(&mut self, table: &Table) -> Result<(), InputError> {
         let is_empty = |i: &usize| match table.readings(*i) {
             Ok(readings) => readings.iter().all(|x| x.is_nan()),

@@ -154,8 +154,8 @@ impl Triangle {
     }
 
     /// The triangle of the same matrix beside another right-hand side, of which the products `(D A)' d` and the square
-    /// `|d|^2` are known; `None` if there is no such side, as far as rounding can tell, or a column is zero beside those
-    /// before it.
+    /// `|d|^2` are known; `None` if these belong to another matrix, of which they explain more than there is, or a column is
+    /// zero beside those before it.
     pub fn beside(mut self, products: &[f64], square: f64) -> Option<Self> {
         let n = self.rows.len();
         let mut explained = 0.0;

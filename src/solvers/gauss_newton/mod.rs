@@ -46,9 +46,11 @@ const PROGRAM_ACCURACY: f64 = 1e-9;
 const MOTION_ROUNDING: f64 = 1000.0;
 /// A relative change of the functions below this is not a step but rounding.
 const SMALLEST_CHANGE: f64 = 1e-9;
-/// A step that changes no function by more than this, relative to its size, changes the Jacobian by about as much: the
-/// next step may be made with it. It then leaves about this share of the error, which the last one squared.
+/// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
 const NEARBY: f64 = 1e-2;
+/// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
+/// one sooner. A step with the old one leaves about that share of the error, which one with its own would square.
+const AS_PREDICTED: f64 = 0.1;
 
 /// The method and its damping.
 pub struct GaussNewton {
@@ -123,7 +125,8 @@ impl Descend for GaussNewton {
                     // The next programs are others: they get the chance to be solved with less.
                     self.damping = before;
                 }
-                let is_nearby = gain > GOOD && change(problem, point, &proposal) <= NEARBY;
+                let is_nearby = (gain - 1.0).abs() <= AS_PREDICTED
+                    && self.distance(problem, point, &proposal) <= NEARBY;
                 let moved = self.moved(work, point, proposal.parameters, evaluation, is_nearby);
                 return Step::Moved {
                     point: Box::new(moved),
@@ -131,17 +134,17 @@ impl Descend for GaussNewton {
                     hindered: trouble.is_some(),
                 };
             }
-            if trouble.is_none()
-                && let Some(reason) = at_minimum(problem, point, &proposal)
-            {
-                return Step::Minimum(reason);
-            }
             if self.made_at.take().is_some() {
                 // The Jacobian of another point may be to blame.
                 work.count_tangents(linearisation_tangents(problem));
                 work.linearise_again(point, None);
                 sub = self.linearise(work, point);
                 continue;
+            }
+            if trouble.is_none()
+                && let Some(reason) = at_minimum(problem, point, &proposal)
+            {
+                return Step::Minimum(reason);
             }
             self.damping *= 8.0;
         }
@@ -174,13 +177,16 @@ impl Descend for GaussNewton {
         {
             return false;
         }
-        self.made_at = made_at.map(|at| at.0);
         let [damping, first_cost @ ..] = numbers.0.as_slice() else {
             return false;
         };
+        if first_cost.len() > 1 {
+            return false;
+        }
         self.damping = *damping;
         self.first_cost = first_cost.first().copied();
-        first_cost.len() <= 1
+        self.made_at = made_at.map(|at| at.0);
+        true
     }
 }
 
@@ -198,6 +204,12 @@ impl GaussNewton {
             work.linearised(&point.parameters)
         });
         linearise_from(problem, point, ahead, &mut work.timings).0
+    }
+
+    /// How far a proposal goes from where the Jacobian was made, relative to the sizes of the functions at the point.
+    fn distance(&self, problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
+        let from = self.made_at.as_ref().unwrap_or(&point.parameters);
+        point.distance(problem, from, &proposal.parameters)
     }
 
     /// The point that a step from `before` leads to; if that is nearby, with the same Jacobian.
