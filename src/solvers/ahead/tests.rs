@@ -1,4 +1,3 @@
-
 use super::*;
 use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
 use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
