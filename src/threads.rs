@@ -151,17 +151,31 @@ impl<'s, J: Send> Companion<'s, J> {
         own: impl FnOnce() -> T,
         look: impl FnOnce(T, &mut J) -> R,
     ) -> R {
+        self.post(prepare);
+        let own = own();
+        if !self.finish() {
+            (self.act)(&mut self.shared.job());
+        }
+        look(own, &mut self.shared.job())
+    }
+
+    /// Prepares the job and lets the other thread do it. A job that was posted before is ended first.
+    pub fn post(&mut self, prepare: impl FnOnce(&mut J)) {
+        self.finish();
         prepare(&mut self.shared.job());
         self.shared.state.store(POSTED, Ordering::Release);
         self.thread.unpark();
-        let own = own();
-        if self.shared.take() {
-            (self.act)(&mut self.shared.job());
-        } else {
+    }
+
+    /// Waits for the end of what was posted; whether it was done, and not taken back because nobody had begun it.
+    pub fn finish(&mut self) -> bool {
+        let was_posted = self.shared.state.load(Ordering::Acquire) != NONE;
+        let is_done = was_posted && !self.shared.take();
+        if is_done {
             self.wait();
         }
         self.shared.state.store(NONE, Ordering::Release);
-        look(own, &mut self.shared.job())
+        is_done
     }
 
     /// The job as it was left.

@@ -43,7 +43,7 @@ pub use step_jacobian::{StateChange, StepJacobian};
 pub use tableau::Method;
 pub use tangent::DeviceTangent;
 pub use term::{MOST_TERMS, Term};
-pub(crate) use trials::{Ray, Trials};
+pub(crate) use trials::{Layout, Ray, Trials, replay};
 
 /// What motions, adjoints and tangents are computed with: `AVX-512`, `AVX2` or `scalar`, the widest that this
 /// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the

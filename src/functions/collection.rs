@@ -3,6 +3,7 @@
 use super::{CoefficientFunction, Design, Gram, Runs, Scalar};
 use crate::dynamics::Device;
 use crate::dynamics::quadrature::{trapezoid, trapezoid_weights};
+use crate::lanes::sum::largest_difference;
 use std::ops::Range;
 
 /// The functions to be found and the scalars beside them. Their parameters stand one after the other
@@ -171,12 +172,17 @@ impl Functions {
         self.runs[index].as_ref()
     }
 
-    /// The largest size that a change `delta` of the parameters of function `index` has at any node.
-    pub(crate) fn largest_change(&self, index: usize, delta: &[f64]) -> f64 {
-        match (self.flat[index], delta, &self.runs[index]) {
+    /// The largest size at any node of what function `index` changes by from its parameters `from` to `after`.
+    pub(crate) fn largest_change(&self, index: usize, from: &[f64], after: &[f64]) -> f64 {
+        let design = &self.list[index].design;
+        if matches!(design, Design::Identity) {
+            return largest_difference(after, from);
+        }
+        let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
+        match (self.flat[index], delta.as_slice(), &self.runs[index]) {
             (Some([_, entry]), [delta], _) => (entry * delta).abs(),
-            (_, _, Some(runs)) => runs.largest(delta, self.nodes),
-            _ => self.list[index].design.largest(delta, self.nodes),
+            (_, delta, Some(runs)) => runs.largest(delta, self.nodes),
+            (_, delta, None) => design.largest(delta, self.nodes),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Design matrices: from parameters to values at the nodes.
 
-use crate::lanes::{self, Elementwise};
+use crate::lanes::sum::largest;
 use nalgebra_sparse::CsrMatrix;
 
 /// A matrix `B` of shape `nodes x parameters`.
@@ -130,22 +130,6 @@ fn each_row(matrix: &CsrMatrix<f64>, theta: &[f64], count: usize, mut act: impl 
         };
         act(i, product);
     }
-}
-
-/// The largest size of any of the values.
-pub(crate) fn largest(f: &[f64]) -> f64 {
-    // Many side by side: one maximum would wait for itself.
-    let (parts, rest) = f.as_chunks::<32>();
-    let mut most = [0.0f64; 32];
-    lanes::run(Elementwise(|| {
-        for part in parts {
-            for (most, p) in most.iter_mut().zip(part) {
-                *most = most.max(p.abs());
-            }
-        }
-    }));
-    let rest = rest.iter().map(|p| p.abs());
-    rest.chain(most).fold(0.0, f64::max)
 }
 
 /// Whether a matrix has one column, without gaps: its values are all there is to it.

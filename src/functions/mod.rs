@@ -18,7 +18,6 @@ mod variation;
 pub use basis::Basis;
 pub use collection::Functions;
 pub use design::Design;
-pub(crate) use design::largest;
 pub use gram::Gram;
 pub use penalty::Penalty;
 pub use quantity::Quantity;

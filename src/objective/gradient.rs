@@ -208,17 +208,13 @@ impl Problem {
         true
     }
 
-    fn empty_devices(&self) -> Vec<Device> {
-        vec![self.functions.empty_device(); self.functions.assemblies().len()]
-    }
-
     /// Euclidean gradient in the parameters, and the parameters of the L2 gradient.
     fn continuous_gradient(&self, evaluation: &Evaluation) -> (Vec<f64>, Vec<f64>) {
         assert!(
             self.supports_continuous(),
             "Eq. 13 needs one reading per node and no sigma"
         );
-        let mut nodal = self.empty_devices();
+        let mut nodal: Vec<Option<Device>> = vec![None; self.functions.assemblies().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
@@ -229,9 +225,15 @@ impl Problem {
                 view.motion,
                 experiment.channels[0].observed(),
             );
-            add(&mut nodal[experiment.device], &share.device);
+            match &mut nodal[experiment.device] {
+                Some(total) => add(total, &share.device),
+                none => *none = Some(share.device),
+            }
             add_initial(experiment.sought, share.initial, &mut scalars);
         }
+        let or_empty =
+            |device: Option<Device>| device.unwrap_or_else(|| self.functions.empty_device());
+        let nodal: Vec<Device> = nodal.into_iter().map(or_empty).collect();
         let grid = &self.oscillator.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let identity = |f: &CoefficientFunction| matches!(f.design, Design::Identity);

@@ -4,8 +4,7 @@ use super::Evaluation;
 use crate::diagnostics::median_size;
 use crate::dynamics::quadrature::curvature_into;
 use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
-use crate::functions::largest;
-use crate::lanes::sum::dot;
+use crate::lanes::sum::{dot, largest};
 use crate::problem::{Experiment, LONG, Problem};
 use crate::signal::Spectrum;
 use std::f64::consts::TAU;
@@ -64,16 +63,21 @@ impl Problem {
 
     /// [`Problem::relative_change`] with the natural sizes at hand.
     pub(crate) fn change_in_sizes(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
-        let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
         let ranges = self.functions.ranges().iter().zip(sizes);
         let mut most = 0.0f64;
         for (index, (range, size)) in ranges.enumerate() {
-            let change = (self.functions).largest_change(index, &delta[range.clone()]);
+            let change =
+                (self.functions).largest_change(index, &from[range.clone()], &after[range.clone()]);
             if change != 0.0 {
                 most = most.max(change / size);
             }
         }
-        let scalars = self.functions.scalars().iter().zip(self.scalars(&delta));
+        let changes = self
+            .scalars(after)
+            .iter()
+            .zip(self.scalars(from))
+            .map(|(a, b)| a - b);
+        let scalars = self.functions.scalars().iter().zip(changes);
         scalars.fold(most, |most, (scalar, x)| most.max(x.abs() / scalar.size))
     }
 }

@@ -13,8 +13,9 @@
 use super::line_search::{Line, weak_wolfe};
 use super::point::Work;
 use super::{Bits, Descend, Memory, Point, Step};
-use crate::functions::{Functions, Quantity, largest};
+use crate::functions::{Functions, Quantity};
 use crate::lanes::sum::dot;
+use crate::lanes::sum::largest;
 use crate::lanes::{self, Elementwise};
 use crate::objective::Evaluation;
 use crate::problem::Problem;

@@ -1,0 +1,101 @@
+//! Steepest descent exactly as in the paper.
+
+mod side_by_side;
+
+use super::point::Work;
+use super::{Descend, Point, Step};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use side_by_side::SideBySide;
+
+/// Number of trial steps.
+const TRIALS: u32 = 50;
+/// Factor of the longest trial step: `5 sqrt(G^2)`.
+const LONGEST: f64 = 5.0;
+
+/// Tries the steps `5 sqrt(G^2) / i^4`, `i = 1..50`, along the L2 gradient and takes the trial with
+/// the lowest cost, if it is strictly lower.
+///
+/// On the paper's own problem all trials are computed side by side; the bits are the same.
+#[derive(Default)]
+pub struct SteepestDescent {
+    spare: Vec<Evaluation>,
+    side_by_side: SideBySide,
+}
+
+/// A trial that lowers the cost.
+struct Best {
+    length: f64,
+    parameters: Vec<f64>,
+    evaluation: Evaluation,
+}
+
+impl Descend for SteepestDescent {
+    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+        let lengths = lengths(point);
+        let best = match side_by_side::ray(work.problem(), point, &lengths) {
+            Some(ray) => (self.side_by_side).lowest(work, point, ray, &lengths, &mut self.spare),
+            None => self.one_by_one(work, point, &lengths),
+        };
+        match best {
+            Some(best) => Step::Moved {
+                point: Box::new(work.complete(best.parameters, best.evaluation)),
+                length: best.length,
+                hindered: false,
+            },
+            None => Step::Stuck(format!("none of the {TRIALS} trial steps lowers the cost")),
+        }
+    }
+
+    fn recycle(&mut self, evaluation: Evaluation) {
+        self.spare.push(evaluation);
+    }
+}
+
+impl SteepestDescent {
+    fn one_by_one(&mut self, work: &mut Work, point: &Point, lengths: &[f64]) -> Option<Best> {
+        let mut evaluation = take(&mut self.spare, work.problem());
+        let mut best: Option<Best> = None;
+        for &length in lengths {
+            let parameters = trial(point, length);
+            if work.evaluate_into(&parameters, &mut evaluation).is_err() {
+                continue;
+            }
+            let lowest = best
+                .as_ref()
+                .map_or(point.evaluation.cost, |b| b.evaluation.cost);
+            if evaluation.cost < lowest {
+                let spare = match best.take() {
+                    Some(old) => old.evaluation,
+                    None => take(&mut self.spare, work.problem()),
+                };
+                best = Some(Best {
+                    length,
+                    parameters,
+                    evaluation: std::mem::replace(&mut evaluation, spare),
+                });
+            }
+        }
+        self.spare.push(evaluation);
+        best
+    }
+}
+
+/// The lengths of the trial steps, longest first.
+fn lengths(point: &Point) -> Vec<f64> {
+    let root = point.gradient.norm_squared.sqrt();
+    (1..=TRIALS)
+        .map(|i| LONGEST * root / f64::from(i.pow(4)))
+        .collect()
+}
+
+/// Storage for an evaluation.
+fn take(spare: &mut Vec<Evaluation>, problem: &Problem) -> Evaluation {
+    spare.pop().unwrap_or_else(|| problem.workspace())
+}
+
+/// `p - length g`.
+fn trial(point: &Point, length: f64) -> Vec<f64> {
+    let moves = point.parameters.iter().zip(&point.gradient.l2);
+    moves.map(|(p, g)| p - length * g).collect()
+}
