@@ -131,7 +131,10 @@ impl SideBySide {
         }
         self.own.run(ray, layout, others..rows);
         let norm = point.gradient.norm_squared;
-        let is_there = |follower: &Follower| follower.point.gradient.norm_squared == norm;
+        let is_there = |follower: &Follower| {
+            let has_all = follower.trials.costs().count() == others;
+            has_all && follower.point.gradient.norm_squared == norm
+        };
         let companion = self.companion.as_mut().filter(|_| is_shared);
         let companion = companion.and_then(|c| (c.finish() && c.look(is_there)).then_some(c));
         self.is_accompanied = companion.is_some();
@@ -252,3 +255,6 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Point, lengths: &[f64]) -
     });
     ray.filter(|ray| ray.is_moderate(lengths[0]))
 }
+
+#[cfg(test)]
+mod tests;
