@@ -3,7 +3,9 @@
 //! A kernel ([`Kernel`]) is written once, in terms of [`Eight`], and compiled for AVX-512, for
 //! AVX2 and for plain numbers; which of them runs is decided when the program runs. All do the same IEEE
 //! operations on the same eight lanes in the same order and none contracts a product and a sum, so
-//! **all give the same bits**: the processor decides how fast an answer comes, never what it is.
+//! **all give the same bits**: the processor decides how fast an answer comes, never what it is. Two things are there for
+//! speed alone and may differ, [`Eight::quotients`] and [`Eight::reciprocal`]: who uses them sees to it that what comes
+//! out does not.
 //!
 //! [`pulp`] proves the presence of instructions by its types, so there is no `unsafe` here.
 

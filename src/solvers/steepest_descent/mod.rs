@@ -54,30 +54,38 @@ impl Descend for SteepestDescent {
 
 impl SteepestDescent {
     fn one_by_one(&mut self, work: &mut Work, point: &Point, lengths: &[f64]) -> Option<Best> {
-        let mut evaluation = take(&mut self.spare, work.problem());
-        let mut best: Option<Best> = None;
+        let mut best = None;
         for &length in lengths {
             let parameters = trial(point, length);
+            let mut evaluation = take(&mut self.spare, work.problem());
             if work.evaluate_into(&parameters, &mut evaluation).is_err() {
+                self.spare.push(evaluation);
                 continue;
             }
-            let lowest = best
-                .as_ref()
-                .map_or(point.evaluation.cost, |b| b.evaluation.cost);
-            if evaluation.cost < lowest {
-                let spare = match best.take() {
-                    Some(old) => old.evaluation,
-                    None => take(&mut self.spare, work.problem()),
-                };
-                best = Some(Best {
-                    length,
-                    parameters,
-                    evaluation: std::mem::replace(&mut evaluation, spare),
-                });
-            }
+            let trial = Best {
+                length,
+                parameters,
+                evaluation,
+            };
+            trial.or_lower(&mut best, point, &mut self.spare);
         }
-        self.spare.push(evaluation);
         best
+    }
+}
+
+impl Best {
+    /// Takes the place of `best` if its cost is strictly lower than that, and than that of the point; whose storage is not
+    /// needed any more goes to `spare`.
+    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) {
+        let lowest = best
+            .as_ref()
+            .map_or(&point.evaluation, |b| &b.evaluation)
+            .cost;
+        let left = match self.evaluation.cost < lowest {
+            true => best.replace(self),
+            false => Some(self),
+        };
+        spare.extend(left.map(|left| left.evaluation));
     }
 }
 

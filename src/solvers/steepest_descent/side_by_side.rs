@@ -62,46 +62,44 @@ impl SideBySide {
             let (_, channel, _) = problem.one_full_record()?;
             let layout = Layout::new(ray, lengths);
             let costs = self.costs(problem, kind, point, ray, &layout);
-            let mut candidates = Vec::new();
-            for which in layout.lowest(&costs) {
-                candidates.push(Taken {
-                    length: lengths[which],
-                    states: self.states(layout.place(which))?,
-                });
-            }
+            let taken = |which: usize| {
+                let states = self.states(layout.place(which))?;
+                let length = lengths[which];
+                Some(Taken { length, states })
+            };
+            let candidates = layout.lowest(&costs).into_iter();
+            let candidates: Vec<Taken> = candidates.filter_map(taken).collect();
             // If there is but one, the other thread need not wait until its cost is known to the last bit.
             if let [only] = candidates[..] {
                 self.follow(only);
             }
-            let mut best: Option<(Best, Taken)> = None;
-            for &taken in &candidates {
+            let mut best = None;
+            for Taken { length, states } in &candidates {
+                let parameters = trial(point, *length);
                 let mut evaluation = take(spare, problem);
-                let parameters = trial(point, taken.length);
-                let cost = match move_to(problem, &parameters, taken.states, &mut evaluation) {
+                let has_motion = move_to(problem, &parameters, *states, &mut evaluation);
+                evaluation.misfit = match has_motion {
                     true => channel.cost(&evaluation.predictions[0][0]),
                     false => f64::INFINITY,
                 };
-                evaluation.misfit = cost;
                 evaluation.regularisation = 0.0;
-                evaluation.cost = cost;
-                let before = best.as_ref().map(|(best, _)| best.evaluation.cost);
-                if cost < before.unwrap_or(point.evaluation.cost) {
-                    let trial = Best {
-                        length: taken.length,
-                        parameters,
-                        evaluation,
-                    };
-                    let left = best.replace((trial, taken));
-                    spare.extend(left.map(|(left, _)| left.evaluation));
-                } else {
-                    spare.push(evaluation);
-                }
+                evaluation.cost = evaluation.misfit;
+                let trial = Best {
+                    length: *length,
+                    parameters,
+                    evaluation,
+                };
+                trial.or_lower(&mut best, point, spare);
             }
-            let (best, taken) = best?;
-            if candidates.len() > 1 {
-                self.follow(taken);
+            let is_best = |taken: &&Taken| best.as_ref().is_some_and(|b| b.length == taken.length);
+            let decided = candidates
+                .iter()
+                .find(is_best)
+                .filter(|_| candidates.len() > 1);
+            if let Some(taken) = decided {
+                self.follow(*taken);
             }
-            Some(best)
+            best
         })
     }
 
