@@ -16,7 +16,7 @@ pub(crate) mod tall;
 mod x86;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::error::{InputError, Place};
 use crate::near::nearest;

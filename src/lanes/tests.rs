@@ -1,6 +1,6 @@
 use super::*;
 
-/// Every operation of the lanes, as bits.
+/// The operations of the lanes that all arithmetics do alike, as bits.
 struct Everything {
     a: [Row; LANES],
     b: Row,
@@ -20,6 +20,8 @@ impl Kernel for Everything {
             rows.push((a * b).row());
             rows.push((a / b).row());
             rows.push((a * b + a * a - b / a).row());
+            rows.push(a.larger(b).row());
+            rows.push((-a).row());
         }
         rows.as_flattened().iter().map(|x| x.to_bits()).collect()
     }
@@ -61,7 +63,7 @@ impl Kernel for Quotients {
 
 /// A numerator and a divisor whose quotient is as near to half-way between two numbers as one of numbers with 53 bits can
 /// be: with `middle = ±1/divisor mod 2^54`, `numerator 2^54 - divisor middle = ∓1`.
-fn hardest(random: &mut impl FnMut() -> u64) -> [f64; 2] {
+pub(crate) fn hardest(random: &mut impl FnMut() -> u64) -> [f64; 2] {
     const MODULUS: u128 = 1 << 54;
     loop {
         let divisor = u128::from(random() >> 11 | 1 << 52 | 1);

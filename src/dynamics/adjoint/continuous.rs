@@ -24,7 +24,7 @@ use std::borrow::Cow;
 /// `dJ/dy(0) = C z - (m z)'` at the beginning.
 ///
 /// # Panics
-/// If the motion ends before the grid does.
+/// If the motion, the readings or a function of the device end before the grid does.
 pub fn gradient(
     oscillator: &Oscillator,
     device: &Device,
@@ -40,9 +40,14 @@ pub fn gradient(
     let mut z = vec![0.0; nodes];
     let m = device.mass.as_slice();
     let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
+    let lists = [m, &m1, &m2, &c, &c1, &k, y, observed];
+    assert!(
+        lists.iter().all(|list| list.len() == nodes),
+        "lists over the whole grid"
+    );
     let first_slope = lanes::run(Sweep {
         dt,
-        lists: [m, &m1, &m2, &c, &c1, &k, y, observed],
+        lists,
         z: &mut z,
     });
     let mut acceleration = curvature(y, dt);
@@ -235,4 +240,85 @@ fn linearised_coefficients<'a>(
         }
     }
     [c, k].map(Cow::Owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps with products, and the same with divisions; whether the products were the same.
+    struct Both {
+        mass: f64,
+        rate: f64,
+    }
+
+    impl Kernel for Both {
+        type Output = Option<([[f64; 2]; 2], bool)>;
+
+        #[inline(always)]
+        fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+            let of = |x: f64| Eight::splat(arithmetic, x);
+            let values = || {
+                [
+                    of(self.mass),
+                    of(0.0),
+                    of(0.1),
+                    of(0.3),
+                    of(0.0),
+                    of(2.0),
+                    of(0.0),
+                    of(0.0),
+                ]
+            };
+            let mut z = [0.0; LANES];
+            let mut steps = Eighth {
+                dt: 0.01,
+                at: [coefficients(values()), coefficients(values())],
+                z: &mut z,
+            };
+            let state = [0.7, self.rate];
+            let (with_products, is_same) = steps.back::<true>(state);
+            let (with_divisions, _) = steps.back::<false>(state);
+            A::IS_FUSED.then_some(([with_products, with_divisions], is_same))
+        }
+    }
+
+    #[test]
+    fn products_that_are_no_quotients_are_noticed() {
+        // Numbers with 53 bits whose quotient is as near to the middle between two numbers as can be.
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(99);
+            state
+        };
+        let mut noticed = 0;
+        for _ in 0..2000 {
+            let [rate, mass] = lanes::tests::hardest(&mut random);
+            for ([products, divisions], is_same) in
+                lanes::on_each(|| Both { mass, rate }).into_iter().flatten()
+            {
+                assert!(!is_same || products == divisions, "{mass} {rate}");
+                noticed += usize::from(!is_same);
+            }
+            // All others are the same.
+            for ([products, divisions], is_same) in lanes::on_each(|| Both {
+                mass: 1.3,
+                rate: 0.9,
+            })
+            .into_iter()
+            .flatten()
+            {
+                assert!(is_same && products == divisions);
+            }
+        }
+        let is_fused = lanes::on_each(|| Both {
+            mass: 1.0,
+            rate: 1.0,
+        })
+        .iter()
+        .any(Option::is_some);
+        assert_eq!(noticed > 0, is_fused, "{noticed} of 2000");
+    }
 }

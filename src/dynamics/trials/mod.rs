@@ -34,10 +34,11 @@ pub(crate) struct Ray<'a> {
 
 /// Most rows at once: enough that the divisions of one row hide behind those of the others, and few
 /// enough for the registers.
-const ROWS: usize = 4;
+pub(crate) const ROWS: usize = 4;
 
-/// How far a cost that is summed in lanes, relative to itself, may be from the one that is summed in order: of `n` terms
-/// that are not negative two sums are within `n EPSILON`, and a last bit of a motion, grown a thousandfold, changes less.
+/// How far a cost that is summed in lanes, relative to itself, may be from the one that is summed in order. Of `n` terms
+/// that are not negative two sums are within `n EPSILON`, which is less up to 10^5 nodes (and is taken beyond). The rest is
+/// for the last bit of a quotient, which may grow on the way: one in `2^50` has another one.
 const MARGIN: f64 = 1e-10;
 
 /// In which rows and lanes the trials at some lengths are.
@@ -48,6 +49,7 @@ pub(crate) struct Layout {
     /// Trials in the first row, which may be less than full: it is filled up with its first.
     in_first: usize,
     rows: Vec<Row>,
+    nodes: usize,
 }
 
 impl Layout {
@@ -63,6 +65,7 @@ impl Layout {
         let row = |part: &[f64]| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0]));
         let first = (!first.is_empty()).then(|| row(first));
         Self {
+            nodes: ray.readings.len(),
             without_mass,
             in_first,
             rows: first
@@ -104,7 +107,8 @@ impl Layout {
             .clone()
             .map(|which| of(&which))
             .fold(f64::INFINITY, f64::min);
-        let may_be = |which: &usize| of(which).is_finite() && of(which) <= lowest * (1.0 + MARGIN);
+        let margin = MARGIN.max(4.0 * f64::EPSILON * self.nodes as f64);
+        let may_be = |which: &usize| of(which).is_finite() && of(which) <= lowest * (1.0 + margin);
         trials.filter(may_be).collect()
     }
 }
@@ -112,54 +116,28 @@ impl Layout {
 /// Displacements and velocities of a row where the eight parts of the record begin.
 type States = [[Row; 2]; LANES];
 
-/// The trials of some rows: storage that is used again and again.
+/// The trials of some rows, at most [`ROWS`]: storage that is used again and again.
 #[derive(Default)]
 pub(crate) struct Trials {
     rows: Range<usize>,
-    batches: Vec<Batch>,
-}
-
-/// Some rows that are done at once.
-#[derive(Default)]
-struct Batch {
     states: Vec<States>,
     costs: Vec<Row>,
 }
 
 impl Trials {
     /// Does the trials of some rows.
+    ///
+    /// # Panics
+    /// If they are too many.
     pub fn run(&mut self, ray: Ray, layout: &Layout, rows: Range<usize>) {
-        let count = rows.len().div_ceil(ROWS);
-        let from = |b: usize| rows.start + (b * rows.len()).div_ceil(count);
-        self.batches.resize_with(count, Batch::default);
-        for (b, batch) in self.batches.iter_mut().enumerate() {
-            let its = from(b)..from(b + 1);
-            let has_half = its.start == 0 && its.len() > 1 && layout.begins_with_half();
-            batch.run(ray, &layout.rows[its], has_half);
-        }
-        self.rows = rows;
-    }
-
-    /// The sums of squares of the rows.
-    pub fn costs(&self) -> impl Iterator<Item = Row> {
-        self.batches.iter().flat_map(|batch| &batch.costs).copied()
-    }
-
-    /// Displacements and velocities of a lane where its parts begin, if the row is one of these.
-    pub fn states(&self, (row, lane): (usize, usize)) -> Option<[Row; 2]> {
-        let mut all = self.batches.iter().flat_map(|batch| &batch.states);
-        let states = all.nth(row.checked_sub(self.rows.start)?)?;
-        let of = |which: usize| std::array::from_fn(|part| states[part][which][lane]);
-        Some([of(0), of(1)])
-    }
-}
-
-impl Batch {
-    fn run(&mut self, ray: Ray, lengths: &[Row], has_half: bool) {
+        assert!(rows.len() <= ROWS, "{} rows at once", rows.len());
+        let has_half = rows.start == 0 && rows.len() > 1 && layout.begins_with_half();
+        let lengths = &layout.rows[rows.clone()];
         self.states
             .resize(lengths.len(), [[[0.0; LANES]; 2]; LANES]);
         self.costs.resize(lengths.len(), [0.0; LANES]);
         match (has_half, lengths.len()) {
+            (_, 0) => {}
             (false, 1) => self.of_rows::<1, false>(ray, lengths),
             (false, 2) => self.of_rows::<2, false>(ray, lengths),
             (false, 3) => self.of_rows::<3, false>(ray, lengths),
@@ -168,6 +146,19 @@ impl Batch {
             (true, 3) => self.of_rows::<2, true>(ray, lengths),
             (true, _) => self.of_rows::<3, true>(ray, lengths),
         }
+        self.rows = rows;
+    }
+
+    /// The sums of squares of the rows.
+    pub fn costs(&self) -> &[Row] {
+        &self.costs
+    }
+
+    /// Displacements and velocities of a lane where its parts begin, if the row is one of these.
+    pub fn states(&self, (row, lane): (usize, usize)) -> Option<[Row; 2]> {
+        let states = self.states.get(row.checked_sub(self.rows.start)?)?;
+        let of = |which: usize| std::array::from_fn(|part| states[part][which][lane]);
+        Some([of(0), of(1)])
     }
 
     fn of_rows<const R: usize, const HALF: bool>(&mut self, ray: Ray, lengths: &[Row]) {
@@ -214,7 +205,7 @@ impl Ray<'_> {
     }
 
     /// Whether the masses of all devices as far as `longest` are so moderate, where they are positive, that
-    /// [`Eight::quotients`] divides by them with the bits of a division. A positive difference is no smaller than the
+    /// [`Eight::quotients`] divides by them as it says. A positive difference is no smaller than the
     /// last place of what it is taken from.
     pub fn is_moderate(self, longest: f64) -> bool {
         const LIGHT: f64 = 1e-70;

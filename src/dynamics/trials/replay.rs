@@ -2,19 +2,24 @@
 
 use super::part;
 use super::rows::{Steps, Values};
-use crate::dynamics::{Device, Trajectory};
+use crate::dynamics::{Device, State, Trajectory};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 
 /// The motion of `device` from the displacements and velocities where its eight parts begin, by divisions alone.
 ///
-/// Whether it is the motion that one step after the other gives, to the last bit: each part ends where the next begins.
+/// Whether it is the motion that one step after the other gives from `initial`, to the last bit: the first part begins there, and
+/// each ends where the next begins.
 /// Otherwise what is in `trajectory` is of no use.
 pub(crate) fn replay(
     device: &Device,
+    initial: State,
     states: [Row; 2],
     step: f64,
     trajectory: &mut Trajectory,
 ) -> bool {
+    if [states[0][0], states[1][0]] != [initial.displacement, initial.velocity] {
+        return false;
+    }
     let nodes = trajectory.nodes();
     let ends = lanes::run(Replay {
         functions: [

@@ -42,7 +42,7 @@ impl<A: Arithmetic> Values<A> {
     }
 
     /// `-y'' = k y/m + c v/m`, by divisions or by as few of them as there can be ([`Eight::quotients`]). Of both signs
-    /// all that follows has the same bits.
+    /// all that follows has the same bits, but for the sign of a velocity of zero.
     #[inline(always)]
     fn deceleration<const DIVIDED: bool>(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
         let [m, c, k] = self.0;

@@ -75,17 +75,18 @@ impl SteepestDescent {
 
 impl Best {
     /// Takes the place of `best` if its cost is strictly lower than that, and than that of the point; whose storage is not
-    /// needed any more goes to `spare`.
-    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) {
+    /// needed any more goes to `spare`. Whether it did.
+    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) -> bool {
         let lowest = best
             .as_ref()
-            .map_or(&point.evaluation, |b| &b.evaluation)
-            .cost;
-        let left = match self.evaluation.cost < lowest {
+            .map_or(point.evaluation.cost, |b| b.evaluation.cost);
+        let is_lower = self.evaluation.cost < lowest;
+        let left = match is_lower {
             true => best.replace(self),
             false => Some(self),
         };
         spare.extend(left.map(|left| left.evaluation));
+        is_lower
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::{Best, lengths, take, trial};
 use crate::dynamics::{Layout, Method, Ray, Term, Trials, replay};
-use crate::lanes::Row;
+use crate::lanes::{LANES, Row};
 use crate::objective::{Evaluation, GradientKind, Weighting};
 use crate::problem::Problem;
 use crate::solvers::Point;
@@ -24,6 +24,8 @@ pub(super) struct SideBySide {
     others: Trials,
     /// The other thread, once there was something that was worth it.
     companion: Option<Companion<'static, Follower>>,
+    /// Whether the system had none to give.
+    is_alone: bool,
     /// Whether it did its share at this point.
     is_accompanied: bool,
     /// Whether it is on its way to the point that comes next.
@@ -62,22 +64,20 @@ impl SideBySide {
             let (_, channel, _) = problem.one_full_record()?;
             let layout = Layout::new(ray, lengths);
             let costs = self.costs(problem, kind, point, ray, &layout);
-            let taken = |which: usize| {
-                let states = self.states(layout.place(which))?;
-                let length = lengths[which];
-                Some(Taken { length, states })
-            };
-            let candidates = layout.lowest(&costs).into_iter();
-            let candidates: Vec<Taken> = candidates.filter_map(taken).collect();
+            let candidates = layout.lowest(&costs).into_iter().map(|which| Taken {
+                length: lengths[which],
+                states: self.states(layout.place(which)),
+            });
+            let candidates: Vec<Taken> = candidates.collect();
             // If there is but one, the other thread need not wait until its cost is known to the last bit.
             if let [only] = candidates[..] {
                 self.follow(only);
             }
-            let mut best = None;
-            for Taken { length, states } in &candidates {
-                let parameters = trial(point, *length);
+            let (mut best, mut decided) = (None, None);
+            for taken in &candidates {
+                let parameters = trial(point, taken.length);
                 let mut evaluation = take(spare, problem);
-                let has_motion = move_to(problem, &parameters, *states, &mut evaluation);
+                let has_motion = move_to(problem, &parameters, taken.states, &mut evaluation);
                 evaluation.misfit = match has_motion {
                     true => channel.cost(&evaluation.predictions[0][0]),
                     false => f64::INFINITY,
@@ -85,19 +85,16 @@ impl SideBySide {
                 evaluation.regularisation = 0.0;
                 evaluation.cost = evaluation.misfit;
                 let trial = Best {
-                    length: *length,
+                    length: taken.length,
                     parameters,
                     evaluation,
                 };
-                trial.or_lower(&mut best, point, spare);
+                if trial.or_lower(&mut best, point, spare) {
+                    decided = Some(*taken);
+                }
             }
-            let is_best = |taken: &&Taken| best.as_ref().is_some_and(|b| b.length == taken.length);
-            let decided = candidates
-                .iter()
-                .find(is_best)
-                .filter(|_| candidates.len() > 1);
-            if let Some(taken) = decided {
-                self.follow(*taken);
+            if let Some(taken) = decided.filter(|_| candidates.len() > 1) {
+                self.follow(taken);
             }
             best
         })
@@ -123,57 +120,62 @@ impl SideBySide {
     ) -> Vec<Row> {
         let rows = layout.rows();
         let others = rows_of_the_other(rows);
-        let is_shared = others > 0 && point.parameters.len() > 3 * WORTH_SHARING;
+        let is_shared = rows > 1 && point.parameters.len() > 3 * WORTH_SHARING;
         if is_shared && !std::mem::take(&mut self.is_followed) {
             self.begin(problem, kind, point);
         }
         self.own.run(ray, layout, others..rows);
         let norm = point.gradient.norm_squared;
         let is_there = |follower: &Follower| {
-            let has_all = follower.trials.costs().count() == others;
+            let has_all = follower.trials.costs().len() == others;
             has_all && follower.point.gradient.norm_squared == norm
         };
         let companion = self.companion.as_mut().filter(|_| is_shared);
         let companion = companion.and_then(|c| (c.finish() && c.look(is_there)).then_some(c));
         self.is_accompanied = companion.is_some();
-        let costs: Vec<Row> = match companion {
-            Some(companion) => companion.look(|other| other.trials.costs().collect()),
+        let costs = match companion {
+            Some(companion) => companion.look(|other| other.trials.costs().to_vec()),
             None => {
                 self.others.run(ray, layout, 0..others);
-                self.others.costs().collect()
+                self.others.costs().to_vec()
             }
         };
-        costs.into_iter().chain(self.own.costs()).collect()
+        [costs.as_slice(), self.own.costs()].concat()
     }
 
     /// Sets the other thread on its way, if there is one.
     fn begin(&mut self, problem: &Problem, kind: GradientKind, point: &Point) {
-        let set = |follower: &mut Follower| {
-            follower.point.clone_from(point);
-            follower.step = None;
-        };
-        if self.companion.is_none() && threads::spare() {
-            let follower = Follower {
-                problem: problem.clone(),
-                kind,
-                point: point.clone(),
-                step: None,
-                trials: Trials::default(),
-            };
-            self.companion = Companion::new(follower, Follower::go);
-        }
         if let Some(companion) = &mut self.companion {
-            companion.post(set);
+            return companion.post(|follower| {
+                follower.point.clone_from(point);
+                follower.step = None;
+            });
+        }
+        if self.is_alone || !threads::spare() {
+            return;
+        }
+        let follower = Follower {
+            problem: problem.clone(),
+            kind,
+            point: point.clone(),
+            step: None,
+            trials: Trials::default(),
+        };
+        self.companion = Companion::new(follower, Follower::go);
+        self.is_alone = self.companion.is_none();
+        if let Some(companion) = &mut self.companion {
+            companion.post(|_| {});
         }
     }
 
-    /// States of a trial.
-    fn states(&self, place: (usize, usize)) -> Option<[Row; 2]> {
+    /// States of a trial; of one that nobody knows they are no numbers, and no motion is made of them.
+    fn states(&self, place: (usize, usize)) -> [Row; 2] {
         let others = match self.companion.as_ref().filter(|_| self.is_accompanied) {
             Some(companion) => companion.look(|follower| follower.trials.states(place)),
             None => self.others.states(place),
         };
-        self.own.states(place).or(others)
+        let states = self.own.states(place).or(others);
+        states.unwrap_or([[f64::NAN; LANES]; 2])
     }
 }
 
@@ -192,9 +194,12 @@ impl Follower {
             point.gradient = (self.problem).gradient(&point.parameters, evaluation, self.kind);
         }
         let lengths = lengths(point);
-        if let Some(ray) = ray(&self.problem, point, &lengths) {
-            let layout = Layout::new(ray, &lengths);
-            (self.trials).run(ray, &layout, 0..rows_of_the_other(layout.rows()));
+        match ray(&self.problem, point, &lengths) {
+            Some(ray) => {
+                let layout = Layout::new(ray, &lengths);
+                (self.trials).run(ray, &layout, 0..rows_of_the_other(layout.rows()));
+            }
+            None => self.trials = Trials::default(),
         }
     }
 }
@@ -215,11 +220,10 @@ fn move_to(
     (problem.functions).device_into(parameters, 0, &mut evaluation.device);
     let (oscillator, device) = (&problem.oscillator, &evaluation.device);
     let motion = &mut evaluation.trajectories[0];
-    if !replay(device, states, oscillator.grid.step(), motion) {
-        let initial = problem.experiments[0].initial;
-        if (oscillator.forward_into(device, initial, None, motion)).is_err() {
-            return false;
-        }
+    let initial = problem.experiments[0].initial;
+    let is_whole = replay(device, initial, states, oscillator.grid.step(), motion);
+    if !is_whole && (oscillator.forward_into(device, initial, None, motion)).is_err() {
+        return false;
     }
     evaluation.predictions[0][0].clone_from(&motion.displacement);
     true

@@ -141,3 +141,64 @@ fn fits_do_not_depend_on_the_second_thread() {
     assert!(together.history == alone.history);
     assert!(together.best.parameters == alone.best.parameters);
 }
+
+/// The other thread's way by itself: the same point, and the trials of its rows.
+#[test]
+fn the_follower_comes_to_the_same_point() {
+    let problem = problem();
+    let points = search(&problem, 3, |_, _| {});
+    let mut follower = Follower {
+        problem: problem.clone(),
+        kind: GradientKind::Continuous,
+        point: points[0].clone(),
+        step: None,
+        trials: Trials::default(),
+    };
+    follower.go();
+    for pair in points.windows(2) {
+        let (before, after) = (&pair[0], &pair[1]);
+        let lengths = lengths(before);
+        let ray = ray(&problem, before, &lengths).expect("the paper's problem");
+        let (layout, mut trials) = (Layout::new(ray, &lengths), Trials::default());
+        trials.run(ray, &layout, 0..rows_of_the_other(layout.rows()));
+        assert_eq!(follower.trials.costs(), trials.costs());
+        let taken = lengths
+            .iter()
+            .position(|a| trial(before, *a) == after.parameters);
+        let taken = taken.expect("one of the trials");
+        let (row, lane) = layout.place(taken);
+        let first = row / 4 * 4;
+        trials.run(ray, &layout, first..layout.rows().min(first + 4));
+        follower.step = Some(Taken {
+            length: lengths[taken],
+            states: trials.states((row, lane)).expect("states"),
+        });
+        follower.go();
+        assert!(follower.point.parameters == after.parameters);
+        assert!(follower.point.gradient == after.gradient);
+        assert!(follower.point.evaluation.trajectories == after.evaluation.trajectories);
+    }
+}
+
+/// States that are not those of the motion lead to the motion all the same.
+#[test]
+fn a_motion_does_not_depend_on_its_states() {
+    let problem = problem();
+    let mut expected = problem.workspace();
+    let evaluated = problem.evaluate_in_order_into(&problem.start(), &mut expected);
+    evaluated.expect("a motion");
+    let mut found = problem.workspace();
+    for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {
+        assert!(move_to(&problem, &problem.start(), states, &mut found));
+        assert!(found.device == expected.device && found.trajectories == expected.trajectories);
+        assert!(found.predictions == expected.predictions);
+    }
+    let mut without_mass = problem.start();
+    without_mass[7] = -1.0;
+    assert!(!move_to(
+        &problem,
+        &without_mass,
+        [[0.0; LANES]; 2],
+        &mut found
+    ));
+}
