@@ -70,10 +70,10 @@ pub(crate) trait Arithmetic: Copy {
     fn larger(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     /// Whether there is an instruction for a product and a sum that are rounded once.
     const IS_FUSED: bool;
-    /// `1 / d`, and what its rounding has lost: nothing, where that is not known.
+    /// `1 / d`, and what its rounding has lost; zeros, and no work, without that instruction.
     #[inline(always)]
-    fn reciprocal(self, d: Self::Registers) -> [Self::Registers; 2] {
-        [self.div(self.splat(1.0), d), self.splat(0.0)]
+    fn reciprocal(self, _: Self::Registers) -> [Self::Registers; 2] {
+        [self.splat(0.0); 2]
     }
     /// `a / d` and `b / d`: see [`Eight::quotients`].
     #[inline(always)]
@@ -140,7 +140,8 @@ impl<A: Arithmetic> Eight<A> {
         }
     }
 
-    /// `1 / d`, and what its rounding has lost to within `2^-105` of it, where there are fused products and sums.
+    /// `1 / d`, and what its rounding has lost to within `2^-105` of it; zeros where there are no fused products
+    /// and sums ([`Arithmetic::IS_FUSED`]).
     #[inline(always)]
     pub fn reciprocal(self) -> [Self; 2] {
         let [reciprocal, lost] = self.arithmetic.reciprocal(self.registers);

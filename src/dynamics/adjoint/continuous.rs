@@ -90,7 +90,7 @@ const LISTS: usize = 8;
 ///
 /// In a step the rate is divided by the mass twice, and all that follows waits for the quotients. A division takes 13 cycles,
 /// a product with the reciprocal and what its rounding lost 7, and differs only where the quotient is next to the middle
-/// between two numbers. So steps go on with the product while the division is done beside it; eight steps in which both
+/// between two numbers. So steps go on with the product while the division is done beside it; eight steps in which they
 /// differ once are done again by divisions.
 struct Sweep<'a> {
     dt: f64,
@@ -121,7 +121,7 @@ struct Eighth<'a> {
 }
 
 impl Eighth<'_> {
-    /// Goes back from `(z, z')`, with products in place of divisions if `fused`; whether these had the same bits.
+    /// Goes back from `(z, z')`, with products in place of divisions if `FUSED`; whether these had the same bits.
     #[inline(always)]
     fn back<const FUSED: bool>(&mut self, [z, w]: [f64; 2]) -> ([f64; 2], bool) {
         let Self { dt, at, z: out } = self;

@@ -54,6 +54,23 @@ fn by_itself(ray: &Ray, length: f64) -> Option<(Trajectory, f64)> {
     Some((motion, cost))
 }
 
+fn ray<'a>(
+    functions: &'a [Vec<f64>; 3],
+    direction: &'a [Vec<f64>; 3],
+    readings: &'a [f64],
+) -> Ray<'a> {
+    Ray {
+        functions: functions.each_ref().map(Vec::as_slice),
+        direction: direction.each_ref().map(Vec::as_slice),
+        initial: State {
+            displacement: 1.2,
+            velocity: -0.7,
+        },
+        readings,
+        step: 0.125,
+    }
+}
+
 #[test]
 fn every_trial_is_the_forward_solve_by_itself() {
     NODES.into_iter().for_each(every_trial);
@@ -62,16 +79,7 @@ fn every_trial_is_the_forward_solve_by_itself() {
 fn every_trial(nodes: usize) {
     let [functions, direction] = functions(nodes);
     let readings: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
-    let ray = Ray {
-        functions: functions.each_ref().map(Vec::as_slice),
-        direction: direction.each_ref().map(Vec::as_slice),
-        initial: State {
-            displacement: 1.2,
-            velocity: -0.7,
-        },
-        readings: &readings,
-        step: 0.125,
-    };
+    let ray = ray(&functions, &direction, &readings);
     // One lane, part of a row, whole rows, and half a row beside one, two and three; the two longest leave no mass.
     for count in [1, 7, 8, 19, 28, 32, 44, 50, 52] {
         let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
@@ -129,16 +137,7 @@ fn every_trial(nodes: usize) {
 fn costs_that_are_as_good_as_equal_are_all_candidates() {
     let [functions, direction] = functions(41);
     let readings = [0.3; 41];
-    let ray = Ray {
-        functions: functions.each_ref().map(Vec::as_slice),
-        direction: direction.each_ref().map(Vec::as_slice),
-        initial: State {
-            displacement: 1.2,
-            velocity: -0.7,
-        },
-        readings: &readings,
-        step: 0.125,
-    };
+    let ray = ray(&functions, &direction, &readings);
     let layout = Layout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
     // Within the margin, and beyond it.
     let mut costs = [1.0; LANES];
