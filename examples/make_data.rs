@@ -3,7 +3,8 @@
 //!
 //! `cargo run --example make_data -- data`
 
-use kmcfit::report::{CsvTable, write_whole};
+use kmcfit::report::CsvTable;
+use kmcfit::results::write_whole;
 use std::path::{Path, PathBuf};
 
 const NODES: usize = 2000;

@@ -7,7 +7,7 @@ use kmcfit::dynamics::{
     ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
     Surroundings, Term, Trajectory,
 };
-use kmcfit::report::write_whole;
+use kmcfit::results::write_whole;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

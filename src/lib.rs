@@ -84,6 +84,8 @@
 //! let error = mass.iter().zip(&truth.mass).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
 //! assert!(error < 1e-9, "{error}");
 //! ```
+// All output passes `cli::output`, all changes of files `results`, all thread starts `threads`.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 #![allow(
     clippy::result_large_err,
     reason = "an input error ends the program: its size costs nothing, its detail helps"
@@ -97,6 +99,7 @@ mod digits;
 pub mod dynamics;
 pub mod error;
 mod excerpt;
+mod faults;
 pub mod functions;
 pub mod guide;
 pub mod identifiability;
@@ -108,6 +111,7 @@ pub mod observations;
 pub mod problem;
 pub mod qp;
 pub mod report;
+pub mod results;
 pub mod signal;
 pub mod solvers;
 pub mod study;

@@ -1,6 +1,13 @@
-//! Second threads: when one may be taken, and one that waits awake.
+//! Threads: the only place that starts them, when one may be taken, and one that waits awake.
+//!
+//! A thread can be refused by the operating system (limits on processes or memory). The callers then do its work
+//! themselves, with the same result.
 
+#![allow(clippy::disallowed_methods)]
+
+use crate::faults::{self, Operation};
 use std::cell::Cell;
+use std::io;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle, Scope, ScopedJoinHandle, Thread};
@@ -21,6 +28,26 @@ pub(crate) fn spare() -> bool {
 /// Says that this thread shares the processors with others from now on.
 pub(crate) fn share() {
     SHARES.set(true);
+}
+
+/// Starts a thread that may borrow what outlives `scope`.
+///
+/// # Errors
+/// If the system has no thread to give.
+pub(crate) fn spawn_scoped<'scope, T: Send + 'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    work: impl FnOnce() -> T + Send + 'scope,
+) -> io::Result<ScopedJoinHandle<'scope, T>> {
+    faults::check(Operation::Spawn)?;
+    Builder::new().spawn_scoped(scope, work)
+}
+
+/// Starts a thread.
+fn spawn<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<JoinHandle<T>> {
+    faults::check(Operation::Spawn)?;
+    Builder::new().spawn(work)
 }
 
 /// Does `work` while another thread is busy for the same end.
@@ -106,7 +133,7 @@ impl<J: Send + 'static> Companion<'static, J> {
     pub fn new(job: J, act: fn(&mut J)) -> Option<Self> {
         let shared = Shared::new(job);
         let its = Arc::clone(&shared);
-        let handle = Builder::new().spawn(move || accompany(&its, act)).ok()?;
+        let handle = spawn(move || accompany(&its, act)).ok()?;
         let thread = handle.thread().clone();
         Some(Self::with_handle(shared, act, thread, Handle::Free(handle)))
     }
@@ -117,8 +144,7 @@ impl<'s, J: Send + 's> Companion<'s, J> {
     pub fn within(scope: &'s Scope<'s, '_>, job: J, act: fn(&mut J)) -> Option<Self> {
         let shared = Shared::new(job);
         let its = Arc::clone(&shared);
-        let run = move || accompany(&its, act);
-        let handle = Builder::new().spawn_scoped(scope, run).ok()?;
+        let handle = spawn_scoped(scope, move || accompany(&its, act)).ok()?;
         let thread = handle.thread().clone();
         Some(Self::with_handle(
             shared,

@@ -1,7 +1,7 @@
 //! A fit that is interrupted and gone on with ends with the bits of one that is not.
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit::report::{FIT_JOURNAL, FitHeading, FitJournal};
+use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
 use kmcfit::solvers::{
     Fit, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
 };
@@ -64,7 +64,7 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
     let (file, model) = model(name, changes);
     let whole = run(&model, None, u64::MAX);
     let place = tempfile::tempdir().expect("a folder");
-    let heading = FitHeading::new(&file, false, None);
+    let heading = Heading::of_model("fit", &file, false, None);
     let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
     let mut times = 0;
     let found = loop {
@@ -75,7 +75,7 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
         }
         times += 1;
         assert!(times < 1000, "{name} never ends");
-        journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+        journal = FitJournal::resume(place.path(), &heading).expect("the journal");
     };
     assert!(times >= 2, "{name} was interrupted {times} times only");
     assert!(told(&whole) == told(&found), "{name}: other bits");
@@ -84,7 +84,7 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
     let text = std::fs::read(&path).expect("the journal");
     std::fs::write(&path, &text[..text.len() - 7]).expect("room");
     std::fs::write(place.path().join("fit.checkpoint"), "{\"fit\"").expect("room");
-    let mut journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+    let mut journal = FitJournal::resume(place.path(), &heading).expect("the journal");
     let found = run(&model, Some(&mut journal), u64::MAX);
     assert!(
         told(&whole) == told(&found),
@@ -156,7 +156,7 @@ fn a_journal_that_lies() {
     let (file, model) = model("knots", &[]);
     let whole = run(&model, None, u64::MAX);
     let place = tempfile::tempdir().expect("a folder");
-    let heading = FitHeading::new(&file, false, Some(0.0));
+    let heading = Heading::of_model("fit", &file, false, Some(0.0));
     let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
     run(&model, Some(&mut journal), 3);
     let path = place.path().join("fit.checkpoint");
@@ -165,7 +165,7 @@ fn a_journal_that_lies() {
     let mut bytes = text.into_bytes();
     bytes[begin + 15] ^= 1;
     std::fs::write(&path, bytes).expect("room");
-    let mut journal = FitJournal::go_on(place.path(), &heading).expect("the journal");
+    let mut journal = FitJournal::resume(place.path(), &heading).expect("the journal");
     let found = run(&model, Some(&mut journal), u64::MAX);
     assert!(told(&whole) == told(&found), "the lie was believed");
 }

@@ -1,11 +1,12 @@
 //! `kmcfit check`
 
-use super::{Failure, NOT_CONVERGED, OK, Overrides, print, say, unwritable};
+use super::{Failure, NOT_CONVERGED, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{Model, Purpose, build};
 use crate::dynamics::Breakdown;
 use crate::objective::GradientKind;
 use crate::report::figures::{self, GradientCurve};
-use crate::report::{CsvTable, OutputFolder, render};
+use crate::report::{CsvTable, render};
+use crate::results::{Claim, OutputFolder};
 use std::path::PathBuf;
 
 /// Read and validate a model, then test its gradient against differences.
@@ -79,6 +80,9 @@ impl Curve {
     }
 }
 
+/// The files in the output folder.
+const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
+
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
@@ -102,10 +106,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         print("the gradient vanishes at the start: check it from another one\n");
         return Ok(OK);
     };
-    let folder = arguments
-        .out
-        .as_deref()
-        .map(OutputFolder::prepare)
+    let folder = (arguments.out.as_deref())
+        .map(|out| {
+            let claim = Claim::new("check").files(FILES).inputs(inputs(&file));
+            OutputFolder::prepare(out, claim)
+        })
         .transpose()?;
     let mut curves = Vec::new();
     print(&describe(&model));
@@ -209,11 +214,10 @@ fn verdict(curves: &[Curve]) -> u8 {
         return OK;
     }
     for curve in failed {
-        eprintln!(
-            "failed: the discrete gradient on {} nodes has an error of {:.1e} at best",
-            curve.nodes,
-            curve.best().1
-        );
+        let (nodes, error) = (curve.nodes, curve.best().1);
+        let sentence =
+            format!("the discrete gradient on {nodes} nodes has an error of {error:.1e} at best");
+        say("failed", sentence);
     }
     NOT_CONVERGED
 }
@@ -227,10 +231,9 @@ fn write(folder: &OutputFolder, steps: &[f64], curves: &[Curve]) -> std::io::Res
             error: &c.error,
         })
         .collect();
-    folder.write(
-        "figures/gradient.svg",
-        &render(&figures::gradient_error(&drawn)),
-    )?;
+    let [table_name, figure_name] = FILES;
+    let mut stage = folder.stage()?;
+    stage.write(figure_name, &render(&figures::gradient_error(&drawn)))?;
     let mut table = CsvTable::new().column("step", steps.to_vec());
     for curve in curves {
         // Steps that broke down are missing from a curve.
@@ -243,5 +246,6 @@ fn write(folder: &OutputFolder, steps: &[f64], curves: &[Curve]) -> std::io::Res
             steps.iter().map(error_at).collect(),
         );
     }
-    folder.write("gradient.csv", &table.to_csv())
+    stage.write(table_name, &table.to_csv())?;
+    stage.commit()
 }

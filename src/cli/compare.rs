@@ -2,11 +2,14 @@
 
 use super::fit::{begun, fit_into};
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, interrupt, print, say, unwritable};
+use super::{Failure, NOT_CONVERGED, OK, inputs, interrupt, print, say, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
-use crate::report::{FitHeading, FitJournal, Journal, OutputFolder, json};
+use crate::report::{fit_claim, json};
+use crate::results::{
+    AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, MANIFEST, OutputFolder, RESULT,
+};
 use crate::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,34 +29,106 @@ pub struct Arguments {
     json: bool,
 }
 
-impl Arguments {
-    /// A comparison of models in a folder.
-    pub(super) fn of(runs: Vec<PathBuf>, out: PathBuf) -> Self {
-        Self {
-            runs,
-            out,
-            json: false,
-        }
-    }
-}
-
 /// One argument, read and found usable.
 pub(super) enum Entry {
-    /// To be fitted into a folder.
-    Model(Box<Model>, FitHeading),
+    /// To be fitted into a folder of its own.
+    Model(Box<ToFit>),
     /// Finished.
     Run(Box<ComparedRun>),
 }
 
+/// A model that is to be fitted.
+pub(super) struct ToFit {
+    file: ModelFile,
+    model: Model,
+    heading: Heading,
+}
+
+impl ToFit {
+    fn claim(&self) -> Claim {
+        fit_claim(&self.model).inputs(inputs(&self.file))
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let entries = entries(&arguments.runs, &arguments.out)?;
-    let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(&arguments.out)?;
-    let (comparison, interrupted) = side_by_side(entries, &folder, &flag, None)?;
-    comparison
-        .write(&folder)
+    let claim = claim("compare", COMPARE_JOURNAL).inputs(files_of(&entries));
+    let folder = OutputFolder::prepare(&arguments.out, claim)?;
+    begin(entries, &folder, &arguments.runs, arguments.json)
+}
+
+/// Prepares a folder for a comparison inside another folder.
+pub(super) fn prepare(parent: &OutputFolder, name: &str) -> Result<OutputFolder, InputError> {
+    parent.prepare_inside(name, claim("compare", COMPARE_JOURNAL))
+}
+
+/// Compares models and runs in a folder that was prepared.
+pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, Failure> {
+    begin(entries(runs, folder.path())?, folder, runs, false)
+}
+
+fn begin(
+    entries: Entries,
+    folder: &OutputFolder,
+    runs: &[PathBuf],
+    as_json: bool,
+) -> Result<u8, Failure> {
+    let children = children(&entries, folder)?;
+    let heading = heading(&entries, runs);
+    let journal = AnalysisJournal::begin(folder.path(), COMPARE_JOURNAL, &heading)
         .map_err(|error| unwritable(folder.path(), &error))?;
-    if arguments.json {
+    finish(entries, (folder, children), journal, (as_json, false))
+}
+
+/// Resumes a comparison that did not come to its end.
+pub(super) fn go_on(place: &Path, as_json: bool) -> Result<u8, Failure> {
+    let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
+    let entries = entries(&runs, place)?;
+    let claim = claim("compare", COMPARE_JOURNAL).inputs(files_of(&entries));
+    let folder = OutputFolder::prepare(place, claim)?;
+    let children = children(&entries, &folder)?;
+    let heading = heading(&entries, &runs);
+    let journal = AnalysisJournal::resume(place, COMPARE_JOURNAL, &heading)?;
+    finish(entries, (&folder, children), journal, (as_json, true))
+}
+
+/// What a comparison writes into its folder, fits apart.
+pub(super) fn claim(command: &'static str, journal: &'static str) -> Claim {
+    Comparison::claim(command).journals(&[journal])
+}
+
+fn heading(entries: &Entries, runs: &[PathBuf]) -> Heading {
+    let heading = Heading::new("compare", runs.to_vec());
+    entries
+        .iter()
+        .fold(heading, |heading, (_, entry)| match entry {
+            Entry::Model(to_fit) => heading.with_model(&to_fit.file),
+            Entry::Run(run) => heading.with_file(run.finished.folder.join(RESULT)),
+        })
+}
+
+/// The files that a comparison reads.
+pub(super) fn files_of(entries: &Entries) -> Vec<PathBuf> {
+    let files = entries.iter().flat_map(|(_, entry)| match entry {
+        Entry::Model(to_fit) => inputs(&to_fit.file),
+        Entry::Run(run) => vec![run.finished.folder.join(RESULT)],
+    });
+    files.collect()
+}
+
+fn finish(
+    entries: Entries,
+    (folder, children): (&OutputFolder, Children),
+    mut journal: AnalysisJournal,
+    (as_json, is_resumed): (bool, bool),
+) -> Result<u8, Failure> {
+    let flag = interrupt::flag();
+    let (comparison, interrupted) =
+        side_by_side(entries, children, &flag, &mut journal, is_resumed)?;
+    comparison
+        .write(folder)
+        .map_err(|error| unwritable(folder.path(), &error))?;
+    if as_json {
         print(&json(&comparison.document()));
     } else {
         print(&comparison.text());
@@ -63,54 +138,61 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             folder.path().join("compare.html").display()
         ));
     }
+    if interrupted {
+        let folder = folder.path().display();
+        say(
+            "note",
+            format!("`kmcfit resume {folder}` goes on with this comparison"),
+        );
+    }
     Ok(match interrupted {
-        true => INTERRUPTED,
+        true => interrupt::exit_code(),
         false => verdict(&comparison),
     })
 }
 
-/// Fits models and reads finished runs; the comparison, and whether it was interrupted. Fits that the
-/// journal of a story says were finished in the folder before are read, not made again.
+/// The folders of the fits of a comparison, in the order of its entries; `None` for a finished run.
+pub(super) type Children = Vec<Option<OutputFolder>>;
+
+/// Prepares a folder for each model: what is wrong with one is found before the first fit.
+pub(super) fn children(entries: &Entries, folder: &OutputFolder) -> Result<Children, InputError> {
+    let prepare = |(name, entry): &(String, Entry)| match entry {
+        Entry::Model(to_fit) => folder.prepare_inside(name, to_fit.claim()).map(Some),
+        Entry::Run(_) => Ok(None),
+    };
+    entries.iter().map(prepare).collect()
+}
+
+/// Fits models and reads finished runs; the comparison, and whether it was interrupted. Where it is resumed, fits that
+/// the journal lists as finished are read from their folders, and one with a journal of its own is
+/// resumed.
 pub(super) fn side_by_side(
-    entries: Vec<(String, Entry)>,
-    folder: &OutputFolder,
+    entries: Entries,
+    children: Children,
     flag: &Arc<AtomicBool>,
-    mut journal: Option<&mut Journal>,
+    journal: &mut AnalysisJournal,
+    is_resumed: bool,
 ) -> Result<(Comparison, bool), Failure> {
-    let out = folder.path();
     let mut compared = Compared::default();
-    let mut prepared = Vec::new();
-    for (name, entry) in entries {
-        let folder = match entry {
-            Entry::Model(..) => Some(OutputFolder::prepare(&out.join(&name))?),
-            Entry::Run(_) => None,
-        };
-        prepared.push((name, entry, folder));
-    }
-    for (name, entry, folder) in prepared {
+    for ((name, entry), folder) in entries.into_iter().zip(children) {
         match (entry, folder) {
-            (Entry::Model(model, heading), Some(folder)) => {
-                let is_kept = journal.as_ref().is_some_and(|j| j.has(&name));
-                match ComparedRun::read(&name, folder.path())
-                    .ok()
-                    .filter(|_| is_kept)
-                {
+            (Entry::Model(to_fit), Some(folder)) => {
+                let finished = ComparedRun::read(&name, folder.path()).ok();
+                match finished.filter(|_| journal.has(&name)) {
                     Some(run) => compared.runs.push(run),
                     None => {
-                        // A fit of a story goes on where it was, one of a comparison begins.
-                        let before = journal
-                            .as_ref()
-                            .and_then(|_| FitJournal::go_on(folder.path(), &heading).ok());
-                        let begin = || begun(&folder, &heading);
+                        let heading = &to_fit.heading;
+                        let before = is_resumed
+                            .then(|| FitJournal::resume(folder.path(), heading).ok())
+                            .flatten();
+                        let begin = || begun(&folder, heading);
                         let fit = before.map_or_else(begin, Ok)?;
-                        compared.fit(&name, *model, fit, &folder, flag)?;
+                        compared.fit(&name, to_fit.model, fit, &folder, flag)?;
                     }
                 }
-                if let Some(journal) = &mut journal
-                    && !compared.interrupted
-                {
-                    let kept = journal.piece(&name, || true, || true);
-                    kept.map_err(|error| unwritable(out, &error))?;
+                if !compared.interrupted {
+                    let kept = journal.analysis(&name, || true, || true);
+                    kept.map_err(|error| unwritable(folder.path(), &error))?;
                 }
             }
             (Entry::Run(run), _) => compared.runs.push(*run),
@@ -124,9 +206,12 @@ pub(super) fn side_by_side(
     ))
 }
 
+/// The arguments and the name of each.
+pub(super) type Entries = Vec<(String, Entry)>;
+
 /// The arguments, read and found usable, and what each is called: whatever is wrong with them is said
 /// before anything is run or made.
-pub(super) fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, Entry)>, InputError> {
+pub(super) fn entries(runs: &[PathBuf], out: &Path) -> Result<Entries, InputError> {
     let entries = runs.iter().zip(names(runs, out));
     entries
         .map(|(path, name)| Ok((name.clone(), entry(path, &name)?)))
@@ -206,8 +291,12 @@ fn entry(path: &Path, name: &str) -> Result<Entry, InputError> {
     }
     let file = ModelFile::read(path)?;
     let model = build(&file, Purpose::Fit)?;
-    let heading = FitHeading::new(&file, true, None);
-    Ok(Entry::Model(Box::new(model), heading))
+    let heading = Heading::of_model("fit", &file, true, None);
+    Ok(Entry::Model(Box::new(ToFit {
+        file,
+        model,
+        heading,
+    })))
 }
 
 /// What each run is called: the name of its file or folder, with a number where that is taken. A
@@ -219,9 +308,15 @@ fn names(paths: &[PathBuf], out: &Path) -> Vec<String> {
         .filter(|path| path.is_dir())
         .filter_map(|path| path.canonicalize().ok())
         .collect();
-    let mut taken: Vec<String> = ["figures", "compare.csv", "compare.html"]
-        .map(String::from)
-        .into();
+    let mut taken: Vec<String> = [
+        "figures",
+        "compare.csv",
+        "compare.html",
+        COMPARE_JOURNAL,
+        MANIFEST,
+    ]
+    .map(String::from)
+    .into();
     let mut names = Vec::new();
     for path in paths {
         let stem = stem(path);

@@ -1,8 +1,8 @@
 //! `kmcfit demo`
 
 use super::{Failure, compare, print, unwritable};
-use crate::report::{OutputFolder, write_whole};
-use std::path::{Path, PathBuf};
+use crate::results::{Claim, OutputFolder};
+use std::path::PathBuf;
 
 /// The files of the demonstration, by their place in its folder.
 const FILES: [(&str, &str); 4] = [
@@ -37,19 +37,22 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let out = &arguments.out;
-    let mut models = Vec::new();
-    for (name, text) in FILES {
-        let path = out.join(name);
-        let folder = path.parent().unwrap_or(Path::new(""));
-        // A folder that is in use, or no folder, is refused.
-        OutputFolder::prepare(folder)?;
-        write_whole(&path, text).map_err(|error| unwritable(&path, &error))?;
-        if name.starts_with("models/") {
-            models.push(path);
+    let folder = OutputFolder::prepare(out, Claim::new("demo").files(FILES.map(|(name, _)| name)))?;
+    let results = compare::prepare(&folder, "results")?;
+    let write = || {
+        let mut stage = folder.stage()?;
+        for (name, text) in FILES {
+            stage.write(name, text)?;
         }
-    }
+        stage.commit()
+    };
+    write().map_err(|error| unwritable(out, &error))?;
+    let models = FILES.iter().map(|(name, _)| out.join(name));
+    let models: Vec<PathBuf> = models
+        .filter(|path| path.extension().is_some_and(|e| e == "yaml"))
+        .collect();
     print(BEFORE);
-    let code = compare::run(&compare::Arguments::of(models, out.join("results")))?;
+    let code = compare::run_in(&results, &models)?;
     let place = out.display();
     print(&format!(
         "\nthe models are in {place}/models: change one, and `kmcfit fit {place}/models/physical.yaml` fits it\n"

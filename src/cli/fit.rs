@@ -1,15 +1,15 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, Overrides, exit_code, interrupt, print, say, stem, unwritable};
+use super::{Failure, Overrides, exit_code, inputs, interrupt, print, say, stem, unwritable};
 use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
 use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    Around, FitHeading, FitJournal, FittedModel, Known, OutputFolder, TimingsSummary, charts, json,
-    predict, summary,
+    Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
 };
+use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use crate::solvers::{
     Fit, Keeper, Moment, Row, Status, Watch, WeightPath, choose_weight_watched,
     fit_with_noise_watched, without_motion,
@@ -70,11 +70,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
-    let heading = FitHeading::new(&file, !arguments.no_report, arguments.checkpoint);
+    let heading = Heading::of_model("fit", &file, !arguments.no_report, arguments.checkpoint);
     let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(&output_path(arguments))?;
+    let claim = fit_claim(&model).inputs(inputs(&file));
+    let folder = OutputFolder::prepare(&output_path(arguments), claim)?;
     if let Ok(Some(_)) = FitJournal::heading(folder.path()) {
-        eprintln!("note: the unfinished fit in this folder is not gone on with but begun again");
+        say(
+            "note",
+            "Discarding the unfinished fit in this folder and starting over; use `kmcfit resume` to \
+             continue one.",
+        );
     }
     let printed = Printed {
         json: arguments.json,
@@ -86,19 +91,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// A new journal.
-pub(super) fn begun(folder: &OutputFolder, heading: &FitHeading) -> Result<FitJournal, Failure> {
+pub(super) fn begun(folder: &OutputFolder, heading: &Heading) -> Result<FitJournal, Failure> {
     let journal = FitJournal::begin(folder.path(), heading);
     Ok(journal.map_err(|error| unwritable(folder.path(), &error))?)
 }
 
 /// Goes on with a fit that did not come to its end.
-pub(super) fn go_on(place: &Path, heading: &FitHeading, printed: &Printed) -> Result<u8, Failure> {
-    let file = ModelFile::read_with(&heading.model, &Override::parse_all(&heading.overrides)?)?;
+pub(super) fn go_on(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
+    let path = heading.inputs.first().cloned().unwrap_or_default();
+    let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
     let model = build(&file, Purpose::Fit)?;
-    let now = FitHeading::new(&file, heading.figures, heading.checkpoint);
+    let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
     let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(place)?;
-    let journal = FitJournal::go_on(folder.path(), &now)?;
+    let claim = fit_claim(&model).inputs(inputs(&file));
+    let folder = OutputFolder::prepare(place, claim)?;
+    let journal = FitJournal::resume(folder.path(), &now)?;
     run_in(&folder, model, flag, (heading.figures, journal), printed)
 }
 
@@ -121,7 +128,10 @@ fn run_in(
     tell(&document, folder.path(), printed);
     if status == Status::Interrupted {
         let folder = folder.path().display();
-        eprintln!("note: `kmcfit resume {folder}` goes on with this fit");
+        say(
+            "note",
+            format!("`kmcfit resume {folder}` goes on with this fit"),
+        );
     }
     Ok(exit_code(status))
 }
@@ -138,7 +148,7 @@ pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) 
             .map_or(PIPED, |(_, columns)| columns.into());
         match charts(folder, document, width) {
             Ok(text) => print(&text),
-            Err(error) => eprintln!("warning: nothing could be drawn: {error}"),
+            Err(error) => say("warning", format!("nothing could be drawn: {error}")),
         }
     }
     if printed.timings {
@@ -160,14 +170,18 @@ pub(super) fn fit_into(
     let full = |error| unwritable(folder.path(), &error);
     let result = search(model, progress, Some(&mut journal));
     if let Some(trouble) = journal.trouble() {
-        eprintln!("warning: the journal of the fit could not be kept: {trouble}");
+        say(
+            "warning",
+            format!("the journal of the fit could not be written: {trouble}"),
+        );
     }
     let (weighted, path, found) = match result {
         Ok(found) => found,
         Err(reason) => {
             let document = FailureDocument::new(&model.title, &reason);
-            let stage = folder.stage().map_err(full)?;
-            stage.commit_run(&json(&document)).map_err(full)?;
+            let mut stage = folder.stage().map_err(full)?;
+            stage.write(RESULT, &json(&document)).map_err(full)?;
+            stage.commit().map_err(full)?;
             FitJournal::clear(folder.path()).map_err(full)?;
             return Err(Failure::Numerical(reason));
         }
@@ -199,7 +213,8 @@ pub(super) fn fit_into(
     // A fit that was gone on with took longer than this clock saw.
     let total = (before.total + clock.elapsed()).max(around.sum() + found.elapsed);
     document.timings = TimingsSummary::new(&found, &around, total);
-    stage.commit_run(&json(&document)).map_err(full)?;
+    stage.write(RESULT, &json(&document)).map_err(full)?;
+    stage.commit().map_err(full)?;
     let status = found.outcome.status;
     if status != Status::Interrupted {
         FitJournal::clear(folder.path()).map_err(full)?;

@@ -3,7 +3,8 @@
 use super::{Failure, OK, print, schema, unwritable};
 use crate::config::{ModelFile, starter};
 use crate::error::{InputError, Place};
-use crate::report::{shell_quoted, write_whole};
+use crate::report::shell_quoted;
+use crate::results::write_together;
 use std::path::{Component, Path, PathBuf};
 
 /// The schema that the comment in the first line of a model names.
@@ -38,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Some(out) => out.clone(),
         None => arguments.data.with_extension("yaml"),
     };
-    if out.exists() {
+    if out.symlink_metadata().is_ok() {
         return Err(InputError::file(&out, "there is such a file already")
             .expected("another name: --out MODEL")
             .into());
@@ -47,12 +48,15 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let starter = starter(&arguments.data, &named_from(folder, &arguments.data), rate)?;
     // What was written must be what can be read.
     ModelFile::parse(&out, starter.text.as_str())?;
-    write_whole(&out, &starter.text).map_err(|error| unwritable(&out, &error))?;
     let schema = folder.join(SCHEMA);
-    let is_new = !schema.exists();
+    let is_new = schema.symlink_metadata().is_err();
+    let schema_text = schema::text();
+    let mut files = vec![(out.as_path(), starter.text.as_str())];
     if is_new {
-        write_whole(&schema, &schema::text()).map_err(|error| unwritable(&schema, &error))?;
+        // The model last: while it is missing, the command can be given again.
+        files.insert(0, (&schema, &schema_text));
     }
+    write_together(&files).map_err(|error| unwritable(&out, &error))?;
     let mut text = format!("{}\n", arguments.data.display());
     for sentence in &starter.found {
         text += &format!("  {sentence}\n");

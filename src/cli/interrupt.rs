@@ -1,24 +1,54 @@
-//! Ctrl-C: the first one ends a run in order, the second one at once.
+//! Signals: Ctrl-C and SIGTERM end a run in order, a second one at once.
 
-use super::INTERRUPTED;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::{INTERRUPTED, TERMINATED};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::io;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
 
-/// A flag that Ctrl-C sets.
+/// The signal that came last, or 0.
+static RECEIVED: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+
+/// A flag that Ctrl-C or SIGTERM sets. A second signal ends the process with its exit code, without waiting for the
+/// iteration; `kmcfit resume` then goes on from the last checkpoint.
 pub fn flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let seen = Arc::clone(&flag);
-    let handler = move || {
-        if seen.swap(true, Ordering::Relaxed) {
-            eprintln!(
-                "stopped at once; `kmcfit resume FOLDER` goes on from what was kept on the way, if anything was"
-            );
-            std::process::exit(INTERRUPTED.into());
-        }
-    };
-    // Without a handler Ctrl-C still ends the program, only not in order.
-    if let Err(error) = ctrlc::set_handler(handler) {
-        eprintln!("warning: Ctrl-C will end the run without results: {error}");
+    let is_set = Arc::new(AtomicBool::new(false));
+    if let Err(error) = register(&is_set) {
+        super::say(
+            "warning",
+            format!("Ctrl-C will end the run without results: {error}"),
+        );
     }
-    flag
+    is_set
+}
+
+fn register(is_set: &Arc<AtomicBool>) -> io::Result<()> {
+    for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
+        // In this order: the first signal finds the flag down, sets it, and does not end the process.
+        flag::register_conditional_shutdown(signal, code.into(), Arc::clone(is_set))?;
+        flag::register(signal, Arc::clone(is_set))?;
+        flag::register_usize(
+            signal,
+            Arc::clone(&RECEIVED),
+            signal.unsigned_abs() as usize,
+        )?;
+    }
+    Ok(())
+}
+
+/// The exit code of a run that a signal ended.
+pub fn exit_code() -> u8 {
+    match RECEIVED.load(Ordering::Relaxed) {
+        signal if signal == SIGTERM.unsigned_abs() as usize => TERMINATED,
+        _ => INTERRUPTED,
+    }
+}
+
+/// Makes a file that grows beyond a limit (`ulimit -f`) an error of the write, which is reported, and not a signal
+/// that kills the process.
+pub fn ignore_file_size_signal() {
+    #[cfg(unix)]
+    // Without a handler the process is killed, as it would be anyway.
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }

@@ -8,6 +8,7 @@ mod explain;
 mod fit;
 mod init;
 mod interrupt;
+mod output;
 mod overrides;
 mod predict;
 mod progress;
@@ -17,16 +18,14 @@ mod shell;
 mod simulate;
 mod study;
 
+use crate::config::ModelFile;
 use crate::error::{InputError, Place};
-use crate::excerpt::Excerpt;
-use crate::input::harmless;
 use crate::solvers::Status;
 use clap::{CommandFactory, Parser, Subcommand};
-use console::style;
+use output::{complain, print, say};
 use overrides::Overrides;
-use std::fmt::Display;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Finds the time-varying mass, damping and stiffness of an oscillator from its measured motion.
@@ -62,6 +61,8 @@ const BAD_INPUT: u8 = 2;
 const NOT_CONVERGED: u8 = 3;
 /// Interrupted by Ctrl-C; the best so far is written.
 const INTERRUPTED: u8 = 130;
+/// Ended by SIGTERM; the best so far is written.
+const TERMINATED: u8 = 143;
 
 /// Why a command did not come to its end.
 #[derive(Debug)]
@@ -80,6 +81,7 @@ impl From<InputError> for Failure {
 
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
+    interrupt::ignore_file_size_signal();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => match arguments::no_number(&error) {
@@ -87,7 +89,10 @@ pub fn main() -> ExitCode {
                 complain(&error);
                 return ExitCode::from(BAD_INPUT);
             }
-            None => arguments::with_near_command(error, &Arguments::command()).exit(),
+            None => {
+                let error = arguments::with_near_command(error, &Arguments::command());
+                return ExitCode::from(output::print_usage(&error));
+            }
         },
     };
     if let Err(error) = crate::lanes::check_limit() {
@@ -109,42 +114,27 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => shell::completions(&arguments),
         Command::Man(arguments) => shell::manual(&arguments),
     };
-    ExitCode::from(match result {
+    let code = match result {
         Ok(code) => code,
         Err(Failure::Input(error)) => {
             complain(&error);
             BAD_INPUT
         }
         Err(Failure::Numerical(reason)) => {
-            let failed = style("failed:").for_stderr().red().bold();
-            eprintln!("{failed} {}", harmless(&reason));
+            output::say_failed(&reason);
             NOT_CONVERGED
         }
+    };
+    ExitCode::from(match output::has_failed() {
+        true => BAD_INPUT,
+        false => code,
     })
-}
-
-/// Says what is wrong with the input: the message, and below its first line the line of the file that
-/// it is about. Coloured on a terminal only, and not where `NO_COLOR` is set.
-fn complain(error: &InputError) {
-    let red = |text: &str| style(text.to_owned()).for_stderr().red().bold();
-    let message = error.to_string();
-    let message = harmless(&message);
-    let (headline, rest) = message.split_once('\n').unwrap_or((&message, ""));
-    eprintln!("{} {headline}", red("error:"));
-    if let Some(excerpt) = Excerpt::of(error) {
-        let [blank, line, mark] = excerpt.lines();
-        let (edge, mark) = mark.split_at(blank.len());
-        eprintln!("{blank}\n{line}\n{edge}{}", red(mark));
-    }
-    if !rest.is_empty() {
-        eprintln!("{rest}");
-    }
 }
 
 fn exit_code(status: Status) -> u8 {
     match status {
         Status::Converged | Status::Completed => OK,
-        Status::Interrupted => INTERRUPTED,
+        Status::Interrupted => interrupt::exit_code(),
         Status::MaxIterations
         | Status::TimeLimit
         | Status::Stalled
@@ -162,6 +152,13 @@ fn stem(model: &Path) -> String {
     }
 }
 
+/// The files that a command on a model reads: none of them may be replaced by its results.
+fn inputs(file: &ModelFile) -> Vec<PathBuf> {
+    let mut files = file.data_files();
+    files.push(file.path.clone());
+    files
+}
+
 /// A failure to write, as an input error about where the output should go.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
     InputError::new(
@@ -170,26 +167,4 @@ fn unwritable(path: &Path, error: &io::Error) -> InputError {
     )
     .found(format!("{}: {error}", path.display()))
     .expected("a place that can be written to")
-}
-
-/// Says something beside the results.
-fn say(kind: &str, what: impl Display) {
-    eprintln!("{kind}: {}", harmless(&what.to_string()));
-}
-
-/// Prints results; a reader that has gone away (`| head`) is no error, a full disk ends the
-/// program.
-fn print(text: &str) {
-    use io::Write;
-    let mut out = io::stdout();
-    match out
-        .write_all(harmless(text).as_bytes())
-        .and_then(|()| out.flush())
-    {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            eprintln!("error: the output cannot be written: {error}");
-            std::process::exit(BAD_INPUT.into());
-        }
-        _ => {}
-    }
 }

@@ -4,8 +4,9 @@ use super::{Failure, OK, print, unwritable};
 use crate::dynamics::State;
 use crate::error::{InputError, Place};
 use crate::report::{
-    CsvTable, OutputFolder, PredictedMotion, Run, figures, json, predict, prediction_table, render,
+    CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
+use crate::results::{Claim, OutputFolder};
 use std::path::PathBuf;
 
 /// Predict the free motion of a found device from other initial states.
@@ -24,6 +25,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// The files in the output folder.
+const FILES: [&str; 2] = ["predictions.csv", "figures/predictions.svg"];
+
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let states: Vec<State> = arguments
         .initial
@@ -31,10 +35,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
     let run = Run::open(&arguments.run)?;
-    let folder = arguments
-        .out
-        .as_deref()
-        .map(OutputFolder::prepare)
+    let folder = (arguments.out.as_deref())
+        .map(|out| {
+            let claim = Claim::new("predict").files(FILES);
+            OutputFolder::prepare(out, claim)
+        })
         .transpose()?;
     let motions = predict(&run.oscillator, &run.device, run.truth.as_ref(), &states)
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
@@ -94,9 +99,8 @@ fn write(
     }
     let figure = figures::predictions(times, motions);
     let mut stage = folder.stage()?;
-    let mut batch = stage.batch();
-    batch.write("predictions.csv", &table.to_csv())?;
-    batch.write("figures/predictions.svg", &render(&figure))?;
-    batch.finish()?;
+    let [table_name, figure_name] = FILES;
+    stage.write(table_name, &table.to_csv())?;
+    stage.write(figure_name, &render(&figure))?;
     stage.commit()
 }

@@ -1,13 +1,14 @@
 //! `kmcfit resume`
 
 use super::fit::{self, Printed};
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, study};
+use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, compare, say, study};
 use crate::error::InputError;
-use crate::report::{FitJournal, JOURNAL, Run};
+use crate::report::Run;
+use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
 use crate::solvers::Status;
 use std::path::PathBuf;
 
-/// Go on with a fit, study or story that was killed or interrupted, to the same bits.
+/// Go on with a fit, study or comparison that was killed or interrupted, to the same bits.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Its folder.
@@ -27,11 +28,15 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let folder = &arguments.folder;
     if !folder.is_dir() {
         return Err(InputError::file(folder, "there is no such folder")
-            .expected("the folder of a fit or study that did not come to its end")
+            .expected("the folder of a fit, study or comparison that did not come to its end")
             .into());
     }
-    if folder.join(JOURNAL).exists() {
+    results::complete(folder)?;
+    if folder.join(STUDY_JOURNAL).exists() {
         return study::go_on(folder, arguments.json, arguments.threads);
+    }
+    if folder.join(COMPARE_JOURNAL).exists() {
+        return compare::go_on(folder, arguments.json);
     }
     let printed = Printed {
         json: arguments.json,
@@ -50,12 +55,15 @@ fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, Failure> {
     if !folder.join("result.json").exists() {
         return Err(
             InputError::file(folder, "there is nothing to go on with in this folder")
-                .expected("the folder of a fit or study that did not come to its end")
+                .expected("the folder of a fit, study or comparison that did not come to its end")
                 .into(),
         );
     }
     let run = Run::open(folder)?;
-    eprintln!("note: nothing is left to do: this run had come to its end");
+    say(
+        "note",
+        "nothing is left to do: this run had come to its end",
+    );
     fit::tell(&run.document, folder, printed);
     let is = |status: Status| run.document.outcome.status == status.name();
     Ok(match () {

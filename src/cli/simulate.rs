@@ -1,15 +1,16 @@
 //! `kmcfit simulate`
 
-use super::{Failure, OK, Overrides, print, unwritable};
+use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{ModelFile, Purpose, build};
 use crate::error::{InputError, Place};
-use crate::input::{one_of, quote};
+use crate::input::{one_of, quote, read_text};
 use crate::problem::Experiment;
-use crate::report::{CsvTable, json, write_together};
+use crate::report::{CsvTable, json};
+use crate::results::{digest, digest_of_file, write_together};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +51,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let problem = build(&file, purpose)?.problem;
     let noise = noise(arguments)?;
-    keeps_readings(arguments, &file)?;
+    if let Some(out) = &arguments.out {
+        check_place(out, &file)?;
+    }
     let experiment = chosen(arguments, &problem.experiments)?;
     if experiment.sought != [None; 2] {
         return Err(file
@@ -75,9 +78,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(noise) = &noise {
         noise.add_to(&mut readings);
     }
+    let table = CsvTable::new()
+        .column("t_s", problem.oscillator.grid.times())
+        .column("y_m", readings)
+        .to_csv();
     let record = Record {
-        made_by: "kmcfit simulate",
+        made_by: MADE_BY,
         version: env!("CARGO_PKG_VERSION"),
+        sha256: digest(table.as_bytes()),
         model: arguments.model.display().to_string(),
         overrides: file.override_texts(),
         experiment: &experiment.name,
@@ -86,15 +94,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         stepper: problem.oscillator.method.name(),
         noise,
     };
-    let table = CsvTable::new()
-        .column("t_s", problem.oscillator.grid.times())
-        .column("y_m", readings)
-        .to_csv();
     match &arguments.out {
         None => {
             print(&table);
             if let Some(Noise { sigma, seed, .. }) = record.noise {
-                eprintln!("noise: sigma {sigma} m, seed {seed}");
+                say("noise", format!("sigma {sigma} m, seed {seed}"));
             }
         }
         Some(path) => {
@@ -104,24 +108,75 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(OK)
 }
 
-/// Refuses to write over the model's own readings.
-fn keeps_readings(arguments: &Arguments, file: &ModelFile) -> Result<(), InputError> {
-    let Some(out) = &arguments.out else {
-        return Ok(());
-    };
+/// In the record of every file that this command writes.
+const MADE_BY: &str = "kmcfit simulate";
+
+/// Refuses to write over an input of the model, or over a file that this command did not write.
+fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     let target = out.canonicalize().ok();
-    for data in file.spec.experiments.iter().filter_map(|e| e.data.as_ref()) {
-        let own = file.resolve(&data.0).canonicalize().ok();
-        if own.is_some() && own == target {
+    for input in inputs(file) {
+        if target.is_some() && input.canonicalize().ok() == target {
             return Err(InputError::new(
                 Place::Argument("--out".into()),
-                "this file holds the readings of the model",
+                "this file is an input of the model",
             )
             .found(out.display())
             .expected("another file, so that no measurement is lost"));
         }
     }
-    Ok(())
+    if out.is_dir() {
+        let error = io::Error::other("this is a folder, not a file");
+        return Err(unwritable(out, &error));
+    }
+    let beside = record_path(out);
+    let is_taken = |path: &Path| path.symlink_metadata().is_ok();
+    match is_taken(out) || is_taken(&beside) {
+        true if !is_own(out, &beside) => Err(InputError::new(
+            Place::Argument("--out".into()),
+            "a file stands here that was not written by `kmcfit simulate`, or was changed since",
+        )
+        .found(match is_taken(out) {
+            true => out.display().to_string(),
+            false => beside.display().to_string(),
+        })
+        .expected("a new file, or one that this command wrote with its record beside it")),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a table and its record were both written by this command: the record has the digest of the table, which may
+/// be missing.
+fn is_own(out: &Path, beside: &Path) -> bool {
+    #[derive(Deserialize)]
+    struct Known {
+        made_by: String,
+        sha256: String,
+    }
+    let is_file = |path: &Path| path.symlink_metadata().is_ok_and(|m| m.is_file());
+    let is_missing = out.symlink_metadata().is_err();
+    let known = read_text(
+        beside,
+        "the record of simulated measurements",
+        LONGEST_RECORD,
+    )
+    .ok();
+    let known: Option<Known> = known.and_then(|text| serde_json::from_str(&text).ok());
+    let has_digest = |sha256: &str| digest_of_file(out).is_ok_and(|found| found == sha256);
+    is_file(beside)
+        && known.is_some_and(|known| {
+            let is_own = is_missing || is_file(out) && has_digest(&known.sha256);
+            known.made_by == MADE_BY && is_own
+        })
+}
+
+/// Longest record that is read, bytes: it takes some hundred, and the paths and values that were given.
+const LONGEST_RECORD: u64 = 1 << 20;
+
+/// Where the record of a table stands.
+fn record_path(out: &Path) -> PathBuf {
+    let mut beside = out.as_os_str().to_owned();
+    beside.push(".json");
+    beside.into()
 }
 
 /// How a file of readings was made: `OUT.json` beside `OUT`.
@@ -129,6 +184,8 @@ fn keeps_readings(arguments: &Arguments, file: &ModelFile) -> Result<(), InputEr
 struct Record<'a> {
     made_by: &'static str,
     version: &'static str,
+    /// Digest of the table: the proof that this command wrote it.
+    sha256: String,
     /// The model file as it was given.
     model: String,
     /// What was given beside it.
@@ -164,12 +221,7 @@ impl Noise {
 
 /// The readings and, before them, their record: readings with noise are never without a seed.
 fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
-    if path.is_dir() {
-        return Err(io::Error::other("this is a folder, not a file"));
-    }
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".json");
-    write_together(&[(Path::new(&beside), &json(record)), (path, table)])
+    write_together(&[(&record_path(path), &json(record)), (path, table)])
 }
 
 fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {

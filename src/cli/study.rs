@@ -1,10 +1,10 @@
 //! `kmcfit study`
 
-use super::compare::{entries, side_by_side, verdict};
+use super::compare::{children, claim, entries, files_of, side_by_side, verdict};
 use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, INTERRUPTED, NOT_CONVERGED, OK, Overrides, interrupt, print, say, stem, unwritable,
+    Failure, NOT_CONVERGED, OK, Overrides, inputs, interrupt, print, say, stem, unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
@@ -12,7 +12,10 @@ use crate::identifiability::count;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::report::study::{FitPiece, StudyDocument, gather};
-use crate::report::{FitHeading, FitJournal, Heading, Journal, OutputFolder, Run, json};
+use crate::report::{Run, json};
+use crate::results::{
+    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
+};
 use crate::solvers::{Keeper, Status};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -69,8 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
     let threads = threads(asked)?;
     let Heading {
-        model, overrides, ..
-    } = Journal::heading(folder)?;
+        inputs, overrides, ..
+    } = AnalysisJournal::heading(folder, STUDY_JOURNAL)?;
+    let model = inputs.into_iter().next().unwrap_or_default();
     match Story::read(&model)? {
         Some(story) => tell(&model, &story, folder, as_json, true),
         None => {
@@ -96,22 +100,17 @@ fn threads(asked: Option<usize>) -> Result<usize, InputError> {
 /// Runs the models of a story and tells them on one page.
 fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> Result<u8, Failure> {
     let entries = entries(&story.models, out)?;
-    let mut text = String::new();
+    let mut heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
     for model in &story.models {
-        let file = ModelFile::read(model)?;
-        text += &file.text;
-        text += &FitHeading::new(&file, true, None).data_hashes();
+        heading = heading.with_model(&ModelFile::read(model)?);
     }
-    let heading = Heading::new(path, &text, 0.0);
     let flag = interrupt::flag();
-    let folder = OutputFolder::prepare(out)?;
-    let mut journal = match go_on {
-        // Refused where a model is another one by now.
-        true => Journal::go_on(folder.path(), &heading)?,
-        false => Journal::begin(folder.path(), &heading)
-            .map_err(|error| unwritable(folder.path(), &error))?,
-    };
-    let (comparison, interrupted) = side_by_side(entries, &folder, &flag, Some(&mut journal))?;
+    let mut read = files_of(&entries);
+    read.push(path.into());
+    let folder = OutputFolder::prepare(out, claim("study", STUDY_JOURNAL).inputs(read))?;
+    let children = children(&entries, &folder)?;
+    let mut journal = journal(&folder, &heading, go_on)?;
+    let (comparison, interrupted) = side_by_side(entries, children, &flag, &mut journal, go_on)?;
     let comparison = match interrupted {
         true => comparison,
         false => comparison.told_as(&story.title),
@@ -136,9 +135,22 @@ fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> R
         ));
     }
     Ok(match interrupted {
-        true => INTERRUPTED,
+        true => interrupt::exit_code(),
         false => verdict(&comparison),
     })
+}
+
+/// The journal of a study: resumed, which is refused where a model has changed, or begun.
+fn journal(
+    folder: &OutputFolder,
+    heading: &Heading,
+    go_on: bool,
+) -> Result<AnalysisJournal, InputError> {
+    match go_on {
+        true => AnalysisJournal::resume(folder.path(), STUDY_JOURNAL, heading),
+        false => AnalysisJournal::begin(folder.path(), STUDY_JOURNAL, heading)
+            .map_err(|error| unwritable(folder.path(), &error)),
+    }
 }
 
 fn study(
@@ -158,24 +170,16 @@ fn study(
     }
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));
-    let start = model.problem.start();
-    let cost = model.problem.evaluate(&start).map_or(f64::NAN, |e| e.cost);
-    let fit = FitHeading::new(file, false, None);
-    let text = file.effective_text().to_owned() + &fit.data_hashes();
-    let heading = Heading {
-        overrides: file.override_texts(),
-        ..Heading::new(&file.path, &text, cost)
-    };
-    let folder = OutputFolder::prepare(out)?;
-    let journal = match go_on {
-        true => Journal::go_on(folder.path(), &heading)?,
-        false => Journal::begin(folder.path(), &heading)
-            .map_err(|error| unwritable(folder.path(), &error))?,
-    };
+    let heading = Heading::of_model("study", file, true, None);
+    let claim = StudyDocument::claim()
+        .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
+        .inputs(inputs(file));
+    let folder = OutputFolder::prepare(out, claim)?;
+    let journal = journal(&folder, &heading, go_on)?;
     let mut work = Work {
         model: &model,
         folder: folder.path(),
-        heading: fit,
+        heading: Heading::of_model("fit", file, false, None),
         go_on,
         journal,
         flag,
@@ -215,7 +219,7 @@ fn study(
     let fitted = document.fit.as_ref().map(|fit| fit.status.as_str());
     let fine = [Status::Converged, Status::Completed].map(Status::name);
     Ok(match (done, fitted) {
-        (false, _) => INTERRUPTED,
+        (false, _) => interrupt::exit_code(),
         (true, Some(status)) if fine.contains(&status) => OK,
         (true, _) => NOT_CONVERGED,
     })
@@ -243,8 +247,8 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
 }
 
 /// The journal of the fit of a study; a fit without one begins again when it is gone on with.
-fn fit_journal(folder: &Path, heading: &FitHeading, go_on: bool) -> Option<FitJournal> {
-    let before = go_on.then(|| FitJournal::go_on(folder, heading));
+fn fit_journal(folder: &Path, heading: &Heading, go_on: bool) -> Option<FitJournal> {
+    let before = go_on.then(|| FitJournal::resume(folder, heading));
     match before {
         Some(Ok(journal)) => Some(journal),
         _ => FitJournal::begin(folder, heading).ok(),
@@ -268,9 +272,9 @@ struct Work<'a> {
     model: &'a Model,
     folder: &'a Path,
     /// Of the journal of the fit.
-    heading: FitHeading,
+    heading: Heading,
     go_on: bool,
-    journal: Journal,
+    journal: AnalysisJournal,
     flag: Arc<AtomicBool>,
     threads: usize,
     document: StudyDocument,
@@ -294,12 +298,12 @@ impl Work<'_> {
                 }
                 let name: &str = $name;
                 if std::io::stderr().is_terminal() {
-                    eprintln!("studying: {name}");
+                    say("studying", name);
                 }
                 let flag = Arc::clone(&self.flag);
                 // What an interrupt may have cut short is no piece.
                 let whole = || !flag.load(Ordering::Relaxed);
-                match self.journal.piece(name, || $compute, whole)? {
+                match self.journal.analysis(name, || $compute, whole)? {
                     Some(result) => result,
                     None => return Ok(false),
                 }
@@ -397,7 +401,7 @@ impl Work<'_> {
                 .map_or(true, |fit| gather::is_of(&model.problem, fit))
         };
         self.journal.forget_unless("fit", is_right);
-        let fitted = self.journal.piece("fit", compute, whole)?;
+        let fitted = self.journal.analysis("fit", compute, whole)?;
         let Some(fitted) = fitted else {
             // The best so far is told, and the journal of the fit has what it goes on from.
             self.document.fit = interrupted;

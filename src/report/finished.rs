@@ -6,6 +6,7 @@ use crate::dynamics::{Device, Method, Oscillator, Term};
 use crate::error::InputError;
 use crate::functions::Quantity;
 use crate::input::read_text;
+use crate::results;
 use crate::solvers::Row;
 use serde::Deserialize;
 use serde_json::Value;
@@ -65,6 +66,7 @@ impl Run {
             return Err(InputError::file(folder, "there is no such folder")
                 .expected("the folder of a finished run, as written by `kmcfit fit`"));
         }
+        results::complete(folder)?;
         let value = value(folder)?;
         let document = document(folder, &value)?;
         let (oscillator, quantities) = oscillator(folder, &document)?;

@@ -7,7 +7,6 @@ use super::document::{
     FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary,
     PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
-use super::files::Stage;
 use super::knowledge::knowledge;
 use super::known::Known;
 use super::meaning::POOR;
@@ -21,6 +20,7 @@ use crate::dynamics::{Excitation, Term};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding, is_unhindered};
+use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use crate::solvers::{
     ActiveGroup, Fit, PathPoint, Rung, Solver, Status, WeightPath, WeightRule, active_constraints,
     timed,
@@ -46,7 +46,7 @@ pub struct FittedModel<'a> {
 
 impl FittedModel<'_> {
     /// Writes tables and, if asked for, figures and the page of `document`: all but the result document
-    /// itself, which comes last ([`Stage::commit_run`]). Returns what the writing took.
+    /// itself. Returns what the writing took.
     ///
     /// # Errors
     /// What the file system says.
@@ -57,8 +57,7 @@ impl FittedModel<'_> {
         with_figures: bool,
     ) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
-        let mut batch = stage.batch();
-        let mut write = |name: &str, text: &str| timed(&mut writing, || batch.write(name, text));
+        let mut write = |name: &str, text: &str| timed(&mut writing, || stage.write(name, text));
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;
@@ -71,7 +70,6 @@ impl FittedModel<'_> {
             }
             write("report.html", &self.page(document))?;
         }
-        timed(&mut writing, || batch.finish())?;
         Ok(writing)
     }
 
@@ -453,6 +451,33 @@ fn summarise(values: &[f64], truth: Option<&[f64]>) -> FunctionSummary {
         truth_rms_error: errors
             .map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt()),
     }
+}
+
+/// The files that a fit of a model writes.
+pub fn fit_claim(model: &Model) -> Claim {
+    const FIGURES: [&str; 8] = [
+        "observation",
+        "channel",
+        "residuals",
+        "convergence",
+        "motion",
+        "functions",
+        "ratios",
+        "weights",
+    ];
+    let records = 1..=model.problem.experiments.len();
+    let readings = records.map(|number| number.to_string());
+    Claim::new("fit")
+        .files([
+            RESULT,
+            "history.csv",
+            "functions.csv",
+            "trajectory.csv",
+            "report.html",
+        ])
+        .family("readings", "csv", readings.chain(["held-out".to_owned()]))
+        .family("figures", "svg", FIGURES)
+        .journals(&[FIT_JOURNAL, CHECKPOINT])
 }
 
 /// Pretty JSON with a final newline. Numbers that JSON cannot hold become `null`.

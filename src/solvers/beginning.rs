@@ -148,12 +148,12 @@ pub(super) fn begin(
     let clock = Instant::now();
     let (found, (reference, mut timings, spare)) = match threads::spare() {
         true => std::thread::scope(|scope| {
-            let whole = scope.spawn(|| reference(problem, start, settings));
+            let whole = threads::spawn_scoped(scope, || reference(problem, start, settings));
             let found = threads::sharing(|| fit_part(watch));
-            let whole = whole.join();
+            let whole = whole.ok().and_then(|thread| thread.join().ok());
             (
                 found,
-                whole.unwrap_or_else(|_| reference(problem, start, settings)),
+                whole.unwrap_or_else(|| reference(problem, start, settings)),
             )
         }),
         false => (fit_part(watch), reference(problem, start, settings)),

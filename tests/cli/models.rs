@@ -305,6 +305,12 @@ fn two_runs_are_identical_but_for_their_times() {
         result["timings"] = Value::Null;
         let mut files = bench.contents();
         files.insert("runs/paper-lbfgs/result.json".into(), result.to_string());
+        // It has the digest of the document with its times.
+        assert!(
+            files
+                .remove("runs/paper-lbfgs/kmcfit-manifest.json")
+                .is_some()
+        );
         files
     };
     assert_eq!(run(), run());

@@ -77,7 +77,10 @@ fn simulate_does_not_write_over_the_model_s_readings() {
     let before = bench.contents();
     let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./readings.csv"]);
     assert_eq!(code, 2);
-    assert!(stderr.contains("holds the readings"), "{stderr}");
+    assert!(
+        stderr.contains("this file is an input of the model"),
+        "{stderr}"
+    );
     assert_eq!(bench.contents(), before);
 }
 

@@ -9,9 +9,10 @@ use kmcfit::dynamics::State;
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
-use kmcfit::report::{
-    CHECKPOINT, FIT_JOURNAL, FitHeading, FitJournal, FittedModel, Heading, JOURNAL, Journal, Known,
-    OutputFolder, json, predict,
+use kmcfit::report::{FittedModel, Known, fit_claim, json, predict};
+use kmcfit::results::{
+    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
+    STUDY_JOURNAL, with_checksums,
 };
 use kmcfit::solvers::{Fit, Watch, fit_with_noise_watched};
 use serde::Serialize;
@@ -51,7 +52,7 @@ const METHODS: [&str; 4] = [
 struct Workshop {
     folder: TempDir,
     /// A model and what it fits, for each method.
-    fits: Vec<(FitHeading, Model)>,
+    fits: Vec<(Heading, Model)>,
 }
 
 impl Workshop {
@@ -91,7 +92,7 @@ fn workshop() -> &'static Workshop {
 }
 
 /// A small problem, on few nodes: what is fuzzed is the journal, not the fit.
-fn small(folder: &Path, method: &str) -> (FitHeading, Model) {
+fn small(folder: &Path, method: &str) -> (Heading, Model) {
     let text = format!(
         "format: 1\ntitle: Small\nexperiments:\n  - {{data: ../data/paper.csv, sigma: {{displacement: 0.1}}, \
          initial: {{displacement: 3.3, velocity: 1.0}}}}\ngrid: {{method: midpoint, nodes: 16}}\nfunctions:\n  \
@@ -104,15 +105,10 @@ fn small(folder: &Path, method: &str) -> (FitHeading, Model) {
         _ => text,
     };
     let file = ModelFile::parse(folder.join("models/m.yaml"), text).expect("a model");
-    let heading = FitHeading {
-        overrides: Vec::new(),
-        format: 1,
-        version: String::new(),
-        model: "m.yaml".into(),
-        figures: false,
+    let heading = Heading {
         // Making files durable takes most of the time.
         checkpoint: Some(1e9),
-        sources: Vec::new(),
+        ..Heading::new("fit", vec!["m.yaml".into()])
     };
     (heading, build(&file, Purpose::Fit).expect("a problem"))
 }
@@ -139,13 +135,14 @@ fn finish(workshop: &Workshop) {
         weights: None,
         known: &known,
     };
-    let folder = OutputFolder::prepare(&workshop.path("run")).expect("a folder");
+    let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
     let mut stage = folder.stage().expect("room");
     let document = finished.document();
     finished
         .write(&mut stage, &document, false)
         .expect("a run is written");
-    stage.commit_run(&json(&document)).expect("a run");
+    stage.write(RESULT, &json(&document)).expect("room");
+    stage.commit().expect("a run");
 }
 
 /// Inputs that the program itself makes, for the targets whose files hold what depends on the build.
@@ -163,17 +160,20 @@ pub fn made(target: &str) -> Vec<Vec<u8>> {
         "fit_journal" => (METHODS.iter().zip(&workshop.fits))
             .map(|(method, (heading, model))| {
                 let folder = workshop.path("fit");
-                let heading = FitHeading {
-                    overrides: Vec::new(),
+                let heading = Heading {
                     checkpoint: Some(0.0),
                     ..heading.clone()
                 };
                 let mut journal = FitJournal::begin(&folder, &heading).expect("room");
                 fitted(model, &mut journal);
                 let read = |name| fs::read_to_string(folder.join(name)).expect("a journal");
-                let (journal, checkpoint) = (read(FIT_JOURNAL), read(CHECKPOINT));
-                let rows = journal.split_once('\n').expect("lines").1;
-                let standing = checkpoint.split_once(',').expect("keys").1;
+                // Without headings and checksums, which belong to this build.
+                let json = |text: &str| -> String {
+                    let lines = text.lines().skip(1);
+                    let json = lines.filter_map(|line| line.rsplit_once('\t'));
+                    json.map(|(json, _)| format!("{json}\n")).collect()
+                };
+                let (rows, standing) = (json(&read(FIT_JOURNAL)), json(&read(CHECKPOINT)));
                 format!("{method}\n{rows}{SEPARATOR}{standing}").into_bytes()
             })
             .collect(),
@@ -305,7 +305,7 @@ pub fn run(bytes: &[u8]) {
 }
 
 /// What a fit left that was killed: the name of a method, the lines of its journal behind the heading, and
-/// its checkpoint behind the beginning, which names the fit. The fit goes on from it to a named end.
+/// that of its checkpoint, all without checksums. The fit goes on from it to a named end.
 pub fn fit_journal(bytes: &[u8]) {
     let folder = workshop().path("fit");
     let text = bytes.to_vec();
@@ -321,14 +321,11 @@ pub fn fit_journal(bytes: &[u8]) {
         None => (&body[..], &[][..]),
     };
     let (heading, model) = &workshop().fits[method.unwrap_or(0)];
-    drop(FitJournal::begin(&folder, heading).expect("room"));
-    let append = |name: &str, begin: Vec<u8>, rest: &[u8]| {
-        fs::write(folder.join(name), [&begin, rest].concat()).expect("room");
-    };
-    let begin = fs::read(folder.join(FIT_JOURNAL)).expect("a heading");
-    append(FIT_JOURNAL, begin, rows);
-    append(CHECKPOINT, beginning(heading), standing);
-    match FitJournal::go_on(&folder, heading) {
+    for (name, lines) in [(FIT_JOURNAL, rows), (CHECKPOINT, standing)] {
+        let text = with_checksums(heading, lines).expect("a heading");
+        fs::write(folder.join(name), text).expect("room");
+    }
+    match FitJournal::resume(&folder, heading) {
         Err(error) => told(&error),
         Ok(mut journal) => {
             let found = fitted(model, &mut journal);
@@ -338,29 +335,13 @@ pub fn fit_journal(bytes: &[u8]) {
     }
 }
 
-/// How a checkpoint of a fit begins: with the hash (FNV-1a) of its heading.
-fn beginning(heading: &FitHeading) -> Vec<u8> {
-    let text = serde_json::to_string(heading).expect("a heading");
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
-    format!("{{\"fit\":\"{hash:016x}\",").into_bytes()
-}
-
 /// The lines of a study's journal behind the heading: what is kept is told and drawn.
 pub fn study_journal(bytes: &[u8]) {
     let folder = workshop().path("study");
-    let heading = Heading {
-        overrides: Vec::new(),
-        format: 1,
-        model: "m.yaml".into(),
-        fingerprint: "0".into(),
-    };
-    let mut text = serde_json::to_vec(&heading).expect("a heading");
-    text.push(b'\n');
-    text.extend_from_slice(bytes);
-    fs::write(folder.join(JOURNAL), text).expect("room");
-    let mut journal = match Journal::go_on(&folder, &heading) {
+    let heading = Heading::new("study", vec!["m.yaml".into()]);
+    let text = with_checksums(&heading, bytes).expect("a heading");
+    fs::write(folder.join(STUDY_JOURNAL), text).expect("room");
+    let mut journal = match AnalysisJournal::resume(&folder, STUDY_JOURNAL, &heading) {
         Ok(journal) => journal,
         Err(error) => return told(&error),
     };
@@ -387,7 +368,8 @@ pub fn study_journal(bytes: &[u8]) {
     }
     document.text();
     if PIECES.iter().any(|name| journal.has(name)) {
-        let out = OutputFolder::prepare(&folder).expect("a folder");
+        let claim = StudyDocument::claim().journals(&[STUDY_JOURNAL]);
+        let out = OutputFolder::prepare(&folder, claim).expect("a folder");
         document.write(&out).expect("room");
     }
 }
@@ -406,11 +388,15 @@ const PIECES: [&str; 10] = [
     "tubes",
 ];
 
-fn kept<T: Serialize + DeserializeOwned>(journal: &mut Journal, name: &str) -> Option<T> {
+fn kept<T: Serialize + DeserializeOwned>(journal: &mut AnalysisJournal, name: &str) -> Option<T> {
     let none = || -> Option<T> { None };
     let has = journal.has(name);
     match has {
-        true => journal.piece(name, none, || false).ok().flatten().flatten(),
+        true => journal
+            .analysis(name, none, || false)
+            .ok()
+            .flatten()
+            .flatten(),
         false => None,
     }
 }

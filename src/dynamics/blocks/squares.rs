@@ -16,7 +16,7 @@ use crate::dynamics::State;
 use crate::lanes::{self, Arithmetic, Kernel, LANES};
 use crate::threads;
 use std::sync::{Mutex, PoisonError};
-use std::thread::{Builder, ScopedJoinHandle};
+use std::thread::ScopedJoinHandle;
 
 /// From so many tiles on, a second thread pays: to start it takes as long as some three tiles do, twice.
 const WORTH_A_THREAD: usize = 24;
@@ -295,7 +295,7 @@ fn both<P: Send, T: Send>(
     let take = || latter.lock().unwrap_or_else(PoisonError::into_inner).take();
     std::thread::scope(|scope| {
         let other = || take().map(&act);
-        let other = Builder::new().spawn_scoped(scope, other);
+        let other = threads::spawn_scoped(scope, other);
         let mut all = act(former);
         match other.map(ScopedJoinHandle::join) {
             Ok(Ok(more)) => all.extend(more.into_iter().flatten()),

@@ -32,6 +32,9 @@ pub(super) fn style(index: usize) -> Style {
 }
 
 /// All figures of a comparison.
+/// The names of the figures.
+pub(super) const NAMES: [&str; 4] = ["functions", "ratios", "residuals", "convergence"];
+
 pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
     let runs = &comparison.runs;
     let mut figures = vec![

@@ -16,8 +16,8 @@ mod verdict;
 pub use measures::{Errors, Measures, Roughness};
 pub use run::{ComparedRun, MatchedMotion};
 
-use super::files::OutputFolder;
 use super::render;
+use crate::results::{Claim, OutputFolder};
 use serde::Serialize;
 use std::io;
 
@@ -134,19 +134,24 @@ impl Comparison {
         page::page(self)
     }
 
+    /// The files that `command` writes with a comparison.
+    pub fn claim(command: &'static str) -> Claim {
+        Claim::new(command)
+            .files(["compare.csv", "compare.html"])
+            .family("figures", "svg", figures::NAMES)
+    }
+
     /// Writes `figures/*.svg`, `compare.csv` and `compare.html`.
     ///
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
-        let mut batch = stage.batch();
         for figure in figures::all(self) {
-            batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            stage.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        batch.write("compare.csv", &self.to_csv())?;
-        batch.write("compare.html", &self.to_html())?;
-        batch.finish()?;
+        stage.write("compare.csv", &self.to_csv())?;
+        stage.write("compare.html", &self.to_html())?;
         stage.commit()
     }
 }

@@ -5,6 +5,18 @@ use crate::report::figure::{Axis, Figure, Panel};
 use crate::report::mark::{Colour, Dash, Mark, Style};
 
 /// All that the study has something for.
+/// The names of the figures, some with a suffix.
+pub const NAMES: [&str; 8] = [
+    "bands",
+    "spectrum",
+    "directions",
+    "profiles",
+    "tubes",
+    "equivalents",
+    "waterfall",
+    "study-predictions",
+];
+
 pub fn all(study: &StudyDocument) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(bands(study));

@@ -12,8 +12,8 @@ pub use pieces::{
     PredictionRecord, ProfilePiece, SpectrumPiece, StudyDocument, TubeRecord, VariesRecord,
 };
 
-use super::files::OutputFolder;
 use super::{json, render};
+use crate::results::{Claim, OutputFolder};
 use std::io;
 
 impl StudyDocument {
@@ -22,19 +22,24 @@ impl StudyDocument {
         text::text(self)
     }
 
+    /// The files that a study writes.
+    pub fn claim() -> Claim {
+        Claim::new("study")
+            .files(["study.html", "study.json"])
+            .family("figures", "svg", figures::NAMES)
+    }
+
     /// Writes `study.json`, `study.html` and `figures/*.svg`.
     ///
     /// # Errors
     /// What the file system says.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
-        let mut batch = stage.batch();
         for figure in figures::all(self) {
-            batch.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            stage.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
         }
-        batch.write("study.html", &page::page(self))?;
-        batch.write("study.json", &json(self))?;
-        batch.finish()?;
+        stage.write("study.html", &page::page(self))?;
+        stage.write("study.json", &json(self))?;
         stage.commit()
     }
 }

@@ -1,24 +1,25 @@
 //! A lock on an output folder: one run at a time.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use super::system;
+use std::fs::{File, TryLockError};
 use std::path::Path;
 
 /// The file that is locked where a folder cannot be.
 const LOCK: &str = ".kmcfit.lock";
 
-/// The lock. The system opens it when the program ends, however it ends, so a killed run blocks nobody.
+/// The lock. The operating system releases it when the process ends, so a killed run blocks no other.
 #[derive(Debug)]
 pub(super) struct Lock {
     _held: File,
 }
 
-/// Somebody else holds the lock.
+/// Another process holds the lock.
 #[derive(Debug)]
 pub(super) struct Taken;
 
 impl Lock {
-    /// Locks a folder, or a file in it where the system locks no folders. Nothing, where the file system
-    /// knows no locks at all: a run must be possible there too.
+    /// Locks a folder, or a file in it where the system locks no folders. `None` where the file system
+    /// has no locks: runs are possible there too.
     pub fn take(folder: &Path) -> Result<Option<Self>, Taken> {
         let on_folder = File::open(folder).ok().map(locked);
         match on_folder {
@@ -29,12 +30,10 @@ impl Lock {
     }
 
     fn by_file(path: &Path) -> Result<Option<Self>, Taken> {
-        let mut options = OpenOptions::new();
-        options.write(true).create(true).truncate(false);
         // A link in its place could lead anywhere.
         let file = match path.is_symlink() {
             true => None,
-            false => options.open(path).ok(),
+            false => system::open_lock(path).ok(),
         };
         match file.map(locked) {
             Some(Ok(lock)) => Ok(Some(lock)),

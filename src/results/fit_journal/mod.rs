@@ -1,23 +1,22 @@
 //! The journal of a fit: one line per iteration and per finished search, and a checkpoint beside it.
 //!
-//! Lines are appended and never changed; those of iterations wait for each other for some milliseconds, so
-//! a fit that is killed loses at most the last of them. The checkpoint holds where the running search
-//! stands; it is replaced as a whole every now and then. Both go when the results are written. What they
-//! hold and how a fit goes on from it is told by [`Keeper`]; nothing here looks at the system clock.
+//! Lines of iterations are collected for some milliseconds before they are written, so a fit that is killed loses at
+//! most the last of them. The checkpoint holds the state of the running search; it is replaced as a whole every
+//! now and then. Both are removed when the results are written. [`Keeper`] defines what they hold and how a fit is
+//! resumed from it. Times are taken from a monotonic clock.
 
-mod heading;
 mod read;
 
-pub(super) use heading::hash;
-pub use heading::{FitHeading, Source};
-
-use super::files::{begun, write_whole_with};
+use super::atomic::replace_with;
+use super::heading::Heading;
+use super::journal::{JournalFile, Mark, path_in, push_line, write_line};
+use super::system;
+use super::work_folder::WorkFolder;
 use crate::error::InputError;
 use crate::solvers::{Bits, Keeper, Kept, Row, Standing};
-use read::{Contents, Reader, journal_file};
+use read::{Contents, Reader};
 use serde::{Deserialize, Serialize};
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -54,23 +53,16 @@ enum Entry {
     Nothing,
 }
 
-/// The content of the checkpoint.
-#[derive(Serialize, Deserialize)]
-struct Checkpoint {
-    /// Of the heading of the journal beside it.
-    fit: String,
-    unit: u64,
-    standing: Standing,
-}
-
 /// A journal at work.
 #[derive(Debug)]
 pub struct FitJournal {
     folder: PathBuf,
-    fingerprint: String,
-    file: File,
-    /// Lines that wait to be written, and when others were last.
-    waiting: String,
+    heading: Heading,
+    file: JournalFile,
+    work: WorkFolder,
+    /// Lines that wait to be written, where they end, and when others were last written.
+    waiting: Vec<u8>,
+    waiting_end: Mark,
     written: Instant,
     /// What an earlier run of the same fit left.
     before: Contents,
@@ -121,51 +113,63 @@ impl FitJournal {
     ///
     /// # Errors
     /// What the file system says.
-    pub fn begin(folder: &Path, heading: &FitHeading) -> io::Result<Self> {
+    pub fn begin(folder: &Path, heading: &Heading) -> io::Result<Self> {
         Self::clear(folder)?;
-        let mut text = serde_json::to_string(heading).map_err(io::Error::other)?;
-        text.push('\n');
-        let file = begun(&folder.join(FIT_JOURNAL), &text)?;
-        Ok(Self::new(folder, heading, file, Contents::default()))
+        let work = WorkFolder::create_in(folder)?;
+        let file = JournalFile::begin(&work, &path_in(folder, FIT_JOURNAL), heading)?;
+        Ok(Self::new(
+            folder,
+            heading,
+            (file, work),
+            Contents::default(),
+        ))
     }
 
-    /// The heading of the journal in a folder; nothing where there is no journal.
+    /// The heading of the journal in a folder; `None` where there is no journal.
     ///
     /// # Errors
     /// If it is not the journal of a fit of this format.
-    pub fn heading(folder: &Path) -> Result<Option<FitHeading>, InputError> {
-        match folder.join(FIT_JOURNAL).exists() {
-            true => Reader::open(folder).map(|reader| Some(reader.heading)),
+    pub fn heading(folder: &Path) -> Result<Option<Heading>, InputError> {
+        match path_in(folder, FIT_JOURNAL).exists() {
+            true => Reader::open(folder).map(|reader| Some(reader.text.heading)),
             false => Ok(None),
         }
     }
 
-    /// The journal in a folder, to be gone on with. A last line that was cut off does not count.
+    /// Resumes the journal in a folder, up to the first line that is damaged.
     ///
     /// # Errors
-    /// If there is none, or it is of another model, other data or another version.
-    pub fn go_on(folder: &Path, heading: &FitHeading) -> Result<Self, InputError> {
-        let path = journal_file(folder)?;
+    /// If there is none, or it was begun with another model, other data or by another version.
+    pub fn resume(folder: &Path, heading: &Heading) -> Result<Self, InputError> {
+        let path = path_in(folder, FIT_JOURNAL);
         let reader = Reader::open(folder)?;
-        heading.same_as(&reader.heading, &path)?;
-        let fingerprint = reader.heading.fingerprint();
-        let before = reader.contents(&fingerprint);
-        let file = OpenOptions::new().append(true).open(&path);
-        let file = file.map_err(|error| {
-            InputError::file(
-                &path,
-                format!("the journal cannot be gone on with: {error}"),
-            )
+        heading.check_same(&reader.text.heading, &path)?;
+        let (before, end) = reader.contents();
+        let work = WorkFolder::create_in(folder).map_err(|error| {
+            InputError::file(folder, "the journal cannot be written to").found(error)
         })?;
-        Ok(Self::new(folder, &reader.heading, file, before))
+        let file = JournalFile::resume(&path, end)?;
+        Ok(Self::new(
+            folder,
+            &reader.text.heading,
+            (file, work),
+            before,
+        ))
     }
 
-    fn new(folder: &Path, heading: &FitHeading, file: File, before: Contents) -> Self {
+    fn new(
+        folder: &Path,
+        heading: &Heading,
+        (file, work): (JournalFile, WorkFolder),
+        before: Contents,
+    ) -> Self {
         Self {
             folder: folder.to_path_buf(),
-            fingerprint: heading.fingerprint(),
+            heading: heading.clone(),
+            waiting_end: file.end,
             file,
-            waiting: String::new(),
+            work,
+            waiting: Vec::new(),
             written: Instant::now(),
             before,
             unit: 0,
@@ -175,16 +179,13 @@ impl FitJournal {
         }
     }
 
-    /// Takes journal and checkpoint away: of a fit that is over there is nothing to go on with.
+    /// Removes journal and checkpoint of a fit that has come to its end.
     ///
     /// # Errors
     /// What the file system says.
     pub fn clear(folder: &Path) -> io::Result<()> {
         for name in [CHECKPOINT, FIT_JOURNAL] {
-            match std::fs::remove_file(folder.join(name)) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
+            system::remove_file(&path_in(folder, name))?;
         }
         Ok(())
     }
@@ -198,62 +199,53 @@ impl FitJournal {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        if !matches!(entry, Entry::Row(_)) {
+        let line = Line(self.unit, entry);
+        if !matches!(line.1, Entry::Row(_)) {
             self.write();
             if self.trouble.is_none() {
-                self.trouble = self.stream(entry).err();
+                self.trouble = self.file.append(&line).err();
+                self.waiting_end = self.file.end;
             }
             return;
         }
-        match serde_json::to_string(&Line(self.unit, entry)) {
-            Ok(line) => {
-                self.waiting += &line;
-                self.waiting.push('\n');
-            }
-            Err(error) => self.trouble = Some(io::Error::other(error)),
+        match push_line(&mut self.waiting, self.waiting_end, &line) {
+            Ok(end) => self.waiting_end = end,
+            Err(error) => self.trouble = Some(error),
         }
         if self.written.elapsed() >= GATHER {
             self.write();
         }
     }
 
-    /// Writes a line that may be long: as a text it would take a multiple of the memory of the fit.
-    fn stream(&self, entry: Entry) -> io::Result<()> {
-        let mut out = BufWriter::with_capacity(1 << 16, &self.file);
-        serde_json::to_writer(&mut out, &Line(self.unit, entry))?;
-        out.write_all(b"\n")?;
-        out.flush()
-    }
-
     /// Writes the lines that wait.
     fn write(&mut self) {
-        if self.trouble.is_none() {
-            self.trouble = self.file.write_all(self.waiting.as_bytes()).err();
+        if self.trouble.is_none() && !self.waiting.is_empty() {
+            let written = self.file.append_text(&self.waiting, self.waiting_end);
+            self.trouble = written.err();
         }
         self.waiting.clear();
         self.written = Instant::now();
     }
 
-    /// Drops what an earlier run left after the first `length` bytes.
-    fn cut(&mut self, length: u64) {
+    /// Drops what an earlier run left behind a place.
+    fn cut(&mut self, end: Mark) {
         self.before = Contents::default();
         self.write();
-        if let Err(error) = self.file.set_len(length) {
-            self.trouble = Some(error);
+        match self.file.truncate(end) {
+            Ok(()) => self.waiting_end = end,
+            Err(error) => self.trouble = Some(error),
         }
     }
 
     fn checkpoint(&mut self, standing: Standing) -> io::Result<()> {
         // The iterations before it must not be lost when it is not.
         self.write();
-        self.file.sync_data()?;
-        let checkpoint = Checkpoint {
-            fit: self.fingerprint.clone(),
-            unit: self.unit,
-            standing,
-        };
-        write_whole_with(&self.folder.join(CHECKPOINT), |file| {
-            Ok(serde_json::to_writer(file, &checkpoint)?)
+        self.file.sync()?;
+        let path = path_in(&self.folder, CHECKPOINT);
+        replace_with(self.work.path(), &path, |out| {
+            let begin = write_line(&mut *out, Mark::default(), &self.heading)?;
+            write_line(out, begin, &(self.unit, standing))?;
+            Ok(())
         })
     }
 }

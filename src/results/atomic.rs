@@ -1,0 +1,136 @@
+//! Files that appear whole or not at all: written under a temporary name, made durable, renamed.
+
+use super::system::{self, Writer};
+use super::work_folder::fresh_name;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Bytes that are collected before they are written.
+const BUFFER: usize = 1 << 16;
+
+/// Writes `contents` to `path`; a reader sees the old file or the new one, never a part.
+///
+/// # Errors
+/// What the file system says; the old file is then unchanged.
+pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
+    write_together(&[(path, contents)])
+}
+
+/// Writes files that belong together: none of them appears before all are durable.
+///
+/// # Errors
+/// What the file system says. The older files are then in their places, or, where that cannot be restored either,
+/// some of the new ones.
+pub fn write_together(files: &[(&Path, &str)]) -> io::Result<()> {
+    let files = files.iter().map(|(path, contents)| {
+        system::create_folders(folder_of(path))?;
+        let file = Temporary::create_in(folder_of(path))?;
+        system::write_all(&file.file, contents.as_bytes())?;
+        system::sync(&file.file)?;
+        Ok((file, *path))
+    });
+    let files = files.collect::<io::Result<Vec<_>>>()?;
+    let mut done: Vec<(&Path, Option<PathBuf>)> = Vec::new();
+    let replace = || {
+        for (file, path) in files {
+            done.push((path, second_name(path)?));
+            file.rename_to(path)?;
+        }
+        Ok(())
+    };
+    let result: io::Result<()> = replace();
+    for (path, old) in done.iter().rev() {
+        let _ = match (&result, old) {
+            (Ok(()), Some(old)) => system::remove_file(old),
+            (Err(_), Some(old)) => system::rename(old, path),
+            // Where this is the file that did not come, nothing is there.
+            (Err(_), None) => system::remove_file(path),
+            (Ok(()), None) => Ok(()),
+        };
+        system::sync_folder(folder_of(path));
+    }
+    result
+}
+
+/// A second name for the file at `path`, under which it outlives its replacement; `None` where there is no file.
+fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
+    if path.symlink_metadata().is_err() {
+        return Ok(None);
+    }
+    let old = folder_of(path).join(fresh_name());
+    system::hard_link(path, &old).or_else(|_| system::rename(path, &old))?;
+    Ok(Some(old))
+}
+
+/// Creates the file `path`, in the place of an older one, with `contents`, and returns it open for writing at its end.
+/// Its temporary name is in `work_folder`.
+///
+/// # Errors
+/// What the file system says; an older file is then unchanged.
+pub(super) fn begin_file(work_folder: &Path, path: &Path, contents: &str) -> io::Result<File> {
+    let file = Temporary::create_in(work_folder)?;
+    system::write_all(&file.file, contents.as_bytes())?;
+    file.rename_to(path)
+}
+
+/// Replaces the file `path` by what `write` writes. Its temporary name is in `work_folder`.
+///
+/// # Errors
+/// What the file system says, or `write`; an older file is then unchanged.
+pub(super) fn replace_with(
+    work_folder: &Path,
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let file = Temporary::create_in(work_folder)?;
+    let mut buffered = BufWriter::with_capacity(BUFFER, Writer(&file.file));
+    write(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
+    system::sync(&file.file)?;
+    file.rename_to(path)?;
+    system::sync_folder(folder_of(path));
+    Ok(())
+}
+
+/// A file under a temporary name, which is removed when this is dropped.
+struct Temporary {
+    file: File,
+    path: PathBuf,
+}
+
+impl Temporary {
+    fn create_in(folder: &Path) -> io::Result<Self> {
+        loop {
+            let path = folder.join(fresh_name());
+            match system::create_new(&path) {
+                Ok(file) => return Ok(Self { file, path }),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn rename_to(mut self, path: &Path) -> io::Result<File> {
+        system::rename(&self.path, path)?;
+        self.path = PathBuf::new();
+        self.file.try_clone()
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.path.as_os_str().is_empty() {
+            let _ = system::remove_file(&self.path);
+        }
+    }
+}
+
+/// The folder that a file stands in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}

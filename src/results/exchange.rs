@@ -1,0 +1,398 @@
+//! The exchange of an older run's files for new ones, of which one is whole at every instant.
+//!
+//! 1. All new files are written into a working folder and made durable ([`Stage`]), with a plan of what replaces
+//!    what. Until here the older run is untouched.
+//! 2. The working folder is renamed to [`EXCHANGE`]. From this instant the new run is the valid one.
+//! 3. The files move into their places one by one, the replaced ones into the exchange folder. If a move
+//!    fails, the moves before it are undone, and the older run is whole again.
+//! 4. The exchange folder is removed.
+//!
+//! A process that is killed in step 3 leaves the exchange folder with its plan; the next command that opens the output
+//! folder, to write or to read, completes the exchange ([`complete`]). Files are identified by digest throughout: a
+//! file that neither run wrote is never moved.
+
+use super::atomic::folder_of;
+use super::claim::{Claim, RESULT};
+use super::digest::digest;
+use super::lock::Lock;
+use super::manifest::{FileRecord, FileState, MANIFEST, Manifest, stays_inside};
+use super::system;
+use super::work_folder::{WorkFolder, is_marked};
+use crate::error::InputError;
+use crate::input::read_text;
+use crate::threads;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Name of the folder of an exchange at work.
+pub(super) const EXCHANGE: &str = ".kmcfit-exchange";
+/// In a working folder: the new files, those that they replaced, and the plan.
+const NEW: &str = "new";
+const OLD: &str = "old";
+const PLAN: &str = "plan.json";
+/// Longest plan that is read, bytes: as long as the longest manifest.
+const LONGEST_PLAN: u64 = 1 << 24;
+/// Files that are made durable at once: each takes a thread and is open until then. A disk makes many durable in little
+/// more time than one.
+const AT_ONCE: usize = 16;
+
+/// Results on their way: written to a working folder, and put into their places together.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    folder: &'a Path,
+    claim: &'a Claim,
+    work: WorkFolder,
+    /// In the order in which they were added.
+    names: Vec<String>,
+    records: BTreeMap<String, FileRecord>,
+    unsynced: Vec<File>,
+}
+
+impl<'a> Stage<'a> {
+    pub(super) fn begin(folder: &'a Path, claim: &'a Claim) -> io::Result<Self> {
+        Ok(Self {
+            folder,
+            claim,
+            work: WorkFolder::create_in(folder)?,
+            names: Vec::new(),
+            records: BTreeMap::new(),
+            unsynced: Vec::new(),
+        })
+    }
+
+    /// Adds a file. It appears with the others when they are committed.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn write(&mut self, name: &str, contents: &str) -> io::Result<()> {
+        debug_assert!(self.claim.covers(name), "{name} was not claimed");
+        self.add(name, contents)?;
+        self.records
+            .insert(name.to_owned(), FileRecord::of(contents.as_bytes()));
+        Ok(())
+    }
+
+    fn add(&mut self, name: &str, contents: &str) -> io::Result<()> {
+        let path = self.work.path().join(NEW).join(name);
+        system::create_folders(folder_of(&path))?;
+        let file = system::create_new(&path)?;
+        system::write_all(&file, contents.as_bytes())?;
+        self.unsynced.push(file);
+        self.names.push(name.to_owned());
+        match self.unsynced.len() < AT_ONCE {
+            true => Ok(()),
+            false => self.sync(),
+        }
+    }
+
+    /// Makes the files durable that were added since the last time.
+    fn sync(&mut self) -> io::Result<()> {
+        let files = std::mem::take(&mut self.unsynced);
+        std::thread::scope(|scope| {
+            let syncs = files.iter().map(|file| {
+                // Without a thread to spare it only takes longer.
+                threads::spawn_scoped(scope, || system::sync(file)).map_err(|_| system::sync(file))
+            });
+            let syncs: Vec<_> = syncs.collect();
+            syncs.into_iter().try_for_each(|sync| match sync {
+                Ok(thread) => (thread.join())
+                    .unwrap_or_else(|_| Err(io::Error::other("a file was not made durable"))),
+                Err(done) => done,
+            })
+        })
+    }
+
+    /// Puts the files into their places, in the order in which they were added, those of an older run of the same
+    /// command aside, and writes the manifest.
+    ///
+    /// # Errors
+    /// What the file system says, or that a file in a new one's place is not the program's own. The older files
+    /// are then in their places, or the error says where the new ones are.
+    pub fn commit(mut self) -> io::Result<()> {
+        let refused = |error: InputError| io::Error::other(error.to_string());
+        let before = Manifest::read(self.folder).map_err(refused)?;
+        let manifest = Manifest::new(self.claim.command, std::mem::take(&mut self.records));
+        self.add(MANIFEST, &manifest.text())?;
+        self.sync()?;
+        let plan = self.plan(before.as_ref(), &manifest)?;
+        let text = serde_json::to_string(&plan).map_err(io::Error::other)?;
+        let file = system::create_new(&self.work.path().join(PLAN))?;
+        system::write_all(&file, text.as_bytes())?;
+        system::sync(&file)?;
+        let new = self.work.path().join(NEW);
+        plan.folders()
+            .for_each(|name| system::sync_folder(&new.join(name)));
+        system::sync_folder(self.work.path());
+        let exchange = self.folder.join(EXCHANGE);
+        self.work.rename_to(&exchange)?;
+        system::sync_folder(self.folder);
+        run(self.folder, &exchange, &plan)
+    }
+
+    /// What replaces what, checked against what stands in the folder now.
+    fn plan(&self, before: Option<&Manifest>, manifest: &Manifest) -> io::Result<Plan> {
+        let mut put = Vec::new();
+        for name in &self.names {
+            let path = self.folder.join(name);
+            let known = before.and_then(|before| before.files.get(name));
+            let known = match name == MANIFEST {
+                // It was read and found sound.
+                true if before.is_some() => Some(FileRecord::of(&std::fs::read(&path)?)),
+                _ => known.cloned(),
+            };
+            let state = known.as_ref().map(|record| record.state(&path));
+            let is_free = match state {
+                Some(state) => state != FileState::Changed,
+                None => path.symlink_metadata().is_err(),
+            };
+            if !is_free {
+                return Err(in_the_way(&path));
+            }
+            put.push(Put {
+                name: name.clone(),
+                replaces: known.filter(|_| state == Some(FileState::Unchanged)),
+            });
+        }
+        // The result document comes after what it speaks of.
+        put.sort_by_key(|put| (put.name == MANIFEST, put.name == RESULT));
+        let old = before.map(|before| &before.files).into_iter().flatten();
+        let remove = old.filter(|(name, _)| !manifest.files.contains_key(*name));
+        let remove = remove.map(|(name, record)| (name.clone(), record.clone()));
+        Ok(Plan::new(put, remove.collect()))
+    }
+}
+
+fn in_the_way(path: &Path) -> io::Error {
+    io::Error::other(format!(
+        "{} was not written by kmcfit, or was changed since, and would be replaced",
+        path.display()
+    ))
+}
+
+/// What an exchange does.
+#[derive(Debug, Serialize, Deserialize)]
+struct Plan {
+    put: Vec<Put>,
+    remove: BTreeMap<String, FileRecord>,
+    /// Digest of all the above.
+    checksum: String,
+}
+
+/// A new file, and the file of the older run whose place it takes.
+#[derive(Debug, Serialize, Deserialize)]
+struct Put {
+    name: String,
+    replaces: Option<FileRecord>,
+}
+
+impl Plan {
+    fn new(put: Vec<Put>, remove: BTreeMap<String, FileRecord>) -> Self {
+        let mut plan = Self {
+            put,
+            remove,
+            checksum: String::new(),
+        };
+        plan.checksum = plan.own_checksum();
+        plan
+    }
+
+    fn own_checksum(&self) -> String {
+        digest(format!("{:?}\n{:?}", self.put, self.remove).as_bytes())
+    }
+
+    /// The folders that files move into or out of, relative to the output folder.
+    fn folders(&self) -> impl Iterator<Item = &Path> {
+        let names = self.put.iter().map(|put| put.name.as_str());
+        let names = names.chain(self.remove.keys().map(String::as_str));
+        let folders = names.filter_map(|name| Path::new(name).parent());
+        folders.collect::<BTreeSet<_>>().into_iter()
+    }
+
+    fn is_sound(&self) -> bool {
+        let mut names = (self.put.iter().map(|put| &put.name)).chain(self.remove.keys());
+        self.checksum == self.own_checksum() && names.all(|name| stays_inside(name))
+    }
+}
+
+/// Moves the files of an exchange; after a failure the moves are undone.
+fn run(folder: &Path, exchange: &Path, plan: &Plan) -> io::Result<()> {
+    let moves = Moves {
+        folder,
+        new: exchange.join(NEW),
+        old: exchange.join(OLD),
+    };
+    let mut done = Vec::new();
+    let mut all = || {
+        for put in &plan.put {
+            done.extend(moves.put(put)?);
+        }
+        for (name, record) in &plan.remove {
+            done.extend(moves.remove(name, record)?);
+        }
+        Ok(())
+    };
+    let result: io::Result<()> = all();
+    let Err(error) = result else {
+        plan.folders()
+            .for_each(|name| system::sync_folder(&folder.join(name)));
+        // What is left of the exchange folder is removed now, or by the next run.
+        let _ = WorkFolder::reclaim(exchange);
+        return Ok(());
+    };
+    let undone = done
+        .iter()
+        .rev()
+        .try_for_each(|one: &Move| moves.undo(one))
+        .and_then(|()| WorkFolder::reclaim(exchange));
+    Err(match undone {
+        Ok(_) => error,
+        Err(_) => io::Error::other(format!(
+            "{error}; the new files are complete in {}, and the next kmcfit command on this folder \
+             puts them into their places",
+            exchange.display()
+        )),
+    })
+}
+
+/// A file that was moved.
+struct Move {
+    name: String,
+    /// Whether a new file came.
+    came: bool,
+    /// Whether an old one went.
+    went: bool,
+}
+
+/// The places between which files move.
+struct Moves<'a> {
+    folder: &'a Path,
+    new: PathBuf,
+    old: PathBuf,
+}
+
+impl Moves<'_> {
+    /// Puts a new file into its place; nothing if that was done before.
+    fn put(&self, put: &Put) -> io::Result<Option<Move>> {
+        let (new, place) = (self.new.join(&put.name), self.folder.join(&put.name));
+        if new.symlink_metadata().is_err() {
+            return Ok(None);
+        }
+        self.create_parent(&place)?;
+        let state = put.replaces.as_ref().map(|record| record.state(&place));
+        let went = match state {
+            Some(FileState::Unchanged) => true,
+            Some(FileState::Missing) => false,
+            None if place.symlink_metadata().is_err() => false,
+            _ => return Err(in_the_way(&place)),
+        };
+        let old = self.old.join(&put.name);
+        if went {
+            self.set_aside(&place, &old)?;
+        }
+        if let Err(error) = system::rename(&new, &place) {
+            if went && place.symlink_metadata().is_err() {
+                system::rename(&old, &place)?;
+            }
+            return Err(error);
+        }
+        Ok(Some(Move {
+            name: put.name.clone(),
+            came: true,
+            went,
+        }))
+    }
+
+    /// Gives an old file a second name, so that its own stays taken until the new file replaces it in one step; or,
+    /// where the file system has no such links, moves it away.
+    fn set_aside(&self, place: &Path, old: &Path) -> io::Result<()> {
+        system::create_folders(folder_of(old))?;
+        // Left by an exchange that was cut short, with the same contents.
+        system::remove_file(old)?;
+        system::hard_link(place, old).or_else(|_| system::rename(place, old))
+    }
+
+    /// Removes a file of the older run; one that was changed is no longer the program's own and stays.
+    fn remove(&self, name: &str, record: &FileRecord) -> io::Result<Option<Move>> {
+        let (place, old) = (self.folder.join(name), self.old.join(name));
+        if record.state(&place) != FileState::Unchanged {
+            return Ok(None);
+        }
+        system::create_folders(folder_of(&old))?;
+        system::rename(&place, &old)?;
+        Ok(Some(Move {
+            name: name.to_owned(),
+            came: false,
+            went: true,
+        }))
+    }
+
+    fn undo(&self, one: &Move) -> io::Result<()> {
+        let place = self.folder.join(&one.name);
+        if one.came {
+            system::rename(&place, &self.new.join(&one.name))?;
+        }
+        if one.went {
+            system::rename(&self.old.join(&one.name), &place)?;
+        }
+        Ok(())
+    }
+
+    /// Creates the folder of a file; a link in its place could lead out of the output folder.
+    fn create_parent(&self, place: &Path) -> io::Result<()> {
+        let parent = folder_of(place);
+        match parent != self.folder && parent.is_symlink() {
+            true => Err(io::Error::other(format!(
+                "{} is a link, and results would be written elsewhere",
+                parent.display()
+            ))),
+            false => system::create_folders(parent),
+        }
+    }
+}
+
+/// Completes an exchange that was cut short in a folder which is only read. While another run holds the folder,
+/// completing it is that run's work.
+///
+/// # Errors
+/// If it cannot be completed.
+pub fn complete(folder: &Path) -> Result<(), InputError> {
+    if !folder.join(EXCHANGE).is_dir() {
+        return Ok(());
+    }
+    match Lock::take(folder) {
+        Ok(_lock) => complete_locked(folder),
+        Err(_) => Ok(()),
+    }
+}
+
+/// [`complete`] in a folder that this run has locked.
+pub(super) fn complete_locked(folder: &Path) -> Result<(), InputError> {
+    let exchange = folder.join(EXCHANGE);
+    if exchange.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let unusable = |problem: &str| {
+        InputError::file(&exchange, problem)
+            .expected("what a run of kmcfit left here that was killed, or nothing")
+            .hint("move it away")
+    };
+    if exchange.is_symlink() || !is_marked(&exchange) {
+        return Err(unusable("this folder was not written by kmcfit"));
+    }
+    let text = read_text(
+        &exchange.join(PLAN),
+        "the plan of an exchange",
+        LONGEST_PLAN,
+    )?;
+    let plan: Option<Plan> = serde_json::from_str(&text).ok();
+    let plan = plan.filter(Plan::is_sound);
+    let plan = plan.ok_or_else(|| unusable("the plan of this exchange is damaged"))?;
+    run(folder, &exchange, &plan).map_err(|error| {
+        InputError::file(folder, "a run that was killed cannot be completed here")
+            .found(error)
+            .expected("a folder that can be written to")
+    })
+}

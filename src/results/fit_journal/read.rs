@@ -1,0 +1,133 @@
+//! Reading the journal and checkpoint of a fit that did not come to its end.
+
+use super::{CHECKPOINT, Entry, FIT_JOURNAL, Line};
+use crate::error::InputError;
+use crate::results::journal::{JournalText, Mark, path_in};
+use crate::solvers::{Kept, Row, Standing};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const WHAT: &str = "the journal of a fit that was begun by `kmcfit fit`";
+
+/// A journal that was read.
+pub(super) struct Reader {
+    folder: PathBuf,
+    pub text: JournalText,
+}
+
+/// What a journal and its checkpoint hold.
+#[derive(Debug, Default)]
+pub(super) struct Contents {
+    pub units: BTreeMap<u64, Unit>,
+    /// Where the running search stood, and which unit it was.
+    pub standing: Option<(u64, Standing)>,
+    /// Where the unit that is at work begins.
+    pub begin: Mark,
+    /// The end of what was recalled; `None` when all of it was.
+    pub end: Option<Mark>,
+}
+
+/// What a journal holds of one unit.
+#[derive(Debug)]
+pub(super) struct Unit {
+    pub begin: Mark,
+    pub end: Mark,
+    /// What it came to, if it ended.
+    pub kept: Option<Kept>,
+    /// The iterations, and where the line of each ends.
+    rows: Vec<(Row, Mark)>,
+}
+
+impl Unit {
+    fn new(begin: Mark) -> Self {
+        Self {
+            begin,
+            end: begin,
+            kept: None,
+            rows: Vec::new(),
+        }
+    }
+
+    /// Takes a line; whether it can follow those before it.
+    fn take(&mut self, entry: Entry, end: Mark) -> bool {
+        if self.kept.is_some() {
+            return false;
+        }
+        match entry {
+            Entry::Row(row) if row.iteration == self.rows.len() as u64 + 1 => {
+                self.rows.push((row, end));
+            }
+            Entry::End(standing) if standing.iterations == self.rows.len() as u64 => {
+                let rows = std::mem::take(&mut self.rows).into_iter();
+                let rows = rows.map(|(row, _)| row).collect();
+                self.kept = Some(Kept::Search(rows, standing));
+            }
+            Entry::Piece(piece) if self.rows.is_empty() => self.kept = Some(Kept::Piece(piece.0)),
+            Entry::Nothing if self.rows.is_empty() => self.kept = Some(Kept::Nothing),
+            _ => return false,
+        }
+        self.end = end;
+        true
+    }
+
+    /// How a unit that had not ended goes on, and the end of what is of use for it.
+    pub fn at_work(mut self, standing: Option<Standing>) -> (Mark, Option<Kept>) {
+        let usable = standing.and_then(|standing| {
+            let iterations = usize::try_from(standing.iterations).ok()?;
+            let (_, end) = *self.rows.get(iterations.checked_sub(1)?)?;
+            Some((standing, iterations, end))
+        });
+        match usable {
+            None => (self.begin, None),
+            Some((standing, iterations, end)) => {
+                self.rows.truncate(iterations);
+                let rows = self.rows.into_iter().map(|(row, _)| row).collect();
+                (end, Some(Kept::Search(rows, Box::new(standing))))
+            }
+        }
+    }
+}
+
+impl Reader {
+    /// Reads the journal in a folder.
+    pub fn open(folder: &Path) -> Result<Self, InputError> {
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            text: JournalText::read(&path_in(folder, FIT_JOURNAL), WHAT)?,
+        })
+    }
+
+    /// What it holds up to the first line that is damaged or does not follow from those before, where that line begins,
+    /// and the checkpoint if it is of this fit.
+    pub fn contents(&self) -> (Contents, Mark) {
+        let mut end = self.text.begin;
+        let mut units: BTreeMap<u64, Unit> = BTreeMap::new();
+        for (Line(unit, entry), next) in self.text.lines() {
+            let last = units.last_key_value().map_or(0, |(unit, _)| *unit);
+            let is_next = unit == last + 1 && units.get(&last).is_none_or(|u| u.kept.is_some());
+            if !(is_next || unit == last && last > 0) {
+                break;
+            }
+            let known = units.entry(unit).or_insert_with(|| Unit::new(end));
+            if !known.take(entry, next) {
+                break;
+            }
+            end = next;
+        }
+        let contents = Contents {
+            units,
+            standing: self.standing(),
+            begin: Mark::default(),
+            end: Some(self.text.begin),
+        };
+        (contents, end)
+    }
+
+    /// The checkpoint, if it is of this fit and undamaged.
+    fn standing(&self) -> Option<(u64, Standing)> {
+        let checkpoint = JournalText::read(&path_in(&self.folder, CHECKPOINT), WHAT).ok()?;
+        let is_of_this_fit = checkpoint.heading == self.text.heading;
+        let (standing, _) = checkpoint.lines().next()?;
+        is_of_this_fit.then_some(standing)
+    }
+}

@@ -1,0 +1,161 @@
+//! The first line of a journal: which command with which inputs the work belongs to.
+
+use super::digest::digest;
+use crate::config::ModelFile;
+use crate::error::InputError;
+use crate::input::{LONGEST_TABLE, read_bytes};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Version of the format of journals.
+const FORMAT: u32 = 2;
+
+/// Which work a journal holds. It is resumed by the same version of kmcfit with the same inputs only.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Heading {
+    /// Version of the format.
+    pub format: u32,
+    /// Version of kmcfit: another one may compute other bits.
+    pub version: String,
+    /// The command: `fit`, `study` or `compare`.
+    pub command: String,
+    /// Model files and folders of runs, as they were given.
+    pub inputs: Vec<PathBuf>,
+    /// Values that were given beside the model (`--set`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<String>,
+    /// Whether figures are drawn.
+    pub figures: bool,
+    /// Least time between two checkpoints, s, where it was given.
+    pub checkpoint: Option<f64>,
+    /// The inputs and the files that they read.
+    pub sources: Vec<SourceFile>,
+}
+
+/// A file on which the results depend.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// The file.
+    pub file: PathBuf,
+    /// Its SHA-256 digest, or why there is none.
+    pub sha256: String,
+}
+
+impl Heading {
+    /// The heading for a command with these inputs.
+    pub fn new(command: &str, inputs: Vec<PathBuf>) -> Self {
+        Self {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").into(),
+            command: command.into(),
+            inputs,
+            overrides: Vec::new(),
+            figures: true,
+            checkpoint: None,
+            sources: Vec::new(),
+        }
+    }
+
+    /// The heading for a command on one model; `checkpoint` is the least time between two checkpoints, s.
+    pub fn of_model(
+        command: &str,
+        file: &ModelFile,
+        figures: bool,
+        checkpoint: Option<f64>,
+    ) -> Self {
+        let mut heading = Self::new(command, vec![file.path.clone()]).with_model(file);
+        heading.overrides = file.override_texts();
+        heading.figures = figures;
+        heading.checkpoint = checkpoint;
+        heading
+    }
+
+    /// Adds a model and the files that it reads to the sources.
+    #[must_use]
+    pub fn with_model(mut self, file: &ModelFile) -> Self {
+        self.sources.push(SourceFile {
+            file: file.path.clone(),
+            sha256: digest(file.text.as_bytes()),
+        });
+        for path in file.data_files() {
+            self = self.with_file(path);
+        }
+        self
+    }
+
+    /// Adds a file to the sources.
+    #[must_use]
+    pub fn with_file(mut self, file: PathBuf) -> Self {
+        let bytes = read_bytes(&file, "a file of measurements", LONGEST_TABLE);
+        self.sources.push(SourceFile {
+            sha256: bytes.map_or("not readable".into(), |bytes| digest(&bytes)),
+            file,
+        });
+        self
+    }
+
+    /// Refuses a heading of another format.
+    pub(super) fn check_format(value: &Value, journal: &Path) -> Result<(), InputError> {
+        match value.get("format").and_then(Value::as_u64) {
+            Some(format) if format != u64::from(FORMAT) => Err(InputError::file(
+                journal,
+                "the journal has another format version",
+            )
+            .found(format)
+            .expected(FORMAT.to_string())),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses to resume work that was begun with something else than this.
+    ///
+    /// # Errors
+    /// If version, values or files differ.
+    pub(super) fn check_same(&self, before: &Self, journal: &Path) -> Result<(), InputError> {
+        let command = &before.command;
+        let differs = |what: &str, found: String, expected: String| {
+            InputError::file(journal, format!("this {command} was begun {what}"))
+                .found(found)
+                .expected(format!("{expected}, or a new {command}"))
+        };
+        if before.version != self.version {
+            return Err(differs(
+                "by another version of kmcfit",
+                format!("version {}", before.version),
+                format!("version {}", self.version),
+            ));
+        }
+        if before.command != self.command || before.inputs != self.inputs {
+            return Err(differs(
+                "with other arguments",
+                before.text_of_command(),
+                self.text_of_command(),
+            ));
+        }
+        if before.overrides != self.overrides {
+            return Err(differs(
+                "with other values beside the model",
+                before.overrides.join(", "),
+                "the same values".into(),
+            ));
+        }
+        let changed = |source: &&SourceFile| !before.sources.contains(source);
+        let changed = self.sources.iter().find(changed);
+        let missing = |source: &&SourceFile| !self.sources.contains(source);
+        match changed.or_else(|| before.sources.iter().find(missing)) {
+            Some(source) => Err(InputError::file(
+                &source.file,
+                format!("this file has changed since the {command} was begun"),
+            )
+            .expected(format!("the same model and data, or a new {command}"))),
+            None => Ok(()),
+        }
+    }
+
+    fn text_of_command(&self) -> String {
+        let inputs = self.inputs.iter().map(|input| input.display().to_string());
+        let words = std::iter::once(self.command.clone()).chain(inputs);
+        words.collect::<Vec<_>>().join(" ")
+    }
+}

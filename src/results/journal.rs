@@ -1,0 +1,287 @@
+//! The format of all journals: text files to which lines are appended while a command works.
+//!
+//! A line is a JSON value, a tab, and 16 hexadecimal digits: the chained checksum, the first 8 bytes of
+//! `SHA-256(previous checksum || JSON)`. The first line holds the [`Heading`]. A line whose checksum is wrong was cut off,
+//! edited, moved or taken from another journal: it ends what is read, and the work that it and the lines
+//! after it stand for is done again.
+
+use super::atomic::begin_file;
+use super::heading::Heading;
+use super::system::{self, Writer};
+use super::work_folder::WorkFolder;
+use crate::error::InputError;
+use crate::input::read_bytes;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// The journals and checkpoints that can stand in an output folder.
+pub(super) const NAMES: [&str; 4] = [
+    super::FIT_JOURNAL,
+    super::CHECKPOINT,
+    super::STUDY_JOURNAL,
+    super::COMPARE_JOURNAL,
+];
+/// Longest journal that is read, bytes.
+const LONGEST: u64 = 1 << 30;
+/// Longest first line of a journal, bytes: the files of 2000 records have paths and digests in it.
+const LONGEST_HEADING: u64 = 1 << 24;
+/// Bytes that are collected before they are written.
+const BUFFER: usize = 1 << 16;
+/// Digits of a checksum at the end of a line, with the tab before them.
+const TAIL: usize = 17;
+
+/// A place between two lines: the bytes before it, and the checksum of the line that ends there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Mark {
+    pub bytes: u64,
+    chain: u64,
+}
+
+/// The checksum of a line from that of the line before and its JSON.
+struct Chain(Sha256);
+
+impl Chain {
+    fn after(previous: u64) -> Self {
+        Self(Sha256::new().chain_update(previous.to_be_bytes()))
+    }
+
+    fn finish(self) -> u64 {
+        let digest = self.0.finalize();
+        digest[..8]
+            .iter()
+            .fold(0, |sum, byte| sum << 8 | u64::from(*byte))
+    }
+}
+
+/// Appends a line to a text; the place behind it.
+pub(super) fn push_line(
+    text: &mut Vec<u8>,
+    mark: Mark,
+    entry: &impl Serialize,
+) -> io::Result<Mark> {
+    let begin = text.len();
+    serde_json::to_writer(&mut *text, entry)?;
+    let mut chain = Chain::after(mark.chain);
+    chain.0.update(&text[begin..]);
+    let chain = chain.finish();
+    text.extend(format!("\t{chain:016x}\n").bytes());
+    Ok(Mark {
+        bytes: mark.bytes + (text.len() - begin) as u64,
+        chain,
+    })
+}
+
+/// A writer that takes the checksum of what passes.
+struct Summing<W> {
+    inner: W,
+    chain: Chain,
+    bytes: u64,
+}
+
+impl<W: Write> Write for Summing<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.inner.write(bytes)?;
+        self.chain.0.update(&bytes[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+/// Writes a line piece by piece: as a text a long one would take a multiple of the memory of a fit.
+pub(super) fn write_line(out: impl Write, mark: Mark, entry: &impl Serialize) -> io::Result<Mark> {
+    let mut summing = Summing {
+        inner: out,
+        chain: Chain::after(mark.chain),
+        bytes: 0,
+    };
+    serde_json::to_writer(&mut summing, entry)?;
+    let Summing {
+        mut inner,
+        chain,
+        bytes,
+    } = summing;
+    let chain = chain.finish();
+    inner.write_all(format!("\t{chain:016x}\n").as_bytes())?;
+    inner.flush()?;
+    Ok(Mark {
+        bytes: mark.bytes + bytes + TAIL as u64 + 1,
+        chain,
+    })
+}
+
+/// The JSON of a line whose checksum is right, and the place behind it; `None` for any other line.
+fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
+    let text = line.strip_suffix(b"\n")?;
+    let (json, tail) = text.split_at_checked(text.len().checked_sub(TAIL)?)?;
+    let digits = std::str::from_utf8(tail.strip_prefix(b"\t")?).ok()?;
+    let mut chain = Chain::after(mark.chain);
+    chain.0.update(json);
+    let chain = chain.finish();
+    let mark = Mark {
+        bytes: mark.bytes + line.len() as u64,
+        chain,
+    };
+    // As text: other spellings of the same number were not written by the program.
+    (format!("{chain:016x}") == digits).then_some((json, mark))
+}
+
+/// Whether the first line of a file is the heading of a journal with its checksum.
+pub(super) fn is_own(path: &Path) -> bool {
+    let is_file = path.symlink_metadata().is_ok_and(|m| m.is_file());
+    let first_line = || {
+        let mut line = Vec::new();
+        let file = BufReader::new(File::open(path).ok()?);
+        file.take(LONGEST_HEADING)
+            .read_until(b'\n', &mut line)
+            .ok()?;
+        Some(line)
+    };
+    is_file && first_line().is_some_and(|line| checked(&line, Mark::default()).is_some())
+}
+
+/// A journal at work. Lines are appended and never changed.
+#[derive(Debug)]
+pub(super) struct JournalFile {
+    file: File,
+    /// The end of what was written.
+    pub end: Mark,
+}
+
+impl JournalFile {
+    /// A new journal, in the place of an older one.
+    pub fn begin(work: &WorkFolder, path: &Path, heading: &Heading) -> io::Result<Self> {
+        let mut text = Vec::new();
+        let end = push_line(&mut text, Mark::default(), heading)?;
+        let text = String::from_utf8(text).map_err(io::Error::other)?;
+        let file = begin_file(work.path(), path, &text)?;
+        Ok(Self { file, end })
+    }
+
+    /// A journal that was read as far as `end`; the rest is dropped.
+    pub fn resume(path: &Path, end: Mark) -> Result<Self, InputError> {
+        let resumed = system::open_to_append(path).and_then(|file| {
+            let mut journal = Self { file, end };
+            journal.truncate(end)?;
+            Ok(journal)
+        });
+        resumed.map_err(|error| {
+            InputError::file(path, "the journal cannot be written to").found(error)
+        })
+    }
+
+    /// Drops what stands behind a place.
+    pub fn truncate(&mut self, end: Mark) -> io::Result<()> {
+        system::truncate(&self.file, end.bytes)?;
+        self.end = end;
+        Ok(())
+    }
+
+    /// Appends lines that were made by [`push_line`] behind the end.
+    pub fn append_text(&mut self, text: &[u8], end: Mark) -> io::Result<()> {
+        system::write_all(&self.file, text)?;
+        self.end = end;
+        Ok(())
+    }
+
+    /// Appends a line.
+    pub fn append(&mut self, entry: &impl Serialize) -> io::Result<()> {
+        let out = BufWriter::with_capacity(BUFFER, Writer(&self.file));
+        self.end = write_line(out, self.end, entry)?;
+        Ok(())
+    }
+
+    /// Makes what was written durable.
+    pub fn sync(&self) -> io::Result<()> {
+        system::sync(&self.file)
+    }
+}
+
+/// A journal that was read.
+pub(super) struct JournalText {
+    bytes: Vec<u8>,
+    /// The first line.
+    pub heading: Heading,
+    /// The end of the first line.
+    pub begin: Mark,
+}
+
+impl JournalText {
+    /// Reads a journal or checkpoint; `what` says what it should be.
+    ///
+    /// # Errors
+    /// If there is none of this format.
+    pub fn read(path: &Path, what: &'static str) -> Result<Self, InputError> {
+        if path.is_symlink() {
+            return Err(InputError::file(path, "this is a link").expected(what));
+        }
+        let bytes = read_bytes(path, what, LONGEST)?;
+        let length = bytes
+            .iter()
+            .position(|b| *b == b'\n')
+            .map_or(bytes.len(), |i| i + 1);
+        let line = &bytes[..length];
+        // The version of the format comes first: another one may have another kind of line.
+        let json = line.split(|b| matches!(b, b'\t' | b'\n')).next();
+        let value: serde_json::Value = serde_json::from_slice(json.unwrap_or_default())
+            .map_err(|error| no_journal(path, what).found(error))?;
+        Heading::check_format(&value, path)?;
+        let (_, begin) = checked(line, Mark::default())
+            .ok_or_else(|| no_journal(path, what).found("a first line with a wrong checksum"))?;
+        let heading =
+            serde_json::from_value(value).map_err(|error| no_journal(path, what).found(error))?;
+        Ok(Self {
+            bytes,
+            heading,
+            begin,
+        })
+    }
+
+    /// The lines behind the heading up to the first that is damaged, each with the place behind it.
+    pub fn lines<T: DeserializeOwned>(&self) -> impl Iterator<Item = (T, Mark)> {
+        let start = usize::try_from(self.begin.bytes).unwrap_or(usize::MAX);
+        let mut rest = self.bytes.get(start..).unwrap_or_default();
+        let mut mark = self.begin;
+        std::iter::from_fn(move || {
+            let length = rest.iter().position(|b| *b == b'\n')? + 1;
+            let (line, behind) = rest.split_at(length);
+            let (json, next) = checked(line, mark)?;
+            let entry = serde_json::from_slice(json).ok()?;
+            (rest, mark) = (behind, next);
+            Some((entry, next))
+        })
+    }
+}
+
+fn no_journal(path: &Path, what: &str) -> InputError {
+    InputError::file(path, "this is no journal of kmcfit, or it was edited").expected(what)
+}
+
+/// The lines of a text, each a JSON value, with the checksums that they have behind the heading of a journal: for
+/// tests that change what a journal holds.
+#[doc(hidden)]
+pub fn with_checksums(heading: &Heading, lines: &[u8]) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    let mut mark = push_line(&mut text, Mark::default(), heading)?;
+    for json in lines.split_inclusive(|b| *b == b'\n') {
+        let json = json.strip_suffix(b"\n").unwrap_or(json);
+        let mut chain = Chain::after(mark.chain);
+        chain.0.update(json);
+        mark.chain = chain.finish();
+        text.extend(json);
+        text.extend(format!("\t{:016x}\n", mark.chain).bytes());
+    }
+    Ok(text)
+}
+
+/// Where a journal of this name stands in a folder.
+pub(super) fn path_in(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name)
+}

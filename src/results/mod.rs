@@ -1,0 +1,30 @@
+//! Results on disk: output folders, atomic files, journals.
+//!
+//! Files appear whole or not at all, a run replaces an older one as a whole, and only files that the program can prove
+//! to have written are ever replaced or removed. All changes to the file system pass `system`.
+
+mod analysis_journal;
+mod atomic;
+mod claim;
+mod digest;
+mod exchange;
+mod fit_journal;
+mod heading;
+mod journal;
+mod lock;
+mod manifest;
+mod output_folder;
+mod system;
+mod work_folder;
+
+pub use analysis_journal::{AnalysisJournal, COMPARE_JOURNAL, STUDY_JOURNAL};
+pub use atomic::{write_together, write_whole};
+pub use claim::{Claim, RESULT};
+pub use digest::{digest, digest_of_file};
+pub use exchange::{Stage, complete};
+pub use fit_journal::{CHECKPOINT, FIT_JOURNAL, FitJournal};
+pub use heading::{Heading, SourceFile};
+#[doc(hidden)]
+pub use journal::with_checksums;
+pub use manifest::{FileRecord, MANIFEST, Manifest};
+pub use output_folder::OutputFolder;

@@ -1,0 +1,264 @@
+//! Output folders: checked before the work begins, written as a whole at its end.
+
+use super::claim::Claim;
+use super::exchange::{self, Stage};
+use super::journal;
+use super::lock::Lock;
+use super::manifest::{FileState, MANIFEST, Manifest};
+use super::system;
+use super::work_folder::{self, WorkFolder};
+use crate::error::{InputError, Place};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A folder for the results of one command, locked against other runs as long as this lives.
+///
+/// The folder may hold files of the user, which stay as they are, and the results of an older run of the same
+/// command, which the new results replace ([`Stage::commit`]).
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    claim: Claim,
+    /// Whether this run created it.
+    is_new: bool,
+    _lock: Option<Lock>,
+}
+
+impl Drop for OutputFolder {
+    /// A folder that was created for nothing goes.
+    fn drop(&mut self) {
+        if self.is_new {
+            // Refused where anything stands in it.
+            let _ = system::remove_folder(&self.path);
+        }
+    }
+}
+
+impl OutputFolder {
+    /// Creates the folder if need be, locks it, completes an exchange that was cut short, and checks that the files of
+    /// `claim` can be written.
+    ///
+    /// # Errors
+    /// If the folder cannot be created or written to, another run uses it, it holds the results of another command, or
+    /// a file that the claim covers is an input, was not written by kmcfit or was changed since. The error names
+    /// the file, and nothing in the folder has changed.
+    pub fn prepare(path: &Path, claim: Claim) -> Result<Self, InputError> {
+        let refuse = |problem: &str, error: &io::Error| {
+            InputError::new(Place::Argument("--out".into()), problem)
+                .found(format!("{}: {error}", path.display()))
+                .expected("a folder that can be written to")
+        };
+        let is_new = !path.exists();
+        system::create_folders(path).map_err(|e| refuse("the output folder cannot be made", &e))?;
+        let lock = Lock::take(path).map_err(|_| taken(path))?;
+        exchange::complete_locked(path)?;
+        work_folder::remove_leftovers(path);
+        let manifest = Manifest::read(path)?;
+        let folder = Self {
+            path: path.to_path_buf(),
+            claim,
+            is_new,
+            _lock: lock,
+        };
+        folder.check_command(manifest.as_ref())?;
+        folder.check_inputs(manifest.as_ref())?;
+        folder.check_places(manifest.as_ref())?;
+        folder.check_journals()?;
+        WorkFolder::create_in(path)
+            .map_err(|e| refuse("the output folder cannot be written to", &e))?;
+        Ok(folder)
+    }
+
+    /// [`OutputFolder::prepare`] for a folder inside this one. A link in its place is refused: it could lead out.
+    ///
+    /// # Errors
+    /// As for [`OutputFolder::prepare`].
+    pub fn prepare_inside(&self, name: &str, claim: Claim) -> Result<Self, InputError> {
+        let path = self.path.join(name);
+        match path.is_symlink() {
+            true => Err(a_link(&path)),
+            false => Self::prepare(&path, claim),
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Begins to write results.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn stage(&self) -> io::Result<Stage<'_>> {
+        Stage::begin(&self.path, &self.claim)
+    }
+
+    /// A folder holds the results of one command.
+    fn check_command(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
+        match manifest {
+            Some(manifest) if manifest.command != self.claim.command => Err(InputError::new(
+                Place::Argument("--out".into()),
+                "this folder holds the results of another command",
+            )
+            .found(format!(
+                "{}: results of `kmcfit {}`",
+                self.path.display(),
+                manifest.command
+            ))
+            .expected(format!(
+                "a new folder, or one with results of `kmcfit {}`",
+                self.claim.command
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a relative path is one that the command may write or remove.
+    fn is_claimed(&self, name: &str, manifest: Option<&Manifest>) -> bool {
+        self.claim.covers(name)
+            || name == MANIFEST
+            || self.claim.journals.contains(&name)
+            || manifest.is_some_and(|manifest| manifest.files.contains_key(name))
+    }
+
+    /// No input may be replaced.
+    fn check_inputs(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
+        let Ok(folder) = self.path.canonicalize() else {
+            return Ok(());
+        };
+        for input in &self.claim.inputs {
+            let Ok(path) = input.canonicalize() else {
+                continue;
+            };
+            let Ok(inside) = path.strip_prefix(&folder) else {
+                continue;
+            };
+            let parts = inside.components().map(|c| c.as_os_str().to_string_lossy());
+            let name = parts.collect::<Vec<_>>().join("/");
+            if self.is_claimed(&name, manifest) {
+                return Err(
+                    InputError::file(input, "this input would be replaced by a result")
+                        .found(format!("--out {}", self.path.display()))
+                        .expected("another output folder, or another place for the input"),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Every file that may be written is missing so far, or the program's own.
+    fn check_places(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
+        if let Some(manifest) = manifest {
+            for (name, record) in &manifest.files {
+                let path = self.path.join(name);
+                self.check_parent(name)?;
+                if record.state(&path) == FileState::Changed {
+                    return Err(InputError::file(
+                        &path,
+                        "this file was changed since kmcfit wrote it, and would be replaced",
+                    )
+                    .expected("the file as it was written, or none")
+                    .hint("move it away, or give another folder with --out"));
+                }
+            }
+        }
+        let is_own =
+            |name: &str| manifest.is_some_and(|manifest| manifest.files.contains_key(name));
+        for name in self.claim.fixed().filter(|name| !is_own(name)) {
+            self.check_parent(name)?;
+            self.check_missing(name)?;
+        }
+        for family in &self.claim.families {
+            self.check_parent(&format!("{}/", family.folder))?;
+            let entries = std::fs::read_dir(self.path.join(family.folder));
+            for entry in entries.into_iter().flatten().flatten() {
+                let file_name = entry.file_name();
+                let name = format!("{}/{}", family.folder, file_name.to_string_lossy());
+                if family.covers(&file_name.to_string_lossy()) && !is_own(&name) {
+                    return Err(unknown(&self.path.join(name)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The folders above a relative path are folders, or missing.
+    fn check_parent(&self, name: &str) -> Result<(), InputError> {
+        for (end, _) in name.match_indices('/') {
+            let folder = self.path.join(&name[..end]);
+            if folder.is_symlink() {
+                return Err(a_link(&folder));
+            }
+            if folder.exists() && !folder.is_dir() {
+                return Err(InputError::file(
+                    &folder,
+                    "this is a file where results need a folder",
+                )
+                .expected("a folder, or nothing")
+                .hint("move it away, or give another folder with --out"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_missing(&self, name: &str) -> Result<(), InputError> {
+        let path = self.path.join(name);
+        match path.symlink_metadata() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            _ => Err(unknown(&path)),
+        }
+    }
+
+    /// A journal may be begun anew where an older one of the same command stands.
+    fn check_journals(&self) -> Result<(), InputError> {
+        for name in journal::NAMES {
+            let path = self.path.join(name);
+            let is_there = path.symlink_metadata().is_ok();
+            match self.claim.journals.contains(&name) {
+                true if is_there && !journal::is_own(&path) => return Err(unknown(&path)),
+                false if journal::is_own(&path) => {
+                    return Err(InputError::file(
+                        &path,
+                        "this folder holds unfinished work of another command",
+                    )
+                    .expected("a folder without it")
+                    .hint(format!(
+                        "finish it with `kmcfit resume {}`, or give another folder with --out",
+                        self.path.display()
+                    )));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn taken(path: &Path) -> InputError {
+    InputError::new(
+        Place::Argument("--out".into()),
+        "another run is writing to this folder",
+    )
+    .found(path.display())
+    .expected("a folder of its own for each run")
+    .hint("wait for the other run, or give another folder with --out")
+}
+
+fn a_link(path: &Path) -> InputError {
+    InputError::file(
+        path,
+        "this is a link, and results would be written elsewhere",
+    )
+    .expected("a folder, or nothing")
+    .hint("remove the link, or give another folder with --out")
+}
+
+fn unknown(path: &Path) -> InputError {
+    InputError::file(
+        path,
+        "this file was not written by kmcfit, and would be replaced",
+    )
+    .expected("an output folder without it")
+    .hint("move it away, or give another folder with --out")
+}

@@ -1,0 +1,201 @@
+//! Output folders that hold something: files of the user, inputs, runs of other commands, links.
+
+use crate::tree::{settled, tree};
+use crate::workbench::{MODEL, Workbench};
+
+/// The program refuses with exit code 2 and a message about this path, and nothing has changed.
+fn refused(bench: &Workbench, arguments: &[&str], about: &str) -> String {
+    let before = tree(&bench.path(""));
+    let (code, stdout, stderr) = bench.run(arguments);
+    assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+    assert!(
+        stderr.starts_with(&format!("error: {about}: ")),
+        "{arguments:?}: {stderr}"
+    );
+    assert!(tree(&bench.path("")) == before, "{arguments:?}: {stderr}");
+    stderr
+}
+
+/// A project folder as output folder: the measurements and drawings in it are the user's.
+#[test]
+fn a_project_folder_keeps_its_files() {
+    let bench = Workbench::with_small_model();
+    let model = MODEL.replace("data: readings.csv", "data: readings/paper.csv");
+    bench.write("model.yaml", &model);
+    bench.write("readings/paper.csv", &bench.read("readings.csv"));
+    bench.write("readings/other.csv", "t_s,y_m\n0,1\n");
+    bench.write("figures/my_drawing.svg", "<svg/>");
+    let before = tree(&bench.path(""));
+    bench.run_to(0, &["fit", "model.yaml", "--out", "."]);
+    let after = tree(&bench.path(""));
+    for (name, entry) in &before {
+        assert!(after.get(name) == Some(entry), "{name}");
+    }
+    assert!(bench.path("figures/motion.svg").exists());
+    // Once more: only the program's own files are replaced.
+    bench.run_to(0, &["fit", "model.yaml", "--out", ".", "--no-report"]);
+    let after = tree(&bench.path(""));
+    for (name, entry) in &before {
+        assert!(after.get(name) == Some(entry), "{name}");
+    }
+    assert!(!bench.path("figures/motion.svg").exists());
+}
+
+/// Whatever stands in the place of a result is named before the fit.
+#[test]
+fn files_in_the_way_are_refused_before_the_fit() {
+    for name in [
+        "result.json",
+        "history.csv",
+        "report.html",
+        "kmcfit-manifest.json",
+        "fit.journal",
+        "fit.checkpoint",
+        "figures/motion.svg",
+        "readings/1-displacement.csv",
+    ] {
+        let bench = Workbench::with_small_model();
+        bench.write(&format!("run/{name}"), "mine\n");
+        let fit = ["fit", "model.yaml", "--out", "run"];
+        refused(&bench, &fit, &format!("run/{name}"));
+    }
+    for name in ["history.csv/", "figures/motion.svg/", "fit.journal/"] {
+        let bench = Workbench::with_small_model();
+        bench.write(&format!("run/{name}mine.txt"), "mine\n");
+        let about = format!("run/{}", name.trim_end_matches('/'));
+        refused(&bench, &["fit", "model.yaml", "--out", "run"], &about);
+    }
+    let bench = Workbench::with_small_model();
+    bench.write("run/figures", "mine\n");
+    refused(
+        &bench,
+        &["fit", "model.yaml", "--out", "run"],
+        "run/figures",
+    );
+}
+
+/// A run's own table as the start of the next one: it would be replaced while it is an input.
+#[test]
+fn inputs_are_never_replaced() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    let start = "{data: run/functions.csv, column: mass_kg}";
+    let model = MODEL.replace("start: 2.0", &format!("start: {start}"));
+    bench.write("next.yaml", &model);
+    let stderr = refused(
+        &bench,
+        &["fit", "next.yaml", "--out", "run"],
+        "run/functions.csv",
+    );
+    assert!(stderr.contains("input"), "{stderr}");
+    bench.run_to(0, &["fit", "next.yaml", "--out", "other"]);
+}
+
+/// A file of an older run that was edited is the user's by now.
+#[test]
+fn edited_results_are_refused() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    for name in ["history.csv", "figures/functions.svg", "result.json"] {
+        let path = format!("run/{name}");
+        let text = bench.read(&path);
+        bench.write(&path, &text.replacen('1', "2", 1));
+        let stderr = refused(&bench, &["fit", "model.yaml", "--out", "run"], &path);
+        assert!(stderr.contains("changed since kmcfit wrote it"), "{stderr}");
+        bench.write(&path, &text);
+    }
+    std::fs::remove_file(bench.path("run/history.csv")).expect("removed");
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+}
+
+/// A folder holds the results of one command.
+#[test]
+fn the_results_of_another_command_are_refused() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    for arguments in [
+        &["compare", "model.yaml", "--out", "run"][..],
+        &["compare", "run", "--out", "run"],
+        &["predict", "run", "--initial", "1,0", "--out", "run"],
+        &["check", "model.yaml", "--out", "run"],
+        &["study", "model.yaml", "--out", "run"],
+        &["demo", "--out", "run"],
+    ] {
+        let stderr = refused(&bench, arguments, "--out");
+        assert!(stderr.contains("results of `kmcfit fit`"), "{stderr}");
+    }
+}
+
+/// Links below an output folder are not followed out of it.
+#[test]
+#[cfg(unix)]
+fn links_inside_an_output_folder_are_refused() {
+    use std::os::unix::fs::symlink;
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "elsewhere"]);
+    std::fs::create_dir(bench.path("o")).expect("a folder");
+    symlink(bench.path("elsewhere"), bench.path("o/model")).expect("a link");
+    refused(&bench, &["compare", "model.yaml", "--out", "o"], "o/model");
+    let bench = Workbench::with_small_model();
+    for link in ["results", "models"] {
+        bench.write("elsewhere/mine.txt", "mine");
+        std::fs::create_dir(bench.path("demo")).expect("a folder");
+        symlink(bench.path("elsewhere"), bench.path(&format!("demo/{link}"))).expect("a link");
+        refused(&bench, &["demo", "--out", "demo"], &format!("demo/{link}"));
+        std::fs::remove_dir_all(bench.path("demo")).expect("removed");
+    }
+}
+
+/// A model of the demonstration that was edited, as its last line suggests, is not overwritten.
+#[test]
+fn an_edited_demonstration_is_refused() {
+    let bench = Workbench::empty();
+    bench.write("demo/models/physical.yaml", "mine\n");
+    refused(
+        &bench,
+        &["demo", "--out", "demo"],
+        "demo/models/physical.yaml",
+    );
+}
+
+/// `simulate` replaces its own tables only.
+#[test]
+fn simulate_replaces_its_own_tables_only() {
+    let bench = Workbench::with_small_model();
+    let simulate = ["simulate", "model.yaml", "--out", "made.csv"];
+    bench.write("made.csv", "t_s,y_m\n0,1\n");
+    refused(&bench, &simulate, "--out");
+    std::fs::remove_file(bench.path("made.csv")).expect("removed");
+    bench.write("made.csv.json", "{\"mine\": 1}\n");
+    refused(&bench, &simulate, "--out");
+    std::fs::remove_file(bench.path("made.csv.json")).expect("removed");
+    bench.run_to(0, &simulate);
+    bench.run_to(0, &[&simulate[..], &["--nodes", "11"]].concat());
+    let text = bench.read("made.csv");
+    bench.write("made.csv", &format!("{text}2.1,0\n"));
+    refused(&bench, &simulate, "--out");
+}
+
+/// A refusal leaves no folder behind that was not there before.
+#[test]
+fn a_refused_command_leaves_no_folder() {
+    let bench = Workbench::with_small_model();
+    bench.write("side/model/result.json", "mine\n");
+    bench.write("other.yaml", MODEL);
+    let compare = ["compare", "other.yaml", "model.yaml", "--out", "side"];
+    refused(&bench, &compare, "side/model/result.json");
+}
+
+/// What a killed run leaves on its way is removed by the next one; folders that only look alike stay.
+#[test]
+fn leftovers_of_killed_runs_are_removed() {
+    let bench = Workbench::with_small_model();
+    bench.write("run/.kmcfit-notes/mine.txt", "mine");
+    bench.write("run/.kmcfit-file", "mine");
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    assert_eq!(bench.read("run/.kmcfit-notes/mine.txt"), "mine");
+    assert_eq!(bench.read("run/.kmcfit-file"), "mine");
+    let whole = tree(&bench.path("run"));
+    let settled = settled(&whole);
+    assert_eq!(whole.len(), settled.len() + 3, "{:?}", whole.keys());
+}

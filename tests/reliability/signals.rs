@@ -1,0 +1,93 @@
+//! SIGTERM and kills of long commands.
+
+use crate::tree::whole_run;
+use crate::workbench::Workbench;
+use serde_json::Value;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn started(bench: &Workbench, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        .args(arguments)
+        .current_dir(bench.path(""))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program runs")
+}
+
+fn wait_for_lines(bench: &Workbench, journal: &str, lines: usize) {
+    let begin = Instant::now();
+    let count = || {
+        let text = std::fs::read(bench.path(journal)).unwrap_or_default();
+        text.iter().filter(|b| **b == b'\n').count()
+    };
+    while count() < lines {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no {journal}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill")
+        .args([name, &child.id().to_string()])
+        .status();
+    assert!(sent.expect("kill runs").success());
+}
+
+/// Models of which the second takes long enough to be ended in its middle.
+fn bench() -> Workbench {
+    let bench = Workbench::with_shipped_models();
+    let slow = bench
+        .read("models/knots.yaml")
+        .replace("gauss-newton", "projected-gradient")
+        .replace("{iterations: 50, tolerance: 1e-10}", "{iterations: 400}");
+    assert!(slow.contains("iterations: 400"));
+    bench.write("models/slow.yaml", &slow);
+    bench
+}
+
+/// SIGTERM ends a fit as Ctrl-C does, with exit code 143, and `resume` completes it.
+#[test]
+#[cfg(unix)]
+fn sigterm_writes_the_best_so_far() {
+    let bench = bench();
+    let mut child = started(&bench, &["fit", "models/slow.yaml", "--out", "run"]);
+    wait_for_lines(&bench, "run/fit.journal", 20);
+    signal(&child, "-TERM");
+    assert_eq!(child.wait().expect("it ends").code(), Some(143));
+    whole_run(&bench.path("run")).expect("a whole run");
+    let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
+    assert_eq!(result["outcome"]["status"], "interrupted");
+    bench.run_to(0, &["resume", "run"]);
+    bench.run_to(0, &["fit", "models/slow.yaml", "--out", "whole"]);
+    for table in ["history.csv", "functions.csv", "trajectory.csv"] {
+        let read = |run: &str| bench.read(&format!("{run}/{table}"));
+        assert!(read("run") == read("whole"), "{table}");
+    }
+}
+
+/// A comparison that is killed or ended in its second fit is resumed: the first fit is kept as it is.
+#[test]
+#[cfg(unix)]
+fn a_comparison_is_resumed() {
+    let bench = bench();
+    let models = ["models/linear-mass.yaml", "models/slow.yaml"];
+    let compare = |out| [&["compare"], &models[..], &["--out", out]].concat();
+    bench.run_to(0, &compare("whole"));
+    for (end, code) in [("-KILL", None), ("-TERM", Some(143)), ("-INT", Some(130))] {
+        let mut child = started(&bench, &compare("run"));
+        wait_for_lines(&bench, "run/slow/fit.journal", 20);
+        signal(&child, end);
+        assert_eq!(child.wait().expect("it ends").code(), code, "{end}");
+        let first = bench.read("run/linear-mass/result.json");
+        bench.run_to(0, &["resume", "run"]);
+        assert_eq!(bench.read("run/linear-mass/result.json"), first, "{end}");
+        for table in ["history.csv", "functions.csv", "trajectory.csv"] {
+            let read = |run: &str| bench.read(&format!("{run}/slow/{table}"));
+            assert!(read("run") == read("whole"), "{table} after {end}");
+        }
+        assert!(bench.path("run/compare.html").exists());
+        std::fs::remove_dir_all(bench.path("run")).expect("removed");
+    }
+}
