@@ -179,7 +179,7 @@ fn study(
     let mut work = Work {
         model: &model,
         folder: folder.path(),
-        heading: Heading::of_model("fit", file, false, None),
+        heading: Heading::of_model("study", file, false, None),
         go_on,
         journal,
         flag,

@@ -133,18 +133,20 @@ fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
     (format!("{chain:016x}") == digits).then_some((json, mark))
 }
 
-/// Whether the first line of a file is the heading of a journal with its checksum.
-pub(super) fn is_own(path: &Path) -> bool {
-    let is_file = path.symlink_metadata().is_ok_and(|m| m.is_file());
-    let first_line = || {
-        let mut line = Vec::new();
-        let file = BufReader::new(File::open(path).ok()?);
-        file.take(LONGEST_HEADING)
-            .read_until(b'\n', &mut line)
-            .ok()?;
-        Some(line)
-    };
-    is_file && first_line().is_some_and(|line| checked(&line, Mark::default()).is_some())
+/// The command whose work a journal or checkpoint holds; `None` for a file without the heading of a journal and its
+/// checksum, which kmcfit did not write.
+pub(super) fn command_of(path: &Path) -> Option<String> {
+    if !path.symlink_metadata().is_ok_and(|m| m.is_file()) {
+        return None;
+    }
+    let mut line = Vec::new();
+    let file = BufReader::new(File::open(path).ok()?);
+    file.take(LONGEST_HEADING)
+        .read_until(b'\n', &mut line)
+        .ok()?;
+    let (json, _) = checked(&line, Mark::default())?;
+    let heading: Heading = serde_json::from_slice(json).ok()?;
+    Some(heading.command)
 }
 
 /// A journal at work. Lines are appended and never changed.

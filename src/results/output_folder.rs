@@ -214,20 +214,20 @@ impl OutputFolder {
     fn check_journals(&self) -> Result<(), InputError> {
         for name in journal::NAMES {
             let path = self.path.join(name);
-            let is_there = path.symlink_metadata().is_ok();
-            match self.claim.journals.contains(&name) {
-                true if is_there && !journal::is_own(&path) => return Err(unknown(&path)),
-                false if journal::is_own(&path) => {
+            match journal::command_of(&path) {
+                Some(command) if command != self.claim.command => {
                     return Err(InputError::file(
                         &path,
                         "this folder holds unfinished work of another command",
                     )
+                    .found(format!("the journal of `kmcfit {command}`"))
                     .expected("a folder without it")
                     .hint(format!(
                         "finish it with `kmcfit resume {}`, or give another folder with --out",
                         self.path.display()
                     )));
                 }
+                None if self.claim.journals.contains(&name) => self.check_missing(name)?,
                 _ => {}
             }
         }

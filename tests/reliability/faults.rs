@@ -92,7 +92,7 @@ const DEMO: Case = case(
 );
 
 /// A few parameters: a study of them takes a part of a second.
-fn few() -> String {
+pub fn few() -> String {
     MODEL
         .replace("{basis: nodal, start: 2.0}", "{fixed: 2.0}")
         .replace(

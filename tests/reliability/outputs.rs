@@ -126,6 +126,28 @@ fn the_results_of_another_command_are_refused() {
     }
 }
 
+/// A killed fit is not thrown away by another command.
+#[test]
+fn unfinished_work_of_another_command_is_refused() {
+    let bench = Workbench::with_small_model();
+    let fit = ["fit", "model.yaml", "--out", "run"];
+    bench.run_to(0, &[&fit[..], &["--set", "fit.stop.iterations=4"]].concat());
+    let journal = r#"{"format":2,"version":"","command":"fit","inputs":[],"figures":true,"checkpoint":null,"sources":[]}"#;
+    let heading = serde_json::from_str(journal).expect("a heading");
+    let text = kmcfit::results::with_checksums(&heading, b"").expect("text");
+    std::fs::create_dir(bench.path("killed")).expect("a folder");
+    std::fs::write(bench.path("killed/fit.journal"), text).expect("room");
+    for arguments in [
+        &["study", "model.yaml", "--out", "killed"][..],
+        &["compare", "model.yaml", "--out", "killed"],
+        &["check", "model.yaml", "--out", "killed"],
+    ] {
+        let stderr = refused(&bench, arguments, "killed/fit.journal");
+        assert!(stderr.contains("unfinished work"), "{stderr}");
+    }
+    bench.run_to(0, &["fit", "model.yaml", "--out", "killed"]);
+}
+
 /// Links below an output folder are not followed out of it.
 #[test]
 #[cfg(unix)]

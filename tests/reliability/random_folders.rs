@@ -4,6 +4,7 @@
 //!
 //! `KMCFIT_SEED` draws other folders, `KMCFIT_CASES` more of them.
 
+use crate::faults::few;
 use crate::tree::{Entry, Tree, copy, settled, tree, whole_run};
 use crate::workbench::{MODEL, Workbench};
 use rand::{RngExt, SeedableRng};
@@ -12,7 +13,7 @@ use std::fs;
 
 const OUT: &str = "out";
 /// Commands that write into the folder.
-const COMMANDS: [&[&str]; 9] = [
+const COMMANDS: [&[&str]; 10] = [
     &["fit", "model.yaml", "--out", OUT],
     &["fit", "model.yaml", "--out", OUT, "--no-report"],
     &["check", "model.yaml", "--out", OUT],
@@ -22,7 +23,10 @@ const COMMANDS: [&[&str]; 9] = [
     &["simulate", "model.yaml", "--out", "out/history.csv"],
     &["init", "readings.csv", "--out", "out/model.yaml"],
     &["resume", OUT],
+    &["study", "few.yaml", "--out", OUT, "--threads", "1"],
 ];
+/// Two fits of 2000 nodes: only in `.ci/long`.
+const DEMO: &[&str] = &["demo", "--out", OUT];
 /// Names that commands may want to write, and names that none does.
 const NAMES: [&str; 22] = [
     "result.json",
@@ -58,6 +62,7 @@ fn variable(name: &str, default: u64) -> u64 {
 fn templates() -> Workbench {
     let bench = Workbench::with_small_model();
     bench.run_to(0, &["fit", "model.yaml", "--out", "done"]);
+    bench.write("few.yaml", &few());
     let other = MODEL.replace("iterations: 5", "iterations: 3");
     bench.write("other.yaml", &other);
     bench.run_to(0, &["fit", "other.yaml", "--out", "kinds/fit"]);
@@ -157,6 +162,7 @@ fn own(bench: &Workbench, before: &Tree) -> Vec<String> {
 fn files_of_the_user_stay_and_runs_are_whole() {
     let templates = templates();
     let seed = variable("KMCFIT_SEED", 4711);
+    let is_long = std::env::var_os("KMCFIT_LONG").is_some();
     let (mut refused, mut done) = (0, 0);
     for number in 0..variable("KMCFIT_CASES", 150) {
         let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(number));
@@ -188,7 +194,10 @@ fn files_of_the_user_stay_and_runs_are_whole() {
                 }
                 false => Vec::new(),
             };
-            let command = COMMANDS[random.random_range(0..COMMANDS.len())];
+            let command = match random.random_range(0..COMMANDS.len() + usize::from(is_long)) {
+                index if index < COMMANDS.len() => COMMANDS[index],
+                _ => DEMO,
+            };
             let what = format!("case {number} of seed {seed}, step {step}: {command:?}");
             let (code, _, stderr) = bench.run(command);
             let after = tree(&bench.path(""));
