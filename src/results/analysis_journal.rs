@@ -11,10 +11,6 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-/// Name of the journal of a study.
-pub const STUDY_JOURNAL: &str = "study.journal";
-/// Name of the journal of a comparison.
-pub const COMPARE_JOURNAL: &str = "compare.journal";
 const WHAT: &str = "the journal of a study or comparison that was begun by kmcfit";
 
 /// A line: the name of an analysis and its result.

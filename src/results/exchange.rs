@@ -2,7 +2,7 @@
 //!
 //! 1. All new files are written into a working folder and made durable ([`Stage`]), with a plan of what replaces
 //!    what. Until here the older run is untouched.
-//! 2. The working folder is renamed to [`EXCHANGE`]. From this instant the new run is the valid one.
+//! 2. The working folder is renamed to `.kmcfit-exchange`. From this instant the new run is the valid one.
 //! 3. The files move into their places one by one, the replaced ones into the exchange folder. If a move
 //!    fails, the moves before it are undone, and the older run is whole again.
 //! 4. The exchange folder is removed.
@@ -17,7 +17,7 @@ use super::digest::digest;
 use super::lock::Lock;
 use super::manifest::{FileRecord, FileState, MANIFEST, Manifest, stays_inside};
 use super::system;
-use super::work_folder::{WorkFolder, is_marked};
+use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
 use crate::error::InputError;
 use crate::input::read_text;
 use crate::threads;
@@ -27,8 +27,6 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Name of the folder of an exchange at work.
-pub(super) const EXCHANGE: &str = ".kmcfit-exchange";
 /// In a working folder: the new files, those that they replaced, and the plan.
 const NEW: &str = "new";
 const OLD: &str = "old";

@@ -18,13 +18,16 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
+/// Name of the journal of a fit.
+pub const FIT_JOURNAL: &str = "fit.journal";
+/// Name of its checkpoint.
+pub const CHECKPOINT: &str = "fit.checkpoint";
+/// Name of the journal of a study.
+pub const STUDY_JOURNAL: &str = "study.journal";
+/// Name of the journal of a comparison.
+pub const COMPARE_JOURNAL: &str = "compare.journal";
 /// The journals and checkpoints that can stand in an output folder.
-pub(super) const NAMES: [&str; 4] = [
-    super::FIT_JOURNAL,
-    super::CHECKPOINT,
-    super::STUDY_JOURNAL,
-    super::COMPARE_JOURNAL,
-];
+pub(super) const NAMES: [&str; 4] = [FIT_JOURNAL, CHECKPOINT, STUDY_JOURNAL, COMPARE_JOURNAL];
 /// Longest journal that is read, bytes.
 const LONGEST: u64 = 1 << 30;
 /// Longest first line of a journal, bytes: the files of 2000 records have paths and digests in it.

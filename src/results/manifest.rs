@@ -133,7 +133,9 @@ impl Manifest {
 
     /// The text of the file.
     pub fn text(&self) -> String {
-        crate::report::json(self)
+        // A plain struct with text keys, which always serialises.
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text + "\n"
     }
 }
 

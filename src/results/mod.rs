@@ -17,14 +17,15 @@ mod output_folder;
 mod system;
 mod work_folder;
 
-pub use analysis_journal::{AnalysisJournal, COMPARE_JOURNAL, STUDY_JOURNAL};
+pub use analysis_journal::AnalysisJournal;
 pub use atomic::{write_together, write_whole};
 pub use claim::{Claim, RESULT};
 pub use digest::{digest, digest_of_file};
 pub use exchange::{Stage, complete};
-pub use fit_journal::{CHECKPOINT, FIT_JOURNAL, FitJournal};
+pub use fit_journal::FitJournal;
 pub use heading::{Heading, SourceFile};
 #[doc(hidden)]
 pub use journal::with_checksums;
+pub use journal::{CHECKPOINT, COMPARE_JOURNAL, FIT_JOURNAL, STUDY_JOURNAL};
 pub use manifest::{FileRecord, MANIFEST, Manifest};
 pub use output_folder::OutputFolder;

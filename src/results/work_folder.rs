@@ -5,7 +5,6 @@
 //! removes what a killed run left behind. A folder of such a name without the marker belongs to somebody else and
 //! is left as it is.
 
-use super::exchange::EXCHANGE;
 use super::system;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,6 +12,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Beginning of the names of working folders and of temporary files.
 const PREFIX: &str = ".kmcfit-";
+/// Name of the folder of an exchange at work: a working folder that is more than a leftover.
+pub(super) const EXCHANGE: &str = ".kmcfit-exchange";
 /// Name of the marker in a working folder, and its content.
 const MARKER: &str = "kmcfit-working-folder";
 const MARKER_TEXT: &str =

@@ -9,7 +9,7 @@ mod read;
 
 use super::atomic::replace_with;
 use super::heading::Heading;
-use super::journal::{JournalFile, Mark, path_in, push_line, write_line};
+use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, path_in, push_line, write_line};
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
@@ -20,10 +20,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Name of the journal.
-pub const FIT_JOURNAL: &str = "fit.journal";
-/// Name of the checkpoint.
-pub const CHECKPOINT: &str = "fit.checkpoint";
 /// Least time between two checkpoints: what a killed fit loses at most, about.
 const EVERY: Duration = Duration::from_secs(1);
 /// Checkpoints take at most one part in so many of the time of a fit.

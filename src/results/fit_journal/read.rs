@@ -1,8 +1,8 @@
 //! Reading the journal and checkpoint of a fit that did not come to its end.
 
-use super::{CHECKPOINT, Entry, FIT_JOURNAL, Line};
+use super::{Entry, Line};
 use crate::error::InputError;
-use crate::results::journal::{JournalText, Mark, path_in};
+use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark, path_in};
 use crate::solvers::{Kept, Row, Standing};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
