@@ -28,12 +28,7 @@ pub struct DataFile {
 impl Source {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
-        let mut names = Vec::new();
-        // The text has been parsed before.
-        if let Ok(value) = serde_yaml::from_str(file.effective_text()) {
-            collect(&value, &mut names);
-        }
-        let data = names.into_iter().map(|name| DataFile {
+        let data = file.data_names().into_iter().map(|name| DataFile {
             content: (read_bytes(&file.resolve(&name), "readings", LONGEST_TABLE).ok())
                 .map(|bytes| (bytes.len(), HEXLOWER.encode(&Sha256::digest(&bytes)))),
             name,
@@ -43,23 +38,6 @@ impl Source {
             overrides: file.override_texts(),
             data: data.collect(),
         }
-    }
-}
-
-fn collect(value: &serde_yaml::Value, names: &mut Vec<String>) {
-    match value {
-        serde_yaml::Value::Sequence(list) => list.iter().for_each(|value| collect(value, names)),
-        serde_yaml::Value::Mapping(map) => {
-            for (key, value) in map {
-                match (key.as_str(), value.as_str()) {
-                    (Some("data"), Some(name)) if !names.iter().any(|n| n == name) => {
-                        names.push(name.into());
-                    }
-                    _ => collect(value, names),
-                }
-            }
-        }
-        _ => {}
     }
 }
 
