@@ -102,6 +102,7 @@ pub mod guide;
 pub mod identifiability;
 mod input;
 mod lanes;
+mod memory;
 mod near;
 pub mod objective;
 pub mod observations;

@@ -80,6 +80,7 @@ impl From<InputError> for Failure {
 
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
+    crate::memory::restart_with_plain_allocators();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => match arguments::no_number(&error) {
@@ -90,7 +91,7 @@ pub fn main() -> ExitCode {
             None => arguments::with_near_command(error, &Arguments::command()).exit(),
         },
     };
-    if let Err(error) = crate::lanes::check_limit() {
+    if let Err(error) = crate::lanes::check_limit().and_then(|()| crate::memory::check_base()) {
         complain(&error);
         return ExitCode::from(BAD_INPUT);
     }

@@ -179,7 +179,7 @@ fn study(
         go_on,
         journal,
         flag,
-        threads,
+        threads: model.threads_within_memory(threads),
         document: StudyDocument {
             format: 1,
             title: model.title.clone(),

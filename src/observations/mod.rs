@@ -7,6 +7,7 @@ mod encoding;
 mod field;
 mod format;
 mod resample;
+mod room;
 mod rows;
 mod stated;
 mod table;

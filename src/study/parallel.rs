@@ -2,6 +2,7 @@
 
 use crate::threads::share;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::Builder;
 
 /// `work(0), work(1), ...` in this order, computed on up to `threads` threads. Every job depends on its
 /// index alone, so the results are the same bits for any number of threads.
@@ -28,12 +29,20 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
             }
             turn()
         };
-        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        let joined = handles.into_iter().flat_map(|handle| match handle.join() {
-            Ok(done) => done,
-            Err(panic) => std::panic::resume_unwind(panic),
-        });
-        joined.collect::<Vec<_>>()
+        // A thread that the system has no room for is left out: the others do its work.
+        let begun = |_| Builder::new().spawn_scoped(scope, work).ok();
+        let handles: Vec<_> = (0..workers).map_while(begun).collect();
+        let mut done = match handles.is_empty() {
+            true => turn(),
+            false => Vec::new(),
+        };
+        for handle in handles {
+            match handle.join() {
+                Ok(more) => done.extend(more),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        done
     });
     results.sort_by_key(|(index, _)| *index);
     results.into_iter().map(|(_, result)| result).collect()
