@@ -177,6 +177,15 @@ fn large_models_are_refused_and_the_older_run_stays_whole() {
         &["check", "small.yaml", "--nodes", "21,5000000"],
         &["compare", "large.yaml", "--out", "run"],
         &["study", "large.yaml", "--out", "run"],
+        // A fit of it would fit into the largest limit; a study takes more.
+        &[
+            "study",
+            "small.yaml",
+            "--set",
+            "grid.nodes=500000",
+            "--out",
+            "run",
+        ],
         &[
             "fit",
             "small.yaml",

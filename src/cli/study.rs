@@ -150,6 +150,7 @@ fn study(
 ) -> Result<u8, Failure> {
     let mut model = build(file, Purpose::Fit)?;
     can_be_studied(file, &model)?;
+    model.check_study_memory()?;
     for remark in &model.remarks {
         say("note", remark);
     }

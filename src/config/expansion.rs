@@ -169,7 +169,7 @@ mod tests {
         let laughs: String = (1..20)
             .map(|i| format!("a{i}: &a{i} [{}]\n", format!("*a{}, ", i - 1).repeat(9)))
             .collect();
-        assert!(beyond(&format!("a0: &a0 [1]\n{laughs}"), 1 << 18).is_some());
+        assert!(beyond(&format!("a0: &a0 [1]\n{laughs}"), 10_000).is_some());
         let text = format!(
             "a: &a {{k: {}}}\nb: {{<<: *a}}\nc: {{<<: *a}}\n",
             "x".repeat(500)
@@ -193,7 +193,7 @@ mod tests {
             "'*'",
             "a: 1\n---\nb: '*'",
         ] {
-            assert_eq!(beyond(text, 100), None, "{text}");
+            assert_eq!(beyond(text, 1000), None, "{text}");
         }
     }
 }

@@ -205,6 +205,14 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
             ),
             ("lines", repeat("{\"piece\":\"a\",\"result\":0}\n", 20_000)),
         ],
+        "yaml" | "override" | "sequence" => vec![(
+            "aliases of a long list",
+            format!(
+                "title=\nstory: &a [{}]\nb: [{}]\n",
+                repeat("1,", 20_000),
+                repeat("*a,", 900)
+            ),
+        )],
         _ => vec![
             (
                 "lines",
