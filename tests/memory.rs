@@ -164,7 +164,7 @@ fn large_models_are_refused_and_the_older_run_stays_whole() {
     }
     let bench = Bench::new();
     let before = bench.files(".");
-    let commands: [&[&str]; 6] = [
+    let commands: [&[&str]; 7] = [
         &["fit", "large.yaml", "--out", "run"],
         &[
             "simulate",
