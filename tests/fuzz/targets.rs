@@ -246,8 +246,11 @@ pub fn overrides(bytes: &[u8]) -> Verdict {
                  1.0}}\ngrid: {nodes: 16}\nfunctions: {mass: {basis: nodal, start: 2}, damping: {fixed: 0}, \
                  stiffness: {fixed: 1}}\n";
     let file = ModelFile::parse(&place, model).expect("a model");
-    let changed = Override::parse(&text).and_then(|change| file.with(&[change]));
-    match changed {
+    let change = match Override::parse(&text) {
+        Ok(change) => change,
+        Err(error) => return told(&error),
+    };
+    match file.with(&[change]) {
         Err(error) => told(&error),
         Ok(file) => {
             file.data_files();
