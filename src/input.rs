@@ -3,10 +3,11 @@
 use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata};
-use std::io::{ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::{InputError, Place};
+use crate::memory;
 use crate::near::did_you_mean;
 
 /// Longest piece of somebody's text that is repeated in a message, in characters.
@@ -15,8 +16,18 @@ const LONGEST_QUOTE: usize = 40;
 /// Most names that are listed in a message.
 const MOST_NAMES: usize = 30;
 
-/// Longest table that is read, in bytes: some ten million rows, which fit into memory.
-pub const LONGEST_TABLE: u64 = 1 << 30;
+/// Longest table of measurements that is read, in bytes: a hundred million rows of time and reading, so
+/// more than `simulate` writes on any grid that fits into memory. What fits into the memory of a smaller
+/// machine is asked before it is read.
+pub const LONGEST_TABLE: u64 = 1 << 32;
+
+/// Memory that a file's text takes for each of its bytes: itself, and a copy in another encoding or with
+/// other delimiters.
+const TEXT: u64 = 2;
+
+/// Memory that a JSON document takes for each of its bytes: its text, and its values twice, as a tree
+/// and as what they mean. A list of short numbers, the longest that results have, takes half of it.
+pub const JSON: u64 = 64;
 
 /// Longest line of a table, in bytes: hundreds of columns take a hundredth of it. A longer one is no
 /// table, and would be taken apart into more fields than there is memory for.
@@ -35,27 +46,58 @@ pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputErr
     utf8(path, bytes).map_err(|error| error.expected_if_none(what))
 }
 
+/// Reads a text file as [`read_text`] does, if there is so much memory for each of its bytes: where
+/// more is made of the text than its values.
+///
+/// # Errors
+///
+/// As there, and when it does not fit into memory.
+pub fn read_text_within(
+    path: &Path,
+    what: &str,
+    limit: u64,
+    bytes_per_byte: u64,
+) -> Result<String, InputError> {
+    if let Ok(metadata) = fs::metadata(path)
+        && metadata.len() <= limit
+    {
+        memory::check_file(path, metadata.len().saturating_mul(bytes_per_byte))?;
+    }
+    read_text(path, what, limit)
+}
+
 /// Reads a file of at most `limit` bytes; `what` says what it should be.
 ///
 /// # Errors
 ///
-/// When there is no such file, it is a folder, a device or somebody else's pipe, it cannot be read, or
-/// it is longer than `limit`.
+/// When there is no such file, it is a folder, a device or somebody else's pipe, it cannot be read, it
+/// is longer than `limit`, or does not fit into memory.
 pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
+    let (file, length) = open(path, what)?;
+    // Nothing is read of what is too long, or may not even be there: a file can have holes.
+    if length > limit {
+        return Err(too_long(path, limit).expected(what));
+    }
+    memory::check_file(path, length.saturating_mul(TEXT))?;
+    // At once: bytes that grow leave their smaller selves behind in memory that costs time to get.
+    let mut bytes = Vec::new();
+    // Where there is not so much, reading says so.
+    let _ = bytes.try_reserve_exact(usize::try_from(length).unwrap_or(0));
+    read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))
+}
+
+/// Opens a file and tells its length; `what` says what it should be.
+///
+/// # Errors
+///
+/// When there is no such file, it is a folder, a device or somebody else's pipe, or cannot be opened.
+pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
     let metadata = fs::metadata(path).map_err(|error| unreadable(path, what, &error))?;
     if let Some(other) = no_file(path, &metadata) {
         return Err(InputError::file(path, format!("this is {other}, not a file")).expected(what));
     }
-    // Nothing is read of what is too long, or may not even be there: a file can have holes.
-    if metadata.len() > limit {
-        return Err(too_long(path, limit).expected(what));
-    }
     let file = File::open(path).map_err(|error| unreadable(path, what, &error))?;
-    // At once: bytes that grow leave their smaller selves behind in memory that costs time to get.
-    let mut bytes = Vec::new();
-    // Where there is not so much, reading says so.
-    let _ = bytes.try_reserve_exact(usize::try_from(metadata.len()).unwrap_or(0));
-    read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))
+    Ok((file, metadata.len()))
 }
 
 /// What stands at a path in the place of a file. A device may never end, and a pipe never begin; but the
@@ -120,16 +162,80 @@ pub fn check_lines(path: &Path, text: &str) -> Result<(), InputError> {
     let Some(index) = lines.position(|line| line.len() > LONGEST_LINE) else {
         return Ok(());
     };
+    Err(long_line(path, index + 1))
+}
+
+fn long_line(path: &Path, line: usize) -> InputError {
     let place = Place::Line {
         file: path.to_path_buf(),
-        line: index + 1,
+        line,
         column: 1,
     };
-    Err(InputError::new(
+    InputError::new(
         place,
         format!("the line is longer than {LONGEST_LINE} bytes"),
     )
-    .expected("one row of a table in each line"))
+    .expected("one row of a table in each line")
+}
+
+/// The lines of a table that is too long to be kept as text, one after the other.
+pub struct Lines<'a> {
+    path: &'a Path,
+    reader: BufReader<File>,
+    line: Vec<u8>,
+    count: usize,
+}
+
+impl<'a> Lines<'a> {
+    /// The lines of a file; `path` is what messages call it.
+    pub fn new(path: &'a Path, file: File) -> Self {
+        Self {
+            path,
+            reader: BufReader::with_capacity(1 << 18, file),
+            line: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// The next line without its end and, if it is the first, without a byte order mark; `None` at the
+    /// end of the file.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read, or the line is longer than any table has, or not UTF-8.
+    pub fn next(&mut self) -> Result<Option<&str>, InputError> {
+        self.line.clear();
+        let most = LONGEST_LINE as u64 + 2;
+        let mut rest = (&mut self.reader).take(most);
+        rest.read_until(b'\n', &mut self.line).map_err(|error| {
+            InputError::file(self.path, format!("the file cannot be read: {error}"))
+        })?;
+        if self.line.is_empty() {
+            return Ok(None);
+        }
+        self.count += 1;
+        let ended = self.line.strip_suffix(b"\n");
+        let line = ended.unwrap_or(&self.line);
+        if line.len() > LONGEST_LINE {
+            return Err(long_line(self.path, self.count));
+        }
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        match std::str::from_utf8(line) {
+            Ok(text) if self.count == 1 => Ok(Some(text.trim_start_matches('\u{feff}'))),
+            Ok(text) => Ok(Some(text)),
+            Err(error) => {
+                let place = Place::Line {
+                    file: self.path.to_path_buf(),
+                    line: self.count,
+                    column: 1 + String::from_utf8_lossy(&line[..error.valid_up_to()])
+                        .chars()
+                        .count(),
+                };
+                Err(InputError::new(place, "the file is not UTF-8 text")
+                    .found(format!("the byte 0x{:02x}", line[error.valid_up_to()])))
+            }
+        }
+    }
 }
 
 /// A short quotation of somebody's text for a message: one line, cut where it is long.

@@ -3,6 +3,7 @@
 use super::{Failure, OK, print, schema, unwritable};
 use crate::config::{ModelFile, starter};
 use crate::error::{InputError, Place};
+use crate::observations::SAMPLE_RATES;
 use crate::report::shell_quoted;
 use crate::results::write_together;
 use std::path::{Component, Path, PathBuf};
@@ -26,13 +27,17 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let rate = arguments.sample_rate;
-    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+    if let Some(rate) = rate.filter(|rate| !SAMPLE_RATES.contains(rate)) {
         return Err(InputError::new(
             Place::Argument("--sample-rate".into()),
             "no rate can be this",
         )
-        .found(rate)
-        .expected("a number of readings per second, greater than 0")
+        .found(format!("{rate:?}"))
+        .expected(format!(
+            "samples per second, a number from {:e} to {:e}",
+            SAMPLE_RATES.start(),
+            SAMPLE_RATES.end()
+        ))
         .into());
     }
     let out = match &arguments.out {

@@ -81,6 +81,7 @@ impl From<InputError> for Failure {
 
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
+    crate::memory::restart_with_plain_allocators();
     interrupt::ignore_file_size_signal();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -95,7 +96,7 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    if let Err(error) = crate::lanes::check_limit() {
+    if let Err(error) = crate::lanes::check_limit().and_then(|()| crate::memory::check_base()) {
         complain(&error);
         return ExitCode::from(BAD_INPUT);
     }

@@ -2,11 +2,12 @@
 
 use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{ModelFile, Purpose, build};
+use crate::digest::{digest, digest_of_file};
 use crate::error::{InputError, Place};
 use crate::input::{one_of, quote, read_text};
 use crate::problem::Experiment;
 use crate::report::{CsvTable, json};
-use crate::results::{digest, digest_of_file, write_together};
+use crate::results::write_together;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

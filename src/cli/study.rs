@@ -162,6 +162,7 @@ fn study(
 ) -> Result<u8, Failure> {
     let mut model = build(file, Purpose::Fit)?;
     can_be_studied(file, &model)?;
+    model.check_study_memory()?;
     for remark in &model.remarks {
         say("note", remark);
     }
@@ -183,7 +184,7 @@ fn study(
         go_on,
         journal,
         flag,
-        threads,
+        threads: model.threads_within_memory(threads),
         document: StudyDocument {
             format: 1,
             title: model.title.clone(),

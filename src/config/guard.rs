@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::expansion;
 use super::locate::Position;
 use super::model_file::place;
 use crate::error::InputError;
 use crate::input::quote;
+use serde::de::DeserializeOwned;
 
-/// Longest model file that is read, in bytes.
+/// Longest model file that is read, in bytes; also its longest length with the aliases written out.
 ///
 /// A model file is written by hand and takes a few kilobytes; readings belong into CSV files. The
 /// limit keeps a data file given by mistake from being taken apart as YAML.
@@ -26,6 +28,23 @@ const MOST_OPEN_BRACKETS: usize = 200;
 /// of them means a long one.
 const MOST_ALIASES: usize = 1000;
 
+/// A text that passed [`check`]: the YAML crate reads no other into values.
+pub(super) struct Checked<'a>(&'a str);
+
+impl<'a> Checked<'a> {
+    /// Checks a text; `file` is the place in messages.
+    pub(super) fn new(file: &Path, text: &'a str) -> Result<Self, InputError> {
+        check(file, text)?;
+        Ok(Self(text))
+    }
+
+    /// The value of the text.
+    #[allow(clippy::disallowed_methods, reason = "the text is checked")]
+    pub(super) fn read<T: DeserializeOwned>(&self) -> Result<T, serde_yaml::Error> {
+        serde_yaml::from_str(self.0)
+    }
+}
+
 /// Refuses a text that is too long, nested too deeply, repeats too much, or gives an anchor twice.
 pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
     if text.len() as u64 > LONGEST_MODEL {
@@ -36,7 +55,47 @@ pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
         .hint("put readings into CSV files"));
     }
     check_brackets(file, text)?;
-    check_anchors(file, text)
+    check_anchors(file, text)?;
+    check_expansion(file, text)
+}
+
+/// Refuses a text whose aliases stand for more than the longest model file.
+fn check_expansion(file: &Path, text: &str) -> Result<(), InputError> {
+    const LONGEST: usize = LONGEST_MODEL as usize;
+    let Some(passed) = expansion::beyond(text, LONGEST) else {
+        return Ok(());
+    };
+    let uses = |name: &str| names(text, '*').filter(|(_, alias)| *alias == name).count();
+    let anchors = names(text, '&').map(|(index, name)| (Position::of(text, index), name));
+    // The repeated value that the limit is passed in: the last one anchored before that place.
+    let repeated = anchors
+        .take_while(|(begin, _)| *begin <= passed)
+        .filter(|(_, name)| uses(name) > 0)
+        .last();
+    let (at, which) = match repeated {
+        Some((at, name)) => {
+            let times = match uses(name) {
+                1 => "once".to_owned(),
+                times => format!("{times} times"),
+            };
+            let (anchor, alias) = (quote(&format!("&{name}")), quote(&format!("*{name}")));
+            (
+                at,
+                format!("; {alias} repeats the value of {anchor} {times}"),
+            )
+        }
+        None => (passed, String::new()),
+    };
+    Err(
+        InputError::new(place(file, at), "the aliases stand for too long a text")
+            .found(format!(
+                "more than {LONGEST} bytes with all aliases written out{which}"
+            ))
+            .expected(format!(
+                "at most {LONGEST} bytes with all aliases written out"
+            ))
+            .hint("put readings and long lists into CSV files"),
+    )
 }
 
 fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
@@ -97,7 +156,9 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
 /// The words that begin with `mark` where a value can begin, outside comment lines.
 fn names(text: &str, mark: char) -> impl Iterator<Item = (usize, &str)> {
     let mut line_begin = 0;
-    let lines = text.split_inclusive('\n').map(move |line| {
+    // All characters that end a line, and so a comment, in YAML 1.1.
+    let ends = ['\n', '\r', '\u{85}', '\u{2028}', '\u{2029}'];
+    let lines = text.split_inclusive(ends).map(move |line| {
         let begin = line_begin;
         line_begin += line.len();
         (begin, line)

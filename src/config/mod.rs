@@ -7,6 +7,7 @@
 
 mod build;
 mod complaint;
+mod expansion;
 mod failure;
 mod guard;
 pub mod keys;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::failure;
-use super::guard::{self, LONGEST_MODEL};
+use super::guard::{Checked, LONGEST_MODEL};
 use super::locate::{Position, key_path, locate};
 use super::overrides::Override;
 use super::spec::ModelSpec;
@@ -37,9 +37,11 @@ impl ModelFile {
     ///
     /// # Errors
     ///
-    /// When there is no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
+    /// When there is no such file, its path or its content is not UTF-8 text, or
+    /// [`parse`](Self::parse) finds a mistake.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let path = path.as_ref();
+        check_path(path)?;
         let text = read_text(path, MODEL_FILE, LONGEST_MODEL)?;
         Self::parse(path, text)
     }
@@ -68,7 +70,8 @@ impl ModelFile {
                 )
                 .found(error)
             };
-            let mut model = serde_yaml::from_str(self.effective_text()).map_err(unreadable)?;
+            let checked = Checked::new(&self.path, self.effective_text())?;
+            let mut model = checked.read().map_err(unreadable)?;
             change.apply(&mut model)?;
             let text = serde_yaml::to_string(&model).map_err(unreadable)?;
             let moved = |error: InputError| InputError {
@@ -128,8 +131,8 @@ impl ModelFile {
                 .expected(MODEL_FILE)
                 .hint("begin with `format: 1`"));
         }
-        guard::check(&path, &text)?;
-        let spec = serde_yaml::from_str(&text)
+        let spec = Checked::new(&path, &text)?
+            .read()
             .map_err(|error| failure::input_error(&path, &text, &error))?;
         let model = Self {
             path,
@@ -174,17 +177,26 @@ impl ModelFile {
 
     /// The files that the model reads, each once, in the order of the text.
     pub fn data_files(&self) -> Vec<PathBuf> {
-        let mut names = Vec::new();
-        if let Ok(value) = serde_yaml::from_str::<serde_yaml::Value>(self.effective_text()) {
-            collect_data(&value, &mut names);
-        }
         let mut files: Vec<PathBuf> = Vec::new();
-        for file in names.iter().map(|name| self.resolve(name)) {
+        for file in self.data_names().iter().map(|name| self.resolve(name)) {
             if !files.contains(&file) {
                 files.push(file);
             }
         }
         files
+    }
+
+    /// The values of all keys `data` that name a file, each once, in the order of the text.
+    pub(super) fn data_names(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        // The text was read before: neither step fails.
+        let value = Checked::new(&self.path, self.effective_text())
+            .ok()
+            .and_then(|text| text.read().ok());
+        if let Some(value) = value {
+            collect_data(&value, &mut names);
+        }
+        names
     }
 
     /// A path in the model file, relative to its folder.
@@ -196,20 +208,34 @@ impl ModelFile {
     }
 }
 
-/// The values of all keys `data` that name a file.
 fn collect_data(value: &serde_yaml::Value, names: &mut Vec<String>) {
     use serde_yaml::Value;
     match value {
         Value::Mapping(map) => {
             for (key, value) in map {
                 match (key.as_str(), value.as_str()) {
-                    (Some("data"), Some(name)) => names.push(name.to_owned()),
+                    (Some("data"), Some(name)) => {
+                        if !names.iter().any(|known| known == name) {
+                            names.push(name.to_owned());
+                        }
+                    }
                     _ => collect_data(value, names),
                 }
             }
         }
         Value::Sequence(list) => list.iter().for_each(|value| collect_data(value, names)),
         _ => {}
+    }
+}
+
+/// Refuses a path that is not UTF-8: results and journals, which are UTF-8, name the model by its path.
+pub(super) fn check_path(path: &Path) -> Result<(), InputError> {
+    match path.to_str() {
+        Some(_) => Ok(()),
+        None => Err(InputError::file(path, "the path of the model is not UTF-8")
+            .found("bytes that are no character")
+            .expected("a path in UTF-8: the results name the model by its path")
+            .hint("rename the file or its folder")),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Values that are given beside a model file, in the place of what it says: `--set KEY=VALUE`.
 
-use super::guard;
+use super::guard::Checked;
 use super::locate::{Segment, key_path};
 use crate::error::{InputError, Place};
 use crate::input::quote;
@@ -47,8 +47,7 @@ impl Override {
             return Err(wrong("there is no key before `=`")
                 .expected("KEY=VALUE, for instance fit.stop.iterations=50"));
         }
-        guard::check(Path::new("--set"), written)?;
-        match serde_yaml::from_str(written) {
+        match Checked::new(Path::new("--set"), written)?.read() {
             Ok(Value::Null) | Err(_) => Err(wrong("the value cannot be read").expected(VALUE)),
             Ok(value) => Ok(Self {
                 key: key.to_owned(),

@@ -1,9 +1,8 @@
 //! What a model was made from: its text and its data files, so that a run can be repeated.
 
 use super::ModelFile;
-use crate::input::{LONGEST_TABLE, read_bytes};
-use data_encoding::HEXLOWER;
-use sha2::{Digest, Sha256};
+use crate::digest::digest_of_file;
+use std::path::Path;
 
 /// The text of a model and the data files that it names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -21,21 +20,15 @@ pub struct Source {
 pub struct DataFile {
     /// As the model names it: relative paths start from the model.
     pub name: String,
-    /// Size and SHA-256 in hexadecimal digits; `None` if the file cannot be read any more.
-    pub content: Option<(usize, String)>,
+    /// Size in bytes and SHA-256 in hexadecimal digits; `None` if the file cannot be read any more.
+    pub content: Option<(u64, String)>,
 }
 
 impl Source {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
-        let mut names = Vec::new();
-        // The text has been parsed before.
-        if let Ok(value) = serde_yaml::from_str(file.effective_text()) {
-            collect(&value, &mut names);
-        }
-        let data = names.into_iter().map(|name| DataFile {
-            content: (read_bytes(&file.resolve(&name), "readings", LONGEST_TABLE).ok())
-                .map(|bytes| (bytes.len(), HEXLOWER.encode(&Sha256::digest(&bytes)))),
+        let data = file.data_names().into_iter().map(|name| DataFile {
+            content: content(&file.resolve(&name)),
             name,
         });
         Self {
@@ -46,21 +39,9 @@ impl Source {
     }
 }
 
-fn collect(value: &serde_yaml::Value, names: &mut Vec<String>) {
-    match value {
-        serde_yaml::Value::Sequence(list) => list.iter().for_each(|value| collect(value, names)),
-        serde_yaml::Value::Mapping(map) => {
-            for (key, value) in map {
-                match (key.as_str(), value.as_str()) {
-                    (Some("data"), Some(name)) if !names.iter().any(|n| n == name) => {
-                        names.push(name.into());
-                    }
-                    _ => collect(value, names),
-                }
-            }
-        }
-        _ => {}
-    }
+fn content(path: &Path) -> Option<(u64, String)> {
+    let bytes = path.metadata().ok()?.len();
+    Some((bytes, digest_of_file(path).ok()?))
 }
 
 #[cfg(test)]

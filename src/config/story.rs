@@ -1,7 +1,9 @@
 //! A story: models that are run one after the other and told on one page.
 
 use super::failure;
-use super::guard::{self, LONGEST_MODEL};
+use super::guard::{Checked, LONGEST_MODEL};
+use super::locate::{Segment, locate};
+use super::model_file::check_path;
 use super::scalar::{Format, Text};
 use crate::error::InputError;
 use crate::input::read_text;
@@ -39,12 +41,15 @@ impl Story {
     /// # Errors
     /// When the file cannot be read, or is a story that is not well written.
     pub fn read(path: &Path) -> Result<Option<Self>, InputError> {
+        check_path(path)?;
         let text = read_text(path, "a model file or a story (YAML)", LONGEST_MODEL)?;
-        if !text.lines().any(|line| line.starts_with("story:")) {
+        let checked = Checked::new(path, &text)?;
+        // The key in any style: `story:`, `"story":`, `{story: …}`.
+        if locate(&text, &[Segment::Key("story".into())]).depth == 0 {
             return Ok(None);
         }
-        guard::check(path, &text)?;
-        let spec: StorySpec = serde_yaml::from_str(&text)
+        let spec: StorySpec = checked
+            .read()
             .map_err(|error| failure::input_error(path, &text, &error))?;
         if spec.story.is_empty() {
             return Err(InputError::file(path, "the story has no model")

@@ -80,6 +80,11 @@ const MEANINGS: &[(&str, &str, &str)] = &[
         "put the text in quotes",
     ),
     (
+        "repetition limit exceeded",
+        "the aliases (`*name`) repeat too much",
+        "write the values out, and put long lists into CSV files",
+    ),
+    (
         "unknown anchor",
         "an alias (`*name`) without its anchor (`&name`) before it",
         "put a text that begins with `*` in quotes",

@@ -21,6 +21,7 @@ pub(crate) mod tests;
 use crate::error::{InputError, Place};
 use crate::near::nearest;
 use portable::Portable;
+use std::ffi::OsString;
 use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
 
@@ -293,9 +294,15 @@ impl Width {
     }
 }
 
-/// The limit that [`LIMIT`] sets; what it says where that is no arithmetic.
+/// The limit that [`LIMIT`] sets; its text where that is no arithmetic.
 fn limit() -> Result<Option<Width>, String> {
-    let Some(text) = std::env::var_os(LIMIT) else {
+    parse_limit(std::env::var_os(LIMIT))
+}
+
+/// The limit of a text. An empty one sets none, like a variable that is not set: shells and job
+/// files clear a variable so.
+fn parse_limit(text: Option<OsString>) -> Result<Option<Width>, String> {
+    let Some(text) = text.filter(|text| !text.is_empty()) else {
         return Ok(None);
     };
     let named = |width: &Width| text.eq_ignore_ascii_case(width.name());

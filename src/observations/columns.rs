@@ -6,7 +6,6 @@ use super::Table;
 use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::did_you_mean;
-use crate::units::unbracketed;
 
 /// A column, by its name or by its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,9 +70,7 @@ impl Table {
     /// # Ok::<(), kmcfit::error::InputError>(())
     /// ```
     pub fn unit(&self, index: usize) -> Option<&str> {
-        let own_row = self.units_row().get(index).map(|text| unbracketed(text));
-        let in_name = || split_unit(self.headers().get(index)?).1;
-        own_row.filter(|text| !text.is_empty()).or_else(in_name)
+        self.stated_unit(index).text()
     }
 
     fn find_name(&self, name: &str) -> Result<usize, InputError> {
@@ -128,7 +125,7 @@ fn numbers(width: usize) -> String {
 }
 
 /// A header's name and unit: `acc [g]`, `acc (g)`, `acc / g`.
-fn split_unit(header: &str) -> (&str, Option<&str>) {
+pub(super) fn split_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim_matches(['"', '\'']).trim();
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some(rest) = header.strip_suffix(close)

@@ -7,7 +7,9 @@ mod encoding;
 mod field;
 mod format;
 mod resample;
+mod room;
 mod rows;
+mod stated;
 mod table;
 pub mod times;
 
@@ -15,5 +17,6 @@ pub use columns::ColumnName;
 pub use encoding::Encoding;
 pub use format::{Detected, TableFormat};
 pub use resample::resample;
+pub use stated::StatedUnit;
 pub use table::Table;
-pub use times::{equally_spaced, equally_spaced_at, increasing, increasing_at};
+pub use times::{SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at};

@@ -9,6 +9,7 @@ use super::detect::{Layout, detect};
 use super::encoding::decode;
 use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
+use super::room::Room;
 use super::rows::{Source, with_newlines};
 use crate::error::{InputError, Place};
 use crate::input::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
@@ -217,11 +218,16 @@ impl Table {
             columns: Vec::new(),
             lines: Vec::new(),
         };
-        table.fill(&Source::new(&text, skipped, layout.delimiter), &layout)?;
+        let room = Room::of(path, &text);
+        let width = layout.width.unwrap_or(1);
+        room.check(width)?;
+        table.lines = room.list(width)?;
+        let source = Source::new(&text, skipped, layout.delimiter);
+        table.fill(&source, &layout, room)?;
         Ok(table)
     }
 
-    fn fill(&mut self, source: &Source, layout: &Layout) -> Result<(), InputError> {
+    fn fill(&mut self, source: &Source, layout: &Layout, room: Room) -> Result<(), InputError> {
         let path = self.path.clone();
         let mut rows = source.rows(&path);
         let mut fields = StringRecord::new();
@@ -232,13 +238,13 @@ impl Table {
             if row == layout.header {
                 check_headers(&path, line, &fields, layout.decimal)?;
                 self.headers = fields.iter().map(str::to_owned).collect();
-                self.columns = vec![Column::default(); fields.len()];
+                self.columns = columns(fields.len(), room)?;
                 self.format.header = Some(line);
             } else if row == layout.units {
                 self.units = fields.iter().map(str::to_owned).collect();
                 self.format.units_row = Some(line);
             } else if count >= layout.data {
-                self.push(line, &fields, layout)?;
+                self.push(line, &fields, layout, room)?;
             }
             count += 1;
         }
@@ -261,12 +267,13 @@ impl Table {
         line: usize,
         fields: &StringRecord,
         layout: &Layout,
+        room: Room,
     ) -> Result<(), InputError> {
         let row = self.lines.len();
         self.lines.push(line);
         if self.columns.is_empty() {
             let width = layout.width.unwrap_or(fields.len());
-            self.columns = vec![Column::default(); width];
+            self.columns = columns(width, room)?;
         }
         // Some instruments end every row of data, but not the names, with a delimiter.
         let width = self.columns.len();
@@ -300,6 +307,17 @@ impl Table {
         }
         Ok(())
     }
+}
+
+/// So many columns with room for the values of all rows.
+fn columns(width: usize, room: Room) -> Result<Vec<Column>, InputError> {
+    let column = |_| {
+        Ok(Column {
+            readings: room.list(width)?,
+            ..Column::default()
+        })
+    };
+    (0..width).map(column).collect()
 }
 
 /// The error for a file without rows after the lines that are skipped.

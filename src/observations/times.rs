@@ -10,6 +10,12 @@ use crate::error::InputError;
 /// printed with nine or more digits, and is far below what moves a reading noticeably.
 pub const SPACING_TOLERANCE: f64 = 1e-6;
 
+/// Sampling rates that are accepted, Hz.
+///
+/// From one sample in 30,000 years to one in a picosecond: no motion is measured outside of that, and
+/// times, their squares and their reciprocals stay far from overflow and underflow.
+pub const SAMPLE_RATES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
 /// A spacing that is off by less than this part of the step looks like rounding.
 const ROUNDED: f64 = 0.05;
 

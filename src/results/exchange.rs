@@ -13,11 +13,11 @@
 
 use super::atomic::folder_of;
 use super::claim::{Claim, RESULT};
-use super::digest::digest;
 use super::lock::Lock;
 use super::manifest::{FileRecord, FileState, MANIFEST, Manifest, stays_inside};
 use super::system;
 use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
+use crate::digest::digest;
 use crate::error::InputError;
 use crate::input::read_text;
 use crate::threads;

@@ -1,9 +1,8 @@
 //! The first line of a journal: which command with which inputs the work belongs to.
 
-use super::digest::digest;
 use crate::config::ModelFile;
+use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use crate::input::{LONGEST_TABLE, read_bytes};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -87,11 +86,8 @@ impl Heading {
     /// Adds a file to the sources.
     #[must_use]
     pub fn with_file(mut self, file: PathBuf) -> Self {
-        let bytes = read_bytes(&file, "a file of measurements", LONGEST_TABLE);
-        self.sources.push(SourceFile {
-            sha256: bytes.map_or("not readable".into(), |bytes| digest(&bytes)),
-            file,
-        });
+        let sha256 = digest_of_file(&file).unwrap_or_else(|_| "not readable".into());
+        self.sources.push(SourceFile { file, sha256 });
         self
     }
 

@@ -28,8 +28,8 @@ pub const STUDY_JOURNAL: &str = "study.journal";
 pub const COMPARE_JOURNAL: &str = "compare.journal";
 /// The journals and checkpoints that can stand in an output folder.
 pub(super) const NAMES: [&str; 4] = [FIT_JOURNAL, CHECKPOINT, STUDY_JOURNAL, COMPARE_JOURNAL];
-/// Longest journal that is read, bytes.
-const LONGEST: u64 = 1 << 30;
+/// Longest journal that is read, bytes: what the program wrote it must read, so memory alone limits it.
+const LONGEST: u64 = u64::MAX;
 /// Longest first line of a journal, bytes: the files of 2000 records have paths and digests in it.
 const LONGEST_HEADING: u64 = 1 << 24;
 /// Bytes that are collected before they are written.

@@ -3,7 +3,7 @@
 //! A file may be replaced or removed only if the manifest names it and its contents still have the digest noted
 //! there. A file that was edited since, or that the manifest does not name, belongs to the user.
 
-use super::digest::{digest, digest_of_file};
+use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
 use crate::input::read_text;
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,6 @@
 mod analysis_journal;
 mod atomic;
 mod claim;
-mod digest;
 mod exchange;
 mod fit_journal;
 mod heading;
@@ -20,7 +19,6 @@ mod work_folder;
 pub use analysis_journal::AnalysisJournal;
 pub use atomic::{write_together, write_whole};
 pub use claim::{Claim, RESULT};
-pub use digest::{digest, digest_of_file};
 pub use exchange::{Stage, complete};
 pub use fit_journal::FitJournal;
 pub use heading::{Heading, SourceFile};

@@ -59,3 +59,14 @@ fn an_unknown_arithmetic_is_refused() {
         assert!(said.contains(word), "{word}: {said}");
     }
 }
+
+/// A shell or job file that clears a variable leaves an empty one: it sets no limit.
+#[test]
+fn an_empty_arithmetic_is_none() {
+    let bench = Workbench::with_shipped_models();
+    let mut command = bench.command(&["schema"]);
+    let output = command.env("KMCFIT_ARITHMETIC", "").output();
+    let output = output.expect("the program runs");
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(0), "{said}");
+}

@@ -346,8 +346,8 @@ fn grid() {
 fn a_grid_that_does_not_fit_into_memory_is_refused() {
     let mut settings = Settings::clone_current();
     settings.add_filter(
-        r"at most \d+ nodes: [\d.]+ .?B are (available|assumed, as the system does not say)",
-        "at most [nodes] nodes: [bytes] are available",
+        r"at most \d+ nodes within [\d.]+ .?B, [^\n]+",
+        "at most [nodes] nodes within [bytes]",
     );
     let _bound = settings.bind_to_scope();
     let with_nodes = |command: &str, nodes: &str| {
@@ -362,7 +362,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
     // The largest number that a computer counts to is no more of a trouble.
     assert_snapshot!(with_nodes("fit", "9223372036854775807"), @"
@@ -371,7 +371,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     8 | grid: {nodes: 9223372036854775807, method: midpoint}
       |               ^^^^^^^^^^^^^^^^^^^
       found: 9223372036854775807 nodes, which may need 34864346 PB: 3780 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
     // A simulation needs less for each node.
     let bench = Workbench::with_small_model();
@@ -379,12 +379,12 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     assert_snapshot!(with("simulate"), @"
     error: --nodes: a grid of so many nodes does not fit into memory
       found: 100000000000 nodes, which may need 50.0 TB: 500 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with("check"), @"
     error: --nodes: a grid of so many nodes does not fit into memory
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with_nodes("study", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
@@ -392,7 +392,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with_nodes("compare", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
@@ -400,7 +400,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
-      expected: at most [nodes] nodes: [bytes] are available
+      expected: at most [nodes] nodes within [bytes]
     ");
 }
 

@@ -118,3 +118,31 @@ fn every_file_is_described() {
         );
     }
 }
+
+/// Results and journals, which are text, name the model by its path: the model is at fault, not `--out`.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_path_that_is_no_text() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let bench = Workbench::with_shipped_models();
+    let odd = OsStr::from_bytes(b"models/p\xffper.yaml");
+    let place = bench.path("models");
+    let copy = place.join(OsStr::from_bytes(b"p\xffper.yaml"));
+    std::fs::copy(place.join("paper.yaml"), copy).expect("room");
+    for command in ["fit", "check", "simulate", "study", "compare"] {
+        let output = bench
+            .command(&[command])
+            .arg(odd)
+            .output()
+            .expect("the program runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{command}: {said}");
+        assert!(
+            said.contains("the path of the model is not UTF-8"),
+            "{command}: {said}"
+        );
+        assert!(!said.contains("--out"), "{command}: {said}");
+    }
+    assert!(!bench.path("runs").exists(), "something was written");
+}

@@ -211,8 +211,15 @@ fn a_starter_says_what_was_found() {
     ");
     assert_snapshot!(bench.run(&["init", "only.csv", "--sample-rate", "0"]).2, @"
     error: --sample-rate: no rate can be this
-      found: 0
-      expected: a number of readings per second, greater than 0
+      found: 0.0
+      expected: samples per second, a number from 1e-12 to 1e12
+    ");
+    // The smallest number there is: its reciprocal is infinite.
+    let rate = ["init", "only.csv", "--sample-rate", "5e-324"];
+    assert_snapshot!(bench.run(&rate).2, @"
+    error: --sample-rate: no rate can be this
+      found: 5e-324
+      expected: samples per second, a number from 1e-12 to 1e12
     ");
     assert_snapshot!(bench.run(&["init", "onli.csv"]).2, @"
     error: onli.csv: there is no such file

@@ -50,6 +50,38 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
             ("dashes", repeat("- ", 130_000)),
             ("questions", repeat("? ", 130_000)),
             ("colons", repeat("a: ", 80_000)),
+            (
+                "aliases of a long list",
+                format!(
+                    "a: &a [{}]\nb: [{}]\n",
+                    repeat("1,", 20_000),
+                    repeat("*a,", 900)
+                ),
+            ),
+            (
+                "aliases of a long text",
+                format!(
+                    "{model}experiments: [{{{record}}}]\npredict: &a {}\ntitle: [{}]\n",
+                    repeat("x", 200_000),
+                    repeat("*a,", 900)
+                ),
+            ),
+            (
+                "aliases of aliases",
+                format!(
+                    "a0: &a0 [1]\n{}",
+                    (1..60)
+                        .map(|i| format!("a{i}: &a{i} [{}]\n", repeat(&format!("*a{},", i - 1), 9)))
+                        .collect::<String>()
+                ),
+            ),
+            (
+                "aliases of records",
+                format!(
+                    "{model}experiments:\n- &r {{{record}}}\n{}",
+                    repeat("- *r\n", 990)
+                ),
+            ),
             ("deep", (0..600).map(|i| " ".repeat(i) + "a:\n").collect()),
             ("anchors", repeat("&a ", 80_000) + "*a"),
             (
@@ -173,6 +205,14 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
             ),
             ("lines", repeat("{\"piece\":\"a\",\"result\":0}\n", 20_000)),
         ],
+        "yaml" | "override" | "sequence" => vec![(
+            "aliases of a long list",
+            format!(
+                "title=\nstory: &a [{}]\nb: [{}]\n",
+                repeat("1,", 20_000),
+                repeat("*a,", 900)
+            ),
+        )],
         _ => vec![
             (
                 "lines",

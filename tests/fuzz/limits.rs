@@ -87,6 +87,18 @@ fn models_that_mean_more_than_they_say() {
     };
     let said = refuse(format!("a: &a 1\nb: [{}]\n", "*a,".repeat(1001)));
     assert!(said.contains("m.yaml:2:3005: too many aliases"), "{said}");
+    let said = refuse(format!(
+        "a: &a [{}]\nb: [{}]\n",
+        "1, ".repeat(20_000),
+        "*a, ".repeat(900)
+    ));
+    assert!(
+        said.contains("m.yaml:1:4: the aliases stand for too long a text")
+            && said.contains("found: more than 262144 bytes")
+            && said.contains("`*a` repeats the value of `&a` 900 times")
+            && said.contains("expected: at most 262144 bytes with all aliases written out"),
+        "{said}"
+    );
     let said = refuse("[".repeat(1000));
     assert!(said.contains("too many open brackets"), "{said}");
     let record = "- {data: d.csv, initial: {displacement: 1, velocity: 0}}\n";

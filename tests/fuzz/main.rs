@@ -3,26 +3,35 @@
 //!
 //! `tests/fuzz/corpus/` has a folder of inputs for each target: good ones, hand-made bad ones, and one for
 //! each mistake that was found. They are run with the shipped models and readings, and then so many
-//! mutations of them; `KMCFIT_FUZZ=100000` asks for as many of each target instead.
+//! mutations of them; `KMCFIT_FUZZ=100000` asks for as many of each target instead, `KMCFIT_FUZZ_SEED=7`
+//! draws other ones, and `KMCFIT_FUZZ_GROW=1` keeps those in the corpus that led to a message of a new
+//! kind. `.ci/long` does all three.
 
 mod corpus;
+mod growth;
 mod limits;
 mod mutate;
 mod targets;
 mod watched;
 
+use growth::Growth;
 use mutate::Mutator;
 use targets::{TARGETS, Target};
 use watched::Watched;
 
-/// Mutations of each target where nobody asks for more: a few seconds each.
-const MUTATIONS: [usize; 5] = [12_000, 6000, 6000, 4000, 1000];
+/// Mutations of each target where nothing else is asked for: a few seconds each.
+const MUTATIONS: [usize; 8] = [12_000, 6000, 6000, 4000, 1000, 6000, 6000, 6000];
 
-fn mutations(index: usize) -> usize {
-    match std::env::var("KMCFIT_FUZZ") {
-        Ok(text) => text.parse().expect("KMCFIT_FUZZ is a number of inputs"),
-        Err(_) => MUTATIONS[index],
-    }
+/// The seed of the mutations where nothing else is asked for, so that a failure comes again.
+const SEED: u64 = 1;
+
+/// A number in a variable of the environment.
+fn variable(name: &str) -> Option<u64> {
+    let text = std::env::var(name).ok()?;
+    Some(
+        text.parse()
+            .unwrap_or_else(|_| panic!("{name} is a number")),
+    )
 }
 
 fn hold(index: usize) {
@@ -31,17 +40,30 @@ fn hold(index: usize) {
     let mut seeds = corpus::seeds(name);
     target(b"");
     seeds.sort();
-    let many = mutations(index);
+    let many = variable("KMCFIT_FUZZ").unwrap_or(MUTATIONS[index] as u64);
+    let seed = variable("KMCFIT_FUZZ_SEED").unwrap_or(SEED);
+    let begin = std::time::Instant::now();
     let mut watched = Watched::new(name, target);
     for (file, bytes) in &seeds {
         watched.hold(file, bytes.clone());
     }
     let bytes = seeds.into_iter().map(|(_, bytes)| bytes).collect();
-    let mut mutator = Mutator::new(bytes);
+    let mut mutator = Mutator::new(bytes, seed);
+    let mut growth = Growth::of(name);
     for number in 0..many {
-        watched.hold(&format!("mutation {number}"), mutator.next());
+        let input = mutator.next();
+        let known = watched.kinds();
+        watched.hold(&format!("mutation {number} of seed {seed}"), input.clone());
+        if watched.kinds() > known {
+            growth.add(&input);
+        }
     }
-    println!("{name}: {}", watched.told());
+    println!(
+        "{}, {:.0} s, {} added to the corpus",
+        watched.row(seed),
+        begin.elapsed().as_secs_f64(),
+        growth.added()
+    );
 }
 
 #[test]
@@ -67,4 +89,19 @@ fn journals_of_fits() {
 #[test]
 fn journals_of_studies() {
     hold(4);
+}
+
+#[test]
+fn yaml_with_aliases() {
+    hold(5);
+}
+
+#[test]
+fn overrides() {
+    hold(6);
+}
+
+#[test]
+fn sequences_of_models() {
+    hold(7);
 }

@@ -1,4 +1,4 @@
-//! Inputs that are nearly right: changes to those of the corpus, drawn by a generator with a fixed seed.
+//! Inputs that are nearly right: changes to those of the corpus, drawn by a generator from a seed.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -80,6 +80,10 @@ const PIECES: &[&str] = &[
     ">\n",
     "? ",
     "<<: ",
+    "<<: *a",
+    "&b ",
+    "*b",
+    "[*a, *a]",
     "~",
     "\u{feff}",
     "\0",
@@ -106,13 +110,13 @@ pub struct Mutator {
 }
 
 impl Mutator {
-    pub fn new(mut seeds: Vec<Vec<u8>>) -> Self {
+    pub fn new(mut seeds: Vec<Vec<u8>>, seed: u64) -> Self {
         seeds.retain(|seed| seed.len() <= LONGEST_SEED);
         let is_word = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-');
         let words = seeds.iter().flat_map(|seed| seed.split(|b| !is_word(b)));
         let words: BTreeSet<&[u8]> = words.filter(|w| (2..30).contains(&w.len())).collect();
         Self {
-            random: ChaCha8Rng::seed_from_u64(1),
+            random: ChaCha8Rng::seed_from_u64(seed),
             words: words.into_iter().map(<[u8]>::to_vec).collect(),
             seeds,
         }

@@ -4,7 +4,7 @@
 
 use kmcfit::Run;
 use kmcfit::config::scalar::{Count, Nodes};
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{Model, ModelFile, Override, Purpose, Story, build};
 use kmcfit::dynamics::State;
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
@@ -17,21 +17,35 @@ use kmcfit::results::{
 use kmcfit::solvers::{Fit, Watch, fit_with_noise_watched};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use tempfile::TempDir;
 
 /// A function that is fuzzed.
-pub type Target = fn(&[u8]);
+pub type Target = fn(&[u8]) -> Verdict;
+
+/// What became of an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Accepted,
+    Refused,
+}
+
+/// The kinds of messages so far: without numbers and without what they quote.
+pub static KINDS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// All of them, by the names of their folders in the corpus.
-pub const TARGETS: [(&str, Target); 5] = [
+pub const TARGETS: [(&str, Target); 8] = [
     ("model", model),
     ("table", table),
     ("run", run),
     ("fit_journal", fit_journal),
     ("study_journal", study_journal),
+    ("yaml", yaml),
+    ("override", overrides),
+    ("sequence", sequence),
 ];
 
 /// Nodes beyond which a model is built on fewer: what a model asks for takes time, and is no fault.
@@ -185,15 +199,78 @@ pub fn made(target: &str) -> Vec<Vec<u8>> {
 const SEPARATOR: &str = "---\n";
 
 /// A message is one of text, and begins with the place.
-fn told(error: &InputError) {
+fn told(error: &InputError) -> Verdict {
     let text = error.to_string();
     assert!(!text.is_empty());
     let is_odd = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
     assert!(!text.contains(is_odd), "{text:?}");
+    let kind = kind(&error.problem) + &kind(error.hint.as_deref().unwrap_or_default());
+    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    kinds.insert(kind);
+    Verdict::Refused
+}
+
+/// A message without numbers and without what it quotes.
+fn kind(text: &str) -> String {
+    let unquoted = text.split('`').step_by(2);
+    let words: String = unquoted.collect();
+    words.chars().filter(|c| !c.is_ascii_digit()).collect()
+}
+
+/// A YAML text with aliases behind a model that is right: read again with a value put in, and searched
+/// for its data files, as the commands do.
+pub fn yaml(bytes: &[u8]) -> Verdict {
+    let place = workshop().path("models/m.yaml");
+    let text = String::from_utf8_lossy(bytes);
+    let file = match ModelFile::parse(&place, text) {
+        Ok(file) => file,
+        Err(error) => return told(&error),
+    };
+    file.data_files();
+    let change = Override::parse("title=x").expect("an override");
+    match file.with(&[change]) {
+        Err(error) => told(&error),
+        Ok(file) => {
+            file.data_files();
+            told(&file.error_at("experiments[0].initial.velocity", "a mistake"));
+            Verdict::Accepted
+        }
+    }
+}
+
+/// `KEY=VALUE` beside a model.
+pub fn overrides(bytes: &[u8]) -> Verdict {
+    let text = String::from_utf8_lossy(bytes);
+    let place = workshop().path("models/m.yaml");
+    let model = "format: 1\nexperiments:\n  - {data: ../data/paper.csv, initial: {displacement: 3.3, velocity: \
+                 1.0}}\ngrid: {nodes: 16}\nfunctions: {mass: {basis: nodal, start: 2}, damping: {fixed: 0}, \
+                 stiffness: {fixed: 1}}\n";
+    let file = ModelFile::parse(&place, model).expect("a model");
+    let change = match Override::parse(&text) {
+        Ok(change) => change,
+        Err(error) => return told(&error),
+    };
+    match file.with(&[change]) {
+        Err(error) => told(&error),
+        Ok(file) => {
+            file.data_files();
+            Verdict::Accepted
+        }
+    }
+}
+
+/// A file that lists models.
+pub fn sequence(bytes: &[u8]) -> Verdict {
+    let path = workshop().path("models/sequence.yaml");
+    fs::write(&path, bytes).expect("room");
+    match Story::read(&path) {
+        Err(error) => told(&error),
+        Ok(_) => Verdict::Accepted,
+    }
 }
 
 /// A model file: taken apart, built for every purpose, and evaluated once.
-pub fn model(bytes: &[u8]) {
+pub fn model(bytes: &[u8]) -> Verdict {
     let place = workshop().path("models/m.yaml");
     let text = String::from_utf8_lossy(bytes);
     let mut file = match ModelFile::parse(&place, text) {
@@ -212,9 +289,10 @@ pub fn model(bytes: &[u8]) {
         Purpose::Check { nodes: None },
         Purpose::Simulate { nodes: Some(21) },
     ];
+    let mut verdict = Verdict::Accepted;
     for purpose in purposes {
         match build(&file, purpose) {
-            Err(error) => told(&error),
+            Err(error) => verdict = told(&error),
             Ok(model) => {
                 let start = model.problem.start();
                 assert!(start.iter().all(|x| x.is_finite()));
@@ -224,10 +302,11 @@ pub fn model(bytes: &[u8]) {
             }
         }
     }
+    verdict
 }
 
 /// A table in any format.
-pub fn table(bytes: &[u8]) {
+pub fn table(bytes: &[u8]) -> Verdict {
     let any = TableFormat::default();
     let formats = [
         TableFormat {
@@ -250,12 +329,14 @@ pub fn table(bytes: &[u8]) {
             ..any
         },
     ];
+    let mut verdict = Verdict::Accepted;
     for format in [any, formats[bytes.len() % formats.len()]] {
         match Table::parse_with("t.csv", bytes, &format) {
-            Err(error) => told(&error),
+            Err(error) => verdict = told(&error),
             Ok(table) => columns(&table),
         }
     }
+    verdict
 }
 
 fn columns(table: &Table) {
@@ -264,6 +345,7 @@ fn columns(table: &Table) {
     for index in 0..table.width().min(20) {
         assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
         table.unit(index);
+        let _ = table.check_stated_unit(index);
         if let Ok(readings) = table.readings(index) {
             assert_eq!(readings.len(), table.rows());
         }
@@ -276,7 +358,7 @@ fn columns(table: &Table) {
 }
 
 /// A file of a finished run, in the place of the right one: which it is, is told from its beginning.
-pub fn run(bytes: &[u8]) {
+pub fn run(bytes: &[u8]) -> Verdict {
     let folder = workshop().path("run");
     let head = &bytes[..bytes.len().min(64)];
     let has = |word: &str| head.windows(word.len()).any(|w| w == word.as_bytes());
@@ -300,13 +382,14 @@ pub fn run(bytes: &[u8]) {
             };
             let _ = predict(&run.oscillator, &run.device, run.truth.as_ref(), &[state]);
             run.band("mass");
+            Verdict::Accepted
         }
     }
 }
 
 /// What a fit left that was killed: the name of a method, the lines of its journal behind the heading, and
 /// that of its checkpoint, all without checksums. The fit goes on from it to a named end.
-pub fn fit_journal(bytes: &[u8]) {
+pub fn fit_journal(bytes: &[u8]) -> Verdict {
     let folder = workshop().path("fit");
     let text = bytes.to_vec();
     let method = METHODS.iter().position(|m| text.starts_with(m.as_bytes()));
@@ -331,12 +414,13 @@ pub fn fit_journal(bytes: &[u8]) {
             let found = fitted(model, &mut journal);
             assert!(found.best.evaluation.cost.is_finite());
             assert!(found.best.evaluation.device.mass.iter().all(|m| *m > 0.0));
+            Verdict::Accepted
         }
     }
 }
 
 /// The lines of a study's journal behind the heading: what is kept is told and drawn.
-pub fn study_journal(bytes: &[u8]) {
+pub fn study_journal(bytes: &[u8]) -> Verdict {
     let folder = workshop().path("study");
     let heading = Heading::new("study", vec!["m.yaml".into()]);
     let text = with_checksums(&heading, bytes).expect("a heading");
@@ -372,6 +456,7 @@ pub fn study_journal(bytes: &[u8]) {
         let out = OutputFolder::prepare(&folder, claim).expect("a folder");
         document.write(&out).expect("room");
     }
+    Verdict::Accepted
 }
 
 /// Names of the pieces that are looked for.

@@ -1,6 +1,6 @@
 //! Runs inputs, and watches what they take.
 
-use crate::targets::Target;
+use crate::targets::{KINDS, Target, Verdict};
 use peak_alloc::PeakAlloc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -20,14 +20,16 @@ const HANGS: Duration = Duration::from_secs(60);
 const PER_BYTE: usize = 256;
 const BESIDES: usize = 128 << 20;
 
-/// What an input took, in bytes, if it came back.
-type Taken = Option<usize>;
+/// What an input took, in bytes, and what became of it, if it came back.
+type Taken = Option<(usize, Verdict)>;
 
 /// A target whose inputs are run one by one on a thread of their own.
 pub struct Watched {
     inputs: Sender<Vec<u8>>,
     taken: Receiver<Taken>,
-    count: usize,
+    name: String,
+    /// Inputs that were accepted and refused.
+    verdicts: [usize; 2],
     /// The most that one took.
     most: (usize, String),
     _alone: MutexGuard<'static, ()>,
@@ -44,7 +46,7 @@ impl Watched {
                 MEMORY.reset_peak_usage();
                 let held = std::panic::catch_unwind(|| target(&bytes));
                 let most = MEMORY.peak_usage().saturating_sub(before);
-                if told.send(held.ok().map(|()| most)).is_err() {
+                if told.send(held.ok().map(|verdict| (most, verdict))).is_err() {
                     return;
                 }
             }
@@ -54,7 +56,8 @@ impl Watched {
         Self {
             inputs,
             taken,
-            count: 0,
+            name: name.to_owned(),
+            verdicts: [0; 2],
             most: (0, String::new()),
             _alone: alone,
         }
@@ -67,23 +70,34 @@ impl Watched {
         self.inputs.send(bytes).expect("the thread lives");
         let taken = self.taken.recv_timeout(HANGS);
         let taken = taken.unwrap_or_else(|_| panic!("{name} hangs:\n{shown}"));
-        let taken = taken.unwrap_or_else(|| panic!("{name} panics:\n{shown}"));
+        let (taken, verdict) = taken.unwrap_or_else(|| panic!("{name} panics:\n{shown}"));
         let most = PER_BYTE * length + BESIDES;
         assert!(
             taken <= most,
             "{name} takes {taken} bytes of {most}:\n{shown}"
         );
-        self.count += 1;
+        self.verdicts[verdict as usize] += 1;
         if taken > self.most.0 {
             self.most = (taken, name.to_owned());
         }
     }
 
-    pub fn told(&self) -> String {
+    /// How many kinds of messages there were, in all targets so far.
+    pub fn kinds(&self) -> usize {
+        KINDS.lock().unwrap_or_else(PoisonError::into_inner).len()
+    }
+
+    /// What became of the inputs, as `.ci/long` reads it.
+    pub fn row(&self, seed: u64) -> String {
+        let [accepted, refused] = self.verdicts;
         let (most, name) = &self.most;
         format!(
-            "{} inputs; the most memory, {most} bytes, for {name}",
-            self.count
+            "{}: seed {seed}, {} inputs, {accepted} accepted, {refused} refused, 0 crashes, {} kinds of \
+             messages, {:.1} MB at most ({name})",
+            self.name,
+            accepted + refused,
+            self.kinds(),
+            *most as f64 / 1e6
         )
     }
 }

@@ -1,4 +1,8 @@
 //! The registry of keys, the reader and the schema say the same.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the texts are those of the project"
+)]
 
 use kmcfit::config::keys::{self, Group, Kind, MODEL, STORY};
 use kmcfit::config::{ModelFile, Override};

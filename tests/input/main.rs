@@ -9,3 +9,4 @@ mod model;
 mod model_errors;
 mod table;
 mod table_errors;
+mod units;

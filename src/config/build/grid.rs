@@ -1,7 +1,7 @@
 //! The time grid: from the model, or one node per reading.
 
 mod auto;
-mod memory;
+mod per_node;
 
 use super::Purpose;
 use super::experiments::{RawChannel, Record};
@@ -10,6 +10,7 @@ use crate::config::scalar::{Count, Nodes};
 use crate::config::spec::StepMethod;
 use crate::dynamics::{Grid, Method};
 use crate::error::{InputError, Place};
+use crate::memory;
 
 /// Most nodes that are chosen for the user: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;
@@ -62,17 +63,18 @@ fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError 
     }
 }
 
+/// Memory that a run of the model on so many nodes may need, bytes.
+pub(super) fn memory_of(file: &ModelFile, purpose: Purpose, nodes: usize) -> f64 {
+    nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
+}
+
 /// Refuses a grid that the machine has no memory for, before any is taken.
 fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<(), InputError> {
-    let each = memory::per_node(file, purpose);
-    let (available, how) = match memory::available() {
-        Some(bytes) => (bytes, "available"),
-        None => (memory::ASSUMED, "assumed, as the system does not say"),
-    };
-    let needed = nodes as f64 * each as f64;
-    if needed <= available as f64 {
+    let needed = memory_of(file, purpose, nodes);
+    let Err(available) = memory::check(needed as u64) else {
         return Ok(());
-    }
+    };
+    let each = per_node::per_node(file, purpose) as u64;
     Err(about_nodes(
         file,
         purpose,
@@ -83,9 +85,8 @@ fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<
         memory::in_words(needed)
     ))
     .expected(format!(
-        "at most {} nodes: {} are {how}",
-        available / each as u64,
-        memory::in_words(available as f64)
+        "at most {} nodes within {available}",
+        available.bytes.saturating_sub(memory::BASE) / each,
     )))
 }
 

@@ -5,6 +5,7 @@ use crate::config::ModelFile;
 use crate::dynamics::Grid;
 use crate::error::InputError;
 use crate::observations::{Table, increasing};
+use crate::units::Kind;
 
 /// Column of times in files of functions.
 const TIME_COLUMN: &str = "t_s";
@@ -27,6 +28,7 @@ pub(super) fn column_on_grid(
 ) -> Result<Vec<f64>, InputError> {
     let about_data = asked_for(file, wanted.data_key);
     let table = Table::read(file.resolve(wanted.data)).map_err(&about_data)?;
+    check_seconds(&table).map_err(&about_data)?;
     let times = increasing(&table, TIME_COLUMN).map_err(&about_data)?;
     let values = table
         .column(wanted.column)
@@ -54,6 +56,24 @@ pub(super) fn column_on_grid(
         .iter()
         .map(|t| linear(times, values, *t))
         .collect())
+}
+
+/// Refuses times that the file states in another unit than its name does: s.
+fn check_seconds(table: &Table) -> Result<(), InputError> {
+    let index = table.find(&TIME_COLUMN.into())?;
+    let unit = table.stated_unit(index).explicit(Kind::Time);
+    match unit.filter(|unit| unit.factor() != 1.0) {
+        None => Ok(()),
+        Some(unit) => Err(
+            InputError::file(table.path(), "the times are not in seconds")
+                .found(format!(
+                    "the unit {} of `{}`",
+                    unit.symbol(),
+                    table.label(index)
+                ))
+                .expected(format!("`{TIME_COLUMN}` in s")),
+        ),
+    }
 }
 
 /// Linear interpolation, constant beyond the ends.

@@ -145,6 +145,10 @@ impl Columns {
         if columns.channels().next().is_none() {
             columns.guess(table)?;
         }
+        for column in &columns.used {
+            let correct = |error: InputError| error.hint("correct one of them in the file");
+            table.check_stated_unit(column.index).map_err(correct)?;
+        }
         Ok(columns)
     }
 
@@ -322,8 +326,7 @@ fn known(table: &Table, index: usize) -> Option<Column> {
     let label = table.headers().get(index).map_or("", String::as_str);
     let (label, is_base) = without_base(label);
     let by_name = role_of(&label.to_lowercase());
-    let in_file = table.unit(index);
-    let in_name = suffix(&label);
+    let stated = table.stated_unit(index);
     let roles = [
         Role::Time,
         Role::Acceleration,
@@ -332,9 +335,8 @@ fn known(table: &Table, index: usize) -> Option<Column> {
         Role::Force,
     ];
     let unit_of = |role: Role| {
-        let unit = |text: &str| Unit::recognise(role.kind(), text);
-        (in_file.and_then(unit).map(|u| (u, false)))
-            .or_else(|| in_name.as_deref().and_then(unit).map(|u| (u, true)))
+        let explicit = stated.explicit(role.kind()).map(|u| (u, false));
+        explicit.or_else(|| stated.suffix(role.kind()).map(|u| (u, true)))
     };
     let by_unit = roles.into_iter().find(|role| unit_of(*role).is_some());
     if by_unit.is_none() && is_foreign(&label) {
@@ -397,10 +399,4 @@ fn role_of(name: &str) -> Option<Role> {
         .iter()
         .find(|(_, begins)| begins.iter().any(|b| means(b)));
     named.map(|(role, _)| *role)
-}
-
-/// The unit at the end of a name such as `a_m_per_s2` or `y_mm`.
-fn suffix(name: &str) -> Option<String> {
-    let (_, unit) = name.split_once('_')?;
-    Some(unit.replace("_per_", "/").replace('_', " "))
 }

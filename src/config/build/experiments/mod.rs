@@ -5,6 +5,7 @@ mod doubts;
 mod excitation;
 mod initial;
 mod source;
+mod unit;
 mod value;
 
 use super::functions::Assemblies;

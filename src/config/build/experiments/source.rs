@@ -1,11 +1,12 @@
 //! Columns of files as times and values.
 
+use super::unit::Column;
 use crate::config::ModelFile;
 use crate::config::build::asked_for;
 use crate::config::scalar::{ColumnId, ScalarOr, Text};
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec};
 use crate::error::InputError;
-use crate::observations::{ColumnName, Table, TableFormat, increasing_at};
+use crate::observations::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
 use crate::units::{Kind, Unit};
 
 /// Default name of the column of times.
@@ -83,9 +84,18 @@ pub fn read(
         None => column_key,
     };
     let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
-    let unit = unit(file, &experiment, wanted, &table, index, warnings)?;
+    let column = |index| Column {
+        file,
+        experiment: &experiment,
+        name: wanted.name,
+        kind: wanted.kind,
+        given: wanted.unit,
+        table: &table,
+        index,
+    };
+    let unit = column(index).unit(warnings)?;
     let factor = unit.factor();
-    let times = times(file, spec, &experiment, own, &table)?;
+    let times = times(file, spec, &experiment, own, &table, warnings)?;
     let values = table
         .readings(index)
         .map_err(asked_for(file, &column_key))?;
@@ -94,6 +104,7 @@ pub fn read(
             let found = table
                 .find(&ColumnName::from(name))
                 .map_err(asked_for(file, key))?;
+            column(found).same_as(unit, key, warnings);
             Some(table.readings(found).map_err(asked_for(file, key))?)
         }
         None => None,
@@ -165,12 +176,8 @@ fn format(spec: &ExperimentSpec) -> TableFormat {
 fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
     match &error.place {
         crate::error::Place::Argument(name) => {
-            let here = file.error_at(&format!("{experiment}.format.{name}"), &error.problem);
-            InputError {
-                place: here.place,
-                key: here.key,
-                ..error
-            }
+            let key = format!("{experiment}.format.{name}");
+            about_key(file, &key)(error)
         }
         _ => error,
     }
@@ -188,6 +195,7 @@ fn times(
     experiment: &str,
     own: Option<&crate::config::spec::SourceSpec>,
     table: &Table,
+    warnings: &mut Vec<String>,
 ) -> Result<Times, InputError> {
     let own_rate = own.and_then(|s| s.sample_rate);
     let own_column = own.and_then(|s| s.time.as_ref());
@@ -202,14 +210,14 @@ fn times(
         },
     };
     if let Some(rate) = rate {
-        if rate.0 <= 0.0 {
+        if !SAMPLE_RATES.contains(&rate.0) {
             return Err(file
                 .error_at(
                     &format!("{experiment}.sample_rate"),
-                    "a rate must be positive",
+                    "this sampling rate cannot be used",
                 )
-                .found(rate.0)
-                .expected("readings per s, a number greater than 0"));
+                .found(format!("{:?}", rate.0))
+                .expected(rates()));
         }
         let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
         let label = String::new();
@@ -225,19 +233,27 @@ fn times(
             Some(_) => error,
         }
     })?;
-    let given = spec.units.as_ref().and_then(|u| u.time.as_ref());
-    let unit = match given {
-        Some(text) => parse(file, &format!("{experiment}.units.time"), Kind::Time, text)?,
-        None => table
-            .unit(index)
-            .and_then(|text| Unit::recognise(Kind::Time, text))
-            .unwrap_or(Unit::si(Kind::Time)),
+    let column = Column {
+        file,
+        experiment,
+        name: "time",
+        kind: Kind::Time,
+        given: spec.units.as_ref().and_then(|u| u.time.as_ref()),
+        table,
+        index,
     };
+    let unit = column.unit(warnings)?;
     let values = increasing_at(table, index).map_err(asked_for(file, &key))?;
     Ok(Times {
         values: values.iter().map(|t| t * unit.factor()).collect(),
         label: table.label(index),
     })
+}
+
+/// The sampling rates that are accepted, for messages.
+fn rates() -> String {
+    let (least, most) = (SAMPLE_RATES.start(), SAMPLE_RATES.end());
+    format!("samples per second, a number from {least:e} to {most:e}")
 }
 
 fn two_times(file: &ModelFile, experiment: &str) -> InputError {
@@ -249,72 +265,17 @@ fn two_times(file: &ModelFile, experiment: &str) -> InputError {
     .expected("one of the two")
 }
 
-fn parse(file: &ModelFile, key: &str, kind: Kind, text: &Text) -> Result<Unit, InputError> {
-    Unit::parse(kind, &text.0).map_err(|error| {
+/// An error about an argument, said at the key of the model that gives it.
+pub(super) fn about_key<'a>(
+    file: &'a ModelFile,
+    key: &'a str,
+) -> impl Fn(InputError) -> InputError + 'a {
+    move |error| {
         let here = file.error_at(key, &error.problem);
         InputError {
             place: here.place,
             key: here.key,
             ..error
-        }
-    })
-}
-
-/// The unit of a column: the model's word, else the file's own, else SI.
-fn unit(
-    file: &ModelFile,
-    experiment: &str,
-    wanted: &Wanted,
-    table: &Table,
-    index: usize,
-    warnings: &mut Vec<String>,
-) -> Result<Unit, InputError> {
-    let own = table.unit(index);
-    if let Some(text) = wanted.unit {
-        let key = format!("{experiment}.units.{}", wanted.name);
-        let unit = parse(file, &key, wanted.kind, text)?;
-        let other = own.and_then(|own| Unit::recognise(wanted.kind, own));
-        if let Some(other) = other.filter(|other| other.factor() != unit.factor()) {
-            warnings.push(format!(
-                "{key}: the column `{}` is taken in {}, though the file says {}",
-                table.label(index),
-                unit.symbol(),
-                other.symbol()
-            ));
-        }
-        return Ok(unit);
-    }
-    let Some(own) = own else {
-        let label = table.label(index);
-        let suffix = label.rsplit_once('_').map_or("", |(_, suffix)| suffix);
-        let looks = Unit::recognise(wanted.kind, suffix);
-        if let Some(looks) = looks.filter(|unit| unit.factor() != 1.0) {
-            warnings.push(format!(
-                "{experiment}.columns.{}: the column `{label}` is taken in {}, though its name \
-                 ends like {}; if that is its unit, say `units: {{{}: {}}}`",
-                wanted.name,
-                Unit::si(wanted.kind).symbol(),
-                looks.symbol(),
-                wanted.name,
-                looks.symbol(),
-            ));
-        }
-        // A name like `phi_rad` or `acc_V` says what reports should call the unit.
-        let label = looks.filter(|unit| unit.factor() == 1.0);
-        return Ok(label.unwrap_or(Unit::si(wanted.kind)));
-    };
-    match Unit::recognise(wanted.kind, own) {
-        Some(unit) => Ok(unit),
-        None => {
-            warnings.push(format!(
-                "{experiment}.columns.{}: `{own}`, which the file gives as the unit of `{}`, is \
-                 not known as one of {}; the values are taken as they are, in {}",
-                wanted.name,
-                table.label(index),
-                wanted.kind.name(),
-                Unit::si(wanted.kind).symbol(),
-            ));
-            Ok(Unit::si(wanted.kind))
         }
     }
 }

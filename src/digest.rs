@@ -17,8 +17,11 @@ pub fn digest(bytes: &[u8]) -> String {
 /// The digest of a file's contents, read block by block.
 ///
 /// # Errors
-/// If the file cannot be read.
+/// If the path is no file that can be read. The contents of a pipe can be read once only, so they have no digest.
 pub fn digest_of_file(path: &Path) -> io::Result<String> {
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::other("not a file"));
+    }
     let mut file = File::open(path)?;
     let mut hasher = Sha256::new();
     let mut block = vec![0; BLOCK];

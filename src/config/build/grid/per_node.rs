@@ -10,7 +10,6 @@ use crate::config::build::functions::{Slot, slots};
 use crate::config::scalar::Knots;
 use crate::config::spec::{Basis, FitMethod};
 use crate::solvers::FEW_PARAMETERS;
-use std::path::Path;
 
 /// Bytes per node of every run: times, tables and figures.
 const RUN: usize = 200;
@@ -34,9 +33,6 @@ const MANY_RECORD: usize = 3500;
 const MANY_FUNCTION: usize = 1500;
 /// So many times that where quadratic programs may be needed: an interior-point method keeps more.
 const PROGRAMS: usize = 2;
-
-/// What is assumed to be available where the system does not say, bytes.
-pub const ASSUMED: u64 = 4_000_000_000;
 
 /// Bytes per node that a run of the model may need.
 pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
@@ -118,77 +114,10 @@ fn has_programs(file: &ModelFile, functions: &[Slot]) -> bool {
     file.spec.constraints.is_some() || functions.iter().any(limited)
 }
 
-/// Bytes that can be had without swapping, where the system says so (Linux does), and not more than the
-/// container, if this is one, may still take.
-pub fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let of_machine = kilobytes(&text)?.saturating_mul(1024);
-    Some(of_machine.min(left_of_container().unwrap_or(u64::MAX)))
-}
-
-/// What the control group (version 2) of a container leaves; nothing where it sets no limit.
-fn left_of_container() -> Option<u64> {
-    let number = |name: &str| -> Option<u64> {
-        let text = std::fs::read_to_string(Path::new("/sys/fs/cgroup").join(name));
-        text.ok()?.trim().parse().ok()
-    };
-    Some(number("memory.max")?.saturating_sub(number("memory.current")?))
-}
-
-/// `MemAvailable` of Linux's `/proc/meminfo`.
-fn kilobytes(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse().ok()
-}
-
-/// Bytes for people: three digits and a unit.
-pub fn in_words(bytes: f64) -> String {
-    let units = ["bytes", "kB", "MB", "GB", "TB", "PB"];
-    let mut value = bytes;
-    let mut unit = 0;
-    while value >= 999.5 && unit + 1 < units.len() {
-        value /= 1000.0;
-        unit += 1;
-    }
-    let decimals = match value {
-        small if unit > 0 && small < 9.995 => 2,
-        middle if unit > 0 && middle < 99.95 => 1,
-        _ => 0,
-    };
-    format!("{value:.decimals$} {}", units[unit])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bytes_have_three_digits() {
-        let words = [
-            0.0, 999.0, 1000.0, 9994.0, 9996.0, 99_960.0, 123_456.0, 9e14, 9e20,
-        ]
-        .map(in_words);
-        let expected = [
-            "0 bytes",
-            "999 bytes",
-            "1.00 kB",
-            "9.99 kB",
-            "10.0 kB",
-            "100 kB",
-            "123 kB",
-            "900 TB",
-            "900000 PB",
-        ];
-        assert_eq!(words, expected);
-    }
-
-    #[test]
-    fn the_available_memory_is_found_in_its_line() {
-        let text = "MemTotal:       24596268 kB\nMemFree: 1 kB\nMemAvailable:   23456 kB\n";
-        assert_eq!(kilobytes(text), Some(23_456));
-        assert_eq!(kilobytes("MemTotal: 1 kB\n"), None);
-        assert_eq!(kilobytes("MemAvailable: much\n"), None);
-    }
+    use std::path::Path;
 
     fn model(functions: &str, fit: &str, more: &str) -> ModelFile {
         let record = "{initial: {displacement: 1.0, velocity: 0.0}}";

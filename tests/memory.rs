@@ -1,0 +1,315 @@
+//! Memory limits: whatever the limit is and whatever is asked for, a command either does it or refuses
+//! it in time, with what it needs and what is available; an older run stays as it is.
+//!
+//! The limit is that on the address space (`ulimit -v`), which the system enforces on the process alone.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// Address space in kB.
+const LIMITS: [u64; 6] = [200_000, 300_000, 500_000, 1_000_000, 2_000_000, 4_000_000];
+
+const MODEL: &str = "format: 1
+experiments: [{data: DATA, initial: {displacement: 1, velocity: 0}}]
+grid: {NODES, method: midpoint}
+functions:
+  mass: {basis: nodal, start: 2.0}
+  damping: {basis: constant, start: 1.0}
+  stiffness: {basis: nodal, start: 1.0}
+fit: {method: lbfgs, stop: {iterations: 3}}
+";
+
+/// A folder with models small and large, records short and long, and a run of the small model.
+struct Bench(TempDir);
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self(tempfile::tempdir().expect("a folder"));
+        let row = |i: usize| format!("{},{}\n", i as f64 * 0.1, (i as f64 * 0.1).cos());
+        bench.write(
+            "short.csv",
+            &format!("t_s,y_m\n{}", (0..21).map(row).collect::<String>()),
+        );
+        bench.model("small", "short.csv", "nodes: 21");
+        bench.model("large", "short.csv", "nodes: 5000000");
+        let study = "study: {profiles: false, multistart: {starts: 4}}\n";
+        let text = fs::read_to_string(bench.path("small.yaml")).expect("a model");
+        bench.write("study.yaml", &(text + study));
+        bench.write(
+            "sequence.yaml",
+            "format: 1\nstory: [small.yaml, large.yaml]\n",
+        );
+        let (code, said) = bench.run(None, &["fit", "small.yaml", "--out", "run"]);
+        assert!([0, 3].contains(&code), "{said}");
+        bench
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("room");
+    }
+
+    fn model(&self, name: &str, data: &str, nodes: &str) {
+        let text = MODEL.replace("DATA", data).replace("NODES", nodes);
+        self.write(&format!("{name}.yaml"), &text);
+    }
+
+    /// Runs the program with so much address space: its exit code (-1 for a signal), and what it says.
+    fn run(&self, limit: Option<u64>, arguments: &[&str]) -> (i32, String) {
+        let mut command = Command::new("sh");
+        let shell = match limit {
+            Some(limit) => format!("ulimit -v {limit} && exec \"$0\" \"$@\""),
+            None => "exec \"$0\" \"$@\"".into(),
+        };
+        let output = command
+            .args(["-c", &shell, env!("CARGO_BIN_EXE_kmcfit")])
+            .args(arguments)
+            .current_dir(self.0.path())
+            .stdin(Stdio::null())
+            .output()
+            .expect("a shell");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code().unwrap_or(-1), said)
+    }
+
+    /// All files of a folder with their contents.
+    fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
+        let mut files = BTreeMap::new();
+        collect(&self.path(folder), &mut files);
+        files
+    }
+}
+
+fn collect(folder: &Path, files: &mut BTreeMap<String, Vec<u8>>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        match path.is_dir() {
+            true => collect(&path, files),
+            false => {
+                let bytes = fs::read(&path).expect("a file");
+                files.insert(path.display().to_string(), bytes);
+            }
+        }
+    }
+}
+
+/// Whether the test can be made here; says loudly where it cannot.
+fn is_linux() -> bool {
+    if cfg!(target_os = "linux") {
+        return true;
+    }
+    eprintln!("SKIPPED: memory limits are read on Linux only");
+    false
+}
+
+/// The refusal says what is needed and what is available.
+fn assert_refused(code: i32, said: &str, what: &str) {
+    assert_eq!(code, 2, "{what}: {said}");
+    let amounts = ["memory", "found: ", "expected: ", "B, which "];
+    for word in amounts {
+        assert!(said.contains(word), "{what}: `{word}` in {said}");
+    }
+}
+
+#[test]
+fn small_models_are_done_or_refused() {
+    if !is_linux() {
+        return;
+    }
+    let bench = Bench::new();
+    let commands: [&[&str]; 13] = [
+        &["fit", "small.yaml", "--out", "a"],
+        &["simulate", "small.yaml", "--out", "s.csv"],
+        &["check", "small.yaml"],
+        &["predict", "run", "--initial", "1,0", "--out", "p"],
+        &["compare", "small.yaml", "run", "--out", "c"],
+        &["study", "study.yaml", "--threads", "2", "--out", "t"],
+        &["study", "study.yaml", "--threads", "1000", "--out", "t"],
+        &["resume", "run"],
+        &["init", "short.csv", "--out", "new.yaml"],
+        &["explain", "grid"],
+        &["schema"],
+        &["demo", "--out", "d"],
+        &["completions", "bash"],
+    ];
+    let mut done = 0;
+    for limit in LIMITS {
+        for arguments in commands {
+            let (free, _) = bench.run(None, arguments);
+            let _ = fs::remove_file(bench.path("new.yaml"));
+            let (code, said) = bench.run(Some(limit), arguments);
+            let _ = fs::remove_file(bench.path("new.yaml"));
+            let what = format!("{limit} kB: {arguments:?}");
+            match code == free {
+                true => done += 1,
+                false => assert_refused(code, &said, &what),
+            }
+        }
+    }
+    // A refusal of everything would be no proof: nearly all of them fit into the least limit.
+    let all = LIMITS.len() * commands.len();
+    assert!(done * 10 >= all * 9, "{done} of {all}");
+}
+
+#[test]
+fn large_models_are_refused_and_the_older_run_stays_whole() {
+    if !is_linux() {
+        return;
+    }
+    let bench = Bench::new();
+    let before = bench.files(".");
+    let commands: [&[&str]; 7] = [
+        &["fit", "large.yaml", "--out", "run"],
+        &[
+            "simulate",
+            "small.yaml",
+            "--nodes",
+            "50000000",
+            "--out",
+            "run/functions.csv",
+        ],
+        &["check", "small.yaml", "--nodes", "21,5000000"],
+        &["compare", "large.yaml", "--out", "run"],
+        &["study", "large.yaml", "--out", "run"],
+        // A fit of it would fit into the largest limit; a study takes more.
+        &[
+            "study",
+            "small.yaml",
+            "--set",
+            "grid.nodes=500000",
+            "--out",
+            "run",
+        ],
+        &[
+            "fit",
+            "small.yaml",
+            "--set",
+            "grid.nodes=5000000",
+            "--out",
+            "run",
+        ],
+    ];
+    for limit in LIMITS {
+        for arguments in commands {
+            let (code, said) = bench.run(Some(limit), arguments);
+            assert_refused(code, &said, &format!("{limit} kB: {arguments:?}"));
+        }
+    }
+    let after = bench.files(".");
+    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&before), names(&after));
+    assert!(before == after, "a file was changed");
+}
+
+/// The largest grid that is accepted is fitted to its end.
+#[test]
+fn what_is_accepted_fits() {
+    if !is_linux() {
+        return;
+    }
+    let bench = Bench::new();
+    for method in [
+        "lbfgs",
+        "gauss-newton",
+        "steepest-descent",
+        "projected-gradient",
+    ] {
+        let limit = 300_000;
+        let set = format!("fit.method={method}");
+        let fit = |nodes: &str| {
+            let nodes = format!("grid.nodes={nodes}");
+            let arguments = [
+                "fit",
+                "small.yaml",
+                "--set",
+                &nodes,
+                "--set",
+                &set,
+                "--out",
+                "fits",
+            ];
+            bench.run(Some(limit), &arguments)
+        };
+        let (code, said) = fit("5000000");
+        assert_refused(code, &said, method);
+        let most = said
+            .split("at most ")
+            .nth(1)
+            .and_then(|rest| rest.split(' ').next());
+        let most: usize = most
+            .and_then(|text| text.parse().ok())
+            .expect("a number of nodes");
+        // What the process maps differs a little from start to start.
+        let (code, said) = fit(&(most - most / 50).to_string());
+        assert!([0, 3].contains(&code), "{method} on {most} nodes: {said}");
+    }
+}
+
+/// Tables are read where they fit, and refused before their memory is taken where they do not.
+#[test]
+fn long_records_are_read_or_refused() {
+    if !is_linux() {
+        return;
+    }
+    let bench = Bench::new();
+    let rows = 2_000_000;
+    let text: String = (0..rows).map(|i| format!("{i},{}\n", i % 7)).collect();
+    bench.write("long.csv", &format!("t_s,y_m\n{text}"));
+    bench.model("long", "long.csv", "nodes: 21");
+    let (mut read, mut refused) = (0, 0);
+    for limit in LIMITS {
+        for arguments in [
+            &["check", "long.yaml", "--no-gradient"][..],
+            &["init", "long.csv", "--out", "new.yaml"][..],
+        ] {
+            let (code, said) = bench.run(Some(limit), arguments);
+            let _ = fs::remove_file(bench.path("new.yaml"));
+            match code {
+                0 | 3 => read += 1,
+                _ => {
+                    assert_refused(code, &said, &format!("{limit} kB: {arguments:?}"));
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(read > 0 && refused > 0, "{read} read, {refused} refused");
+}
+
+/// The tables of a run of a million nodes are read where their values fit.
+#[test]
+fn long_runs_are_read_or_refused() {
+    if !is_linux() {
+        return;
+    }
+    let bench = Bench::new();
+    let nodes = 1_000_000;
+    let document = fs::read_to_string(bench.path("run/result.json")).expect("a run");
+    let grown = document.replace("\"nodes\": 21,", &format!("\"nodes\": {nodes},"));
+    assert_ne!(document, grown);
+    bench.write("run/result.json", &grown);
+    for name in ["run/functions.csv", "run/trajectory.csv"] {
+        let table = fs::read_to_string(bench.path(name)).expect("a table");
+        let header = table.lines().next().expect("names");
+        let row = vec!["1"; header.split(',').count()].join(",") + "\n";
+        bench.write(name, &format!("{header}\n{}", row.repeat(nodes)));
+    }
+    let (mut read, mut refused) = (0, 0);
+    for limit in LIMITS {
+        let (code, said) = bench.run(Some(limit), &["predict", "run", "--initial", "1,0"]);
+        match code {
+            0 | 3 => read += 1,
+            _ => {
+                assert_refused(code, &said, &format!("{limit} kB"));
+                refused += 1;
+            }
+        }
+    }
+    assert!(read > 0 && refused > 0, "{read} read, {refused} refused");
+}
