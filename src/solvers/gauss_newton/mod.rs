@@ -77,6 +77,8 @@ impl Default for GaussNewton {
 struct Proposal {
     parameters: Vec<f64>,
     predicted: f64,
+    /// Whether the step is a minimum of the subproblem to full accuracy. Of another one only its decrease counts.
+    is_exact: bool,
 }
 
 /// What a subproblem gives.
@@ -112,6 +114,9 @@ impl Descend for GaussNewton {
                     continue;
                 }
             };
+            if !proposal.is_exact {
+                trouble = Some(ConicStatus::Almost);
+            }
             let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
             let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
             let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
@@ -240,18 +245,28 @@ impl GaussNewton {
     }
 }
 
+/// A change of the cost that is within the rounding of the response, which changes a sum of squared residuals by their
+/// product.
+pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
+    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
+    2.0 * rounding * cost.sqrt() + rounding * rounding
+}
+
+/// A decrease of the cost that cannot be told from none: by the accuracy to which a quadratic program is solved, and the
+/// rounding of the response.
+fn least_decrease(problem: &Problem, cost: f64) -> f64 {
+    PROGRAM_ACCURACY * cost + response_rounding(problem, cost)
+}
+
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
 /// less than the rounding of the cost, or moves less than rounding moves the motion.
 fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<String> {
-    let cost = point.evaluation.cost;
-    // A motion that is off by its rounding changes a sum of squared residuals by their product.
-    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
-    let unseen = PROGRAM_ACCURACY * cost + 2.0 * rounding * cost.sqrt() + rounding * rounding;
-    if proposal.predicted <= unseen {
+    // A prediction below zero by more, or of no number, is that of a wrong solution.
+    if proposal.predicted.abs() <= least_decrease(problem, point.evaluation.cost) {
         return Some("the linearised cost cannot be lowered any further".into());
     }
     let change = change(problem, point, proposal);
-    (change <= SMALLEST_CHANGE)
+    (proposal.predicted > 0.0 && change <= SMALLEST_CHANGE)
         .then(|| format!("no function is to change by more than {change:.1e} of its size"))
 }
 
@@ -260,63 +275,68 @@ fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
     point.relative_change(problem, &proposal.parameters)
 }
 
-/// The best step that the subproblem offers in the constraint set.
+/// The best step that the subproblem offers in the constraint set. Staying is a step as well: whatever predicts
+/// a higher cost is no solution, and the next way is tried.
 fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
     let constraints = &work.problem().constraints;
-    let plain = work.algebra(|| sub.solve_plain());
     let cost = point.evaluation.cost;
+    let least = least_decrease(work.problem(), cost);
+    // False for NaN.
+    let is_sound = |predicted: &f64| *predicted >= -least;
     let moved = |z: &[f64]| -> Vec<f64> {
         let mut moved: Vec<f64> = point.parameters.iter().zip(z).map(|(p, d)| p + d).collect();
         constraints.clip(&mut moved);
         moved
     };
-    if let Some(z) = &plain {
-        let best = cost - sub.value(z);
-        if sub.holds(z, 0.1 * constraints::TOLERANCE) {
-            return Answer::Step(Proposal {
-                parameters: moved(z),
-                predicted: best,
-            });
+    let exact = |parameters: Vec<f64>, predicted: f64| {
+        Answer::Step(Proposal {
+            parameters,
+            predicted,
+            is_exact: true,
+        })
+    };
+    let plain = work.algebra(|| sub.solve_plain());
+    let plain = plain.map(|z| (cost - sub.value(&z), z));
+    if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
+        if sub.holds(&z, 0.1 * constraints::TOLERANCE) {
+            return exact(moved(&z), best);
         }
         if constraints.are_simple() {
-            let parameters = moved(z);
+            let parameters = moved(&z);
             let predicted = cost - model_cost(work, sub, point, &parameters);
-            if predicted >= CLIPPED * best {
-                return Answer::Step(Proposal {
-                    parameters,
-                    predicted,
-                });
+            if predicted >= CLIPPED * best && is_sound(&predicted) {
+                return exact(parameters, predicted);
             }
             let near = 0.1 * constraints::TOLERANCE;
-            let held = work.algebra(|| sub.solve_held(z.clone(), near));
-            if let Some(z) = held
-                && cost - sub.value(&z) >= CLIPPED * best
+            let held = work.algebra(|| sub.solve_held(z, near));
+            let held = held.map(|z| (cost - sub.value(&z), z));
+            if let Some((predicted, z)) = held
+                && predicted >= CLIPPED * best
+                && is_sound(&predicted)
             {
-                return Answer::Step(Proposal {
-                    parameters: moved(&z),
-                    predicted: cost - sub.value(&z),
-                });
+                return exact(moved(&z), predicted);
             }
         }
     }
     let iterations = work.program_iterations;
     let solution = work.program(|| sub.solve_within(iterations));
-    match solution.status {
-        ConicStatus::Solved | ConicStatus::Almost => {
-            let parameters = moved(&solution.z);
-            if constraints.hold(&parameters, constraints::TOLERANCE) {
-                // Not the program's own value: its solution satisfies the steps only to its accuracy.
-                let predicted = cost - model_cost(work, sub, point, &parameters);
-                Answer::Step(Proposal {
-                    parameters,
-                    predicted,
-                })
-            } else {
-                Answer::Unsolved(ConicStatus::Stalled)
-            }
-        }
-        status => Answer::Unsolved(status),
+    if !solution.status.is_point() {
+        return Answer::Unsolved(solution.status);
     }
+    let parameters = moved(&solution.z);
+    if !constraints.hold(&parameters, constraints::TOLERANCE) {
+        return Answer::Unsolved(ConicStatus::Stalled);
+    }
+    // Not the program's own value: its solution satisfies the steps only to its accuracy.
+    let predicted = cost - model_cost(work, sub, point, &parameters);
+    if !is_sound(&predicted) {
+        return Answer::Unsolved(ConicStatus::Stalled);
+    }
+    Answer::Step(Proposal {
+        parameters,
+        predicted,
+        is_exact: solution.status == ConicStatus::Solved,
+    })
 }
 
 /// The subproblem's cost for the step to `parameters`, by tangent solves.
