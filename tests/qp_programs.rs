@@ -231,7 +231,7 @@ fn programs_in_twelve_decades_have_their_exact_minimum_or_are_refused() {
                 }
             }
             ConicStatus::Infeasible => {
-                wrong.push(format!("{number}: infeasible with a minimum of {minimum}"))
+                wrong.push(format!("{number}: infeasible with a minimum of {minimum}"));
             }
             _ => refused.push(number),
         }

@@ -176,3 +176,44 @@ impl Subproblem {
         sub
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `x >= 1`, `y >= 1` and `x + y <= sum`.
+    fn rows(sum: f64) -> Subproblem {
+        let mut sub = Subproblem::new(2);
+        sub.bound([(0, 1.0)], 1.0, f64::INFINITY);
+        sub.bound([(1, 1.0)], 1.0, f64::INFINITY);
+        sub.bound([(0, 1.0), (1, 1.0)], f64::NEG_INFINITY, sum);
+        sub
+    }
+
+    fn proof(sub: &Subproblem, multipliers: [f64; 3]) -> bool {
+        sub.is_contradiction(&Candidate {
+            inequalities: multipliers.to_vec(),
+            ..Candidate::zero(sub)
+        })
+    }
+
+    #[test]
+    fn only_a_proof_is_one() {
+        let contradictory = rows(1.5);
+        assert!(proof(&contradictory, [-1.0, -1.0, 1.0]));
+        assert!(proof(&contradictory, [-1e-9, -1e-9, 1e-9]));
+        // A sum with a slope, one of the wrong sign, and none at all.
+        assert!(!proof(&contradictory, [-1.0, -0.9, 1.0]));
+        assert!(!proof(&contradictory, [1.0, 1.0, -1.0]));
+        assert!(!proof(&contradictory, [0.0; 3]));
+        // The same sum where there are points, and where the bounds cross by less than constraints may be violated by.
+        assert!(!proof(&rows(2.5), [-1.0, -1.0, 1.0]));
+        assert!(!proof(&rows(2.0 - 1e-10), [-1.0, -1.0, 1.0]));
+    }
+
+    #[test]
+    fn least_violations_find_the_proof() {
+        assert!(rows(1.5).has_violations(100));
+        assert!(!rows(2.5).has_violations(100));
+    }
+}

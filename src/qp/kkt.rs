@@ -281,3 +281,115 @@ impl RowResiduals {
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constraints::Cone;
+
+    /// `(z - 2)^2` for `z <= 1`: at 1 the multiplier is 1.
+    fn bounded() -> Subproblem {
+        let mut sub = Subproblem::new(1);
+        sub.residuals.push([(0, 1.0)], 2.0);
+        sub.bound([(0, 1.0)], f64::NEG_INFINITY, 1.0);
+        sub
+    }
+
+    fn at(sub: &Subproblem, z: f64, multiplier: f64) -> Kkt {
+        sub.kkt(&Candidate {
+            z: vec![z],
+            inequalities: vec![multiplier],
+            ..Candidate::zero(sub)
+        })
+    }
+
+    /// Half the cost at zero is 2, the natural size of z is 2.
+    #[test]
+    fn residuals_by_hand() {
+        let sub = bounded();
+        let solved = at(&sub, 1.0, 1.0);
+        assert!(solved.is_solution() && solved.size() == 0.0, "{solved:?}");
+        // Inside: the gradient is -1.5, times 2, over 2.
+        let inside = at(&sub, 0.5, 0.0);
+        assert_eq!(inside.stationarity, 1.5);
+        // The multiplier balances it half a unit from the bound.
+        let distant = at(&sub, 0.5, 1.5);
+        assert_eq!(
+            (distant.stationarity, distant.complementarity),
+            (0.0, 0.375)
+        );
+        // Outside by 0.5 of a terms' size of 2.
+        let outside = at(&sub, 1.5, 0.5);
+        assert_eq!((outside.violation_cost, outside.feasibility), (0.125, 0.25));
+        // A multiplier of the wrong sign is none.
+        assert_eq!(at(&sub, 2.0, -1.0).stationarity, 0.0);
+        assert!(!at(&sub, f64::NAN, 0.0).is_solution());
+    }
+
+    /// A proximal term bounds the decrease that a slope promises: `r^2 / (2 d)`.
+    #[test]
+    fn proximal_terms() {
+        let mut sub = bounded();
+        sub.proximal[0] = 1e6;
+        let kkt = at(&sub, 0.0, 0.0);
+        assert!(
+            (kkt.stationarity - 4.0 / 2e6 / 2.0).abs() < 1e-18,
+            "{kkt:?}"
+        );
+    }
+
+    /// Residuals say the same whatever the units of variables, rows and cost are.
+    #[test]
+    fn units_do_not_matter() {
+        let expected = at(&bounded(), 0.5, 0.7);
+        for (unit, row, cost) in [
+            (1e6, 1.0, 1.0),
+            (1.0, 1e-6, 1.0),
+            (1.0, 1.0, 1e9),
+            (1e-9, 1e5, 1e-7),
+        ] {
+            let mut sub = Subproblem::new(1);
+            sub.residuals.push([(0, unit * cost)], 2.0 * cost);
+            sub.bound([(0, unit * row)], f64::NEG_INFINITY, row);
+            let found = at(&sub, 0.5 / unit, 0.7 * cost * cost / row);
+            for (a, b) in [
+                (found.stationarity, expected.stationarity),
+                (found.complementarity, expected.complementarity),
+                (found.feasibility, expected.feasibility),
+            ] {
+                assert!((a - b).abs() <= 1e-12, "{found:?} {expected:?}");
+            }
+        }
+    }
+
+    /// The nearest point of the unit disc to (3, 4), and the soft threshold of `(z - 3)^2 + |z|`.
+    #[test]
+    fn cones_and_absolute_values() {
+        let mut sub = Subproblem::new(2);
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.residuals.push([(1, 1.0)], 4.0);
+        let mut rows = Rows::new();
+        rows.push([], -1.0);
+        rows.push([(0, 1.0)], 0.0);
+        rows.push([(1, 1.0)], 0.0);
+        sub.cones.push(Cone { rows });
+        let mut candidate = Candidate::zero(&sub);
+        candidate.z = vec![0.6, 0.8];
+        candidate.cones[0] = vec![4.0, -2.4, -3.2];
+        let kkt = sub.kkt(&candidate);
+        assert!(kkt.is_solution(), "{kkt:?}");
+        candidate.cones[0] = vec![0.0; 3];
+        assert!(sub.kkt(&candidate).stationarity > 0.1);
+
+        let mut sub = Subproblem::new(1);
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.absolute.push([(0, 1.0)], 0.0);
+        sub.absolute_weights.push(1.0);
+        let mut candidate = Candidate::zero(&sub);
+        candidate.z = vec![2.5];
+        candidate.absolute = vec![0.5];
+        assert_eq!(sub.kkt(&candidate).size(), 0.0);
+        candidate.absolute = vec![-0.5];
+        assert!(sub.kkt(&candidate).complementarity > 0.1);
+    }
+}

@@ -123,13 +123,13 @@ impl Subproblem {
         self.solve_within(Self::ITERATIONS)
     }
 
-    /// [`Subproblem::solve`] with at most so many iterations of each attempt.
+    /// [`Subproblem::solve`] with at most so many iterations of each attempt; with none it is refused.
     ///
     /// A status word of the interior-point solver decides nothing: its point is repaired where its active set tells how
     /// and judged by its residuals, its proof of infeasibility is checked. What is refused is tried again with another
     /// regularisation.
     pub fn solve_within(&self, iterations: u32) -> Solution {
-        if !self.is_finite() {
+        if iterations == 0 || !self.is_finite() {
             return self.refused(None, 0);
         }
         if self.has_impossible_row() {

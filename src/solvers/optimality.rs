@@ -90,11 +90,12 @@ impl Optimality {
             .zip(&found.z)
             .map(|(p, d)| p + d)
             .collect();
-        let promised = (cost - sub.value(&found.z) - response_rounding(problem, cost)).max(0.0);
+        let promised = cost - sub.value(&found.z) + found.accuracy * cost;
+        let promised = (promised - response_rounding(problem, cost)).max(0.0);
         let share = |x: f64| if x == 0.0 { 0.0 } else { x / cost };
         let worst = problem.constraints.largest_violation(&point.parameters);
         Some(Self {
-            stationarity: share(promised) + found.accuracy,
+            stationarity: share(promised),
             step: point.relative_change(problem, &parameters),
             feasibility: worst.map_or(0.0, |v| v.relative),
             complementarity: share(found.complementarity),
@@ -159,7 +160,8 @@ pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) 
     );
     // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
     let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
-    if !is_end || !is_search || !(cost > 0.0 && cost.is_finite()) {
+    let is_measurable = cost > 0.0 && cost.is_finite();
+    if !is_end || !is_search || !is_measurable {
         return fit;
     }
     let clock = Instant::now();
