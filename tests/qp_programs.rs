@@ -18,7 +18,7 @@ const PROGRAMS: u64 = 500;
 const REFUSALS: usize = 5;
 /// Accuracy of the minimum, relative to the larger of it and the cost at zero.
 const COST: f64 = 1e-9;
-/// Accuracy of the constraints, relative to the terms of their rows.
+/// Accuracy of the constraints, relative to the terms of their rows: that of a solution ([`kmcfit::qp::Kkt::VIOLATION`]).
 const ROWS: f64 = 1e-8;
 /// Largest exponent of two of a scale: twelve decades from the smallest to the largest.
 const OCTAVES: i32 = 20;

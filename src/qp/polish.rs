@@ -69,7 +69,7 @@ impl Subproblem {
             }
             let corrected = self.corrected(&set, &next);
             // Where a system is nearly singular, a correction from the next point is another one.
-            if seen.contains(&corrected) && !(is_better && corrected == set) {
+            if corrected != set && seen.contains(&corrected) {
                 break;
             }
             set = corrected;
