@@ -94,7 +94,12 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
         assert!(found.outcome.reason.contains("solver stalled"));
         assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
         keeps_the_best_point(&problem, &found);
-        assert!(found.best.evaluation.cost > solved.best.evaluation.cost);
+        // A start within the constraints may be as low, but nothing is lower than the minimum.
+        let (cost, least) = (found.best.evaluation.cost, solved.best.evaluation.cost);
+        assert!(
+            cost >= (1.0 - 1e-6) * least,
+            "{solver:?}: {cost:e} {least:e}"
+        );
     }
 }
 
