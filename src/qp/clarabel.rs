@@ -1,6 +1,6 @@
 //! Subproblems by Clarabel.
 
-use super::Subproblem;
+use super::{Candidate, Subproblem};
 use crate::constraints::Rows;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
@@ -8,83 +8,16 @@ use clarabel::solver::{
     SupportedConeT, ZeroConeT,
 };
 
-/// How Clarabel ended, after our own look at the point it left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ConicStatus {
-    /// To full accuracy.
-    Solved,
-    /// To reduced accuracy; the point is used with care.
-    Almost,
-    /// No point satisfies the constraints.
-    Infeasible,
-    /// The cost has no minimum.
-    Unbounded,
-    /// The method stalled or ran out of iterations; the point is not to be trusted.
-    Stalled,
-}
-
-impl ConicStatus {
-    /// One sentence.
-    pub fn sentence(self) -> &'static str {
-        match self {
-            ConicStatus::Solved => "the quadratic program was solved",
-            ConicStatus::Almost => "the quadratic program was solved to reduced accuracy",
-            ConicStatus::Infeasible => {
-                "no point satisfies all constraints of the quadratic program"
-            }
-            ConicStatus::Unbounded => "the quadratic program has no minimum",
-            ConicStatus::Stalled => "the quadratic program could not be solved: its solver stalled",
-        }
-    }
-
-    fn of(status: SolverStatus) -> Self {
-        match status {
-            SolverStatus::Solved => ConicStatus::Solved,
-            SolverStatus::AlmostSolved => ConicStatus::Almost,
-            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
-                ConicStatus::Infeasible
-            }
-            SolverStatus::DualInfeasible | SolverStatus::AlmostDualInfeasible => {
-                ConicStatus::Unbounded
-            }
-            SolverStatus::Unsolved
-            | SolverStatus::MaxIterations
-            | SolverStatus::MaxTime
-            | SolverStatus::NumericalError
-            | SolverStatus::InsufficientProgress
-            | SolverStatus::CallbackTerminated => ConicStatus::Stalled,
-        }
-    }
-}
-
-/// What Clarabel found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
-    /// How it ended.
-    pub status: ConicStatus,
-    /// The variables.
-    pub z: Vec<f64>,
-    /// Multipliers of the inequality rows, positive where the upper bound pushes, negative where the
-    /// lower one does: `gradient of (cost/2) + G^T multipliers + ... = 0`.
-    pub multipliers: Vec<f64>,
-    /// Multipliers of the equality rows, same convention.
-    pub equality_multipliers: Vec<f64>,
-    /// For each cone the multiplier of its bound, the first part: not negative, and what half the
-    /// cost would lose per unit by which the bound gave way.
-    pub cone_multipliers: Vec<f64>,
-}
-
 /// One row of Clarabel's `A x + s = b`, and where its multiplier goes.
 #[derive(Clone, Copy)]
 enum Origin {
-    /// A definition of an auxiliary variable or a later row of a cone, whose multiplier nobody asks
-    /// for.
-    Auxiliary,
+    /// The definition of a residual, whose multiplier is the residual.
+    Residual,
     Equality(usize),
-    Upper(usize),
-    Lower(usize),
-    /// The first row of a cone.
-    Cone(usize),
+    Inequality(usize),
+    Absolute(usize),
+    /// A row of a cone.
+    Cone(usize, usize),
 }
 
 /// Rows, cones and multiplier targets in Clarabel's form; every linear row scaled to size 1.
@@ -112,23 +45,33 @@ impl Conic {
     }
 }
 
+/// How one run of Clarabel ended: its own word, to be judged.
+pub enum Ending {
+    /// A point with multipliers, whatever it is worth.
+    Point(Candidate),
+    /// Multipliers that are said to show that no point satisfies the rows.
+    Contradiction(Candidate),
+    /// Nothing.
+    Nothing,
+}
+
+/// Settings of one run of Clarabel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Shift of the diagonal of Clarabel's systems.
+    pub regularisation: f64,
+    /// Most iterations.
+    pub iterations: u32,
+}
+
 impl Subproblem {
-    /// Most iterations of Clarabel, unless told otherwise: it takes ten to thirty, and what is not
-    /// solved after a hundred does not get solved.
-    pub const ITERATIONS: u32 = 100;
-
-    /// The minimiser under all constraints.
-    pub fn solve(&self) -> Solution {
-        self.solve_within(Self::ITERATIONS)
-    }
-
-    /// [`Subproblem::solve`] in at most so many iterations.
+    /// One run of Clarabel.
     ///
     /// The residuals are variables of their own, so `F^T F` is never formed; rows are scaled to size
     /// 1 and infinite bounds are left out.
-    pub fn solve_within(&self, iterations: u32) -> Solution {
+    pub fn run_clarabel(&self, chosen: Settings) -> Ending {
         // The cost at zero becomes 1: the tolerances mean the same for every problem.
-        let at_zero = self.value(&vec![0.0; self.variables]);
+        let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let scale = if at_zero > 0.0 && at_zero.is_finite() {
             1.0 / at_zero
         } else {
@@ -145,35 +88,28 @@ impl Subproblem {
             tol_gap_abs: 1e-11,
             tol_gap_rel: 1e-10,
             tol_feas: 1e-11,
-            max_iter: iterations,
+            max_iter: chosen.iterations,
             max_threads: 1,
+            static_regularization_constant: chosen.regularisation,
             ..DefaultSettings::default()
         };
         let right = conic.rows.right();
         let solver =
             DefaultSolver::new(&quadratic, &linear, &matrix, right, &conic.cones, settings);
         let Ok(mut solver) = solver else {
-            return self.nothing();
+            return Ending::Nothing;
         };
         solver.solve();
         let found = &solver.solution;
-        let mut solution = self.read(&found.x, &found.z, found.status, &conic);
-        let duals = solution
-            .multipliers
-            .iter_mut()
-            .chain(&mut solution.equality_multipliers)
-            .chain(&mut solution.cone_multipliers);
-        duals.for_each(|m| *m /= scale);
-        solution
-    }
-
-    fn nothing(&self) -> Solution {
-        Solution {
-            status: ConicStatus::Stalled,
-            z: vec![0.0; self.variables],
-            multipliers: vec![0.0; self.inequalities.len()],
-            equality_multipliers: vec![0.0; self.equalities.len()],
-            cone_multipliers: vec![0.0; self.cones.len()],
+        let candidate = self.read(&found.x, &found.z, 1.0 / scale, &conic);
+        if !candidate.is_finite() {
+            return Ending::Nothing;
+        }
+        match found.status {
+            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
+                Ending::Contradiction(candidate)
+            }
+            _ => Ending::Point(candidate),
         }
     }
 
@@ -211,7 +147,7 @@ impl Subproblem {
                 &row,
                 root * self.residuals.right()[i],
                 1.0,
-                Origin::Auxiliary,
+                Origin::Residual,
             );
         }
         for i in 0..self.equalities.len() {
@@ -223,10 +159,10 @@ impl Subproblem {
             let row: Vec<(usize, f64)> = self.inequalities.row(i).collect();
             let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
             if upper.is_finite() {
-                conic.push(&row, upper, 1.0, Origin::Upper(i));
+                conic.push(&row, upper, 1.0, Origin::Inequality(i));
             }
             if lower.is_finite() {
-                conic.push(&row, lower, -1.0, Origin::Lower(i));
+                conic.push(&row, lower, -1.0, Origin::Inequality(i));
             }
         }
         for i in 0..self.absolute.len() {
@@ -237,7 +173,10 @@ impl Subproblem {
                 let mut row: Vec<(usize, f64)> =
                     self.absolute.row(i).map(|(j, a)| (j, sign * a)).collect();
                 row.push((bound, -1.0));
-                conic.push(&row, sign * right, 1.0, Origin::Auxiliary);
+                conic.push(&row, sign * right, 1.0, Origin::Absolute(i));
+                if let Some((_, scale)) = conic.origins.last_mut() {
+                    *scale *= sign;
+                }
             }
         }
         let bounds = conic.rows.len() - zeros;
@@ -255,35 +194,28 @@ impl Subproblem {
                 // s = A z - right must lie in the cone: rows enter with a minus sign, unscaled.
                 let row = cone.rows.row(i).map(|(j, a)| (j, -a));
                 conic.rows.push(row, -cone.rows.right()[i]);
-                let origin = match i {
-                    0 => Origin::Cone(k),
-                    _ => Origin::Auxiliary,
-                };
-                conic.origins.push((origin, 1.0));
+                conic.origins.push((Origin::Cone(k, i), 1.0));
             }
             conic.cones.push(SecondOrderConeT(cone.rows.len()));
         }
         conic
     }
 
-    fn read(&self, x: &[f64], duals: &[f64], status: SolverStatus, conic: &Conic) -> Solution {
-        let mut solution = self.nothing();
-        solution.status = ConicStatus::of(status);
-        if x.iter().all(|x| x.is_finite()) {
-            solution.z.copy_from_slice(&x[..self.variables]);
-        } else {
-            solution.status = ConicStatus::Stalled;
-        }
+    /// The point `x` with the multipliers `duals` in the unit `unit` of the cost.
+    fn read(&self, x: &[f64], duals: &[f64], unit: f64, conic: &Conic) -> Candidate {
+        let mut candidate = Candidate::zero(self);
+        candidate.z.copy_from_slice(&x[..self.variables]);
         for ((origin, scale), dual) in conic.origins.iter().zip(duals) {
-            let multiplier = scale * dual;
+            let multiplier = unit * scale * dual;
             match *origin {
-                Origin::Equality(i) => solution.equality_multipliers[i] = multiplier,
-                Origin::Upper(i) | Origin::Lower(i) => solution.multipliers[i] += multiplier,
-                Origin::Cone(k) => solution.cone_multipliers[k] = multiplier,
-                Origin::Auxiliary => {}
+                Origin::Equality(i) => candidate.equalities[i] = multiplier,
+                Origin::Inequality(i) => candidate.inequalities[i] += multiplier,
+                Origin::Absolute(i) => candidate.absolute[i] += multiplier,
+                Origin::Cone(k, i) => candidate.cones[k][i] = multiplier,
+                Origin::Residual => {}
             }
         }
-        solution
+        candidate
     }
 }
 

@@ -55,6 +55,15 @@ impl Symmetric {
         sides.iter().map(solution).collect()
     }
 
+    /// The solution of `A x = b` as a correction of `start`, with the smallest residual that refinement reaches; `None` if
+    /// the matrix cannot be factored.
+    pub fn solve_from(self, start: &[f64], b: &[f64]) -> Option<Vec<f64>> {
+        let side = self.residual(start, b);
+        let (correction, _) = self.solve(&[side])?.pop()?;
+        let sums = start.iter().zip(&correction);
+        Some(sums.map(|(x, d)| x + d).collect())
+    }
+
     /// Scales rows and columns alike until their largest entries are near 1; returns the scales.
     fn equilibrate(&mut self) -> Vec<f64> {
         let mut total = vec![1.0; self.signs.len()];

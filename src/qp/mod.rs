@@ -4,13 +4,21 @@
 //! constraints ([`Subproblem`]). [`Subproblem::solve_plain`] solves it without its inequalities by
 //! one elimination, at once or along time, or one sparse factorisation; [`Subproblem::solve`] solves all of it by Clarabel.
 
+mod candidate;
 mod chain;
 mod clarabel;
+mod contradiction;
 mod dense;
 mod factor;
+mod kkt;
+mod normal;
+mod polish;
 mod projection;
+mod solve;
 mod subproblem;
 
-pub use self::clarabel::{ConicStatus, Solution};
+pub use candidate::Candidate;
+pub use kkt::Kkt;
 pub use projection::{Projection, RowPlace, project, project_within};
+pub use solve::{ConicStatus, Solution};
 pub use subproblem::Subproblem;

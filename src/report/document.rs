@@ -36,6 +36,10 @@ pub struct ResultDocument {
     pub cost: CostSummary,
     /// The gradient at the start and at the end.
     pub gradient: GradientSummary,
+    /// How far the best point is from the first-order condition of a minimum under the constraints; absent where the fit did not
+    /// come to an end, where J is zero, and where the linearised problem could not be solved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optimality: Option<OptimalitySummary>,
     /// Work done; one count is one pass over all experiments.
     pub counts: CountsSummary,
     /// Wall-clock time of the fit, s. Two runs of one model differ in this and in `timings` only.
@@ -165,6 +169,28 @@ pub struct GradientSummary {
     /// At the best point.
     #[serde(deserialize_with = "number_or_null")]
     pub final_norm_squared: f64,
+}
+
+/// The first-order condition of a minimum under the constraints, measured at the best point by the linearised problem
+/// ([`crate::solvers::Optimality`]). All numbers have no unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OptimalitySummary {
+    /// The share of J by which the solution of the linearised problem promises to lower it.
+    #[serde(deserialize_with = "number_or_null")]
+    pub stationarity: f64,
+    /// The largest change of a function that this solution asks for, relative to its size.
+    #[serde(deserialize_with = "number_or_null")]
+    pub step: f64,
+    /// Largest violation of a constraint relative to its row's scale.
+    #[serde(deserialize_with = "number_or_null")]
+    pub feasibility: f64,
+    /// Sum of the multipliers' sizes times the distances from the bounds, as a share of J.
+    #[serde(deserialize_with = "number_or_null")]
+    pub complementarity: f64,
+    /// A fit that says `converged` by its last steps has a `complementarity` and a `stationarity` or `step` of at most this, and
+    /// a `feasibility` of at most 1e-9. One that ended by a limit on J/J0 or G^2/G0^2 may have any.
+    #[serde(deserialize_with = "number_or_null")]
+    pub tolerance: f64,
 }
 
 /// Work done.

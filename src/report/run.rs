@@ -4,8 +4,9 @@ use super::advice::percent;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
-    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OutcomeSummary,
-    PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
+    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OptimalitySummary,
+    OutcomeSummary, PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary,
+    WeightSummary,
 };
 use super::knowledge::knowledge;
 use super::known::Known;
@@ -22,8 +23,8 @@ use crate::functions::{Basis, CoefficientFunction};
 use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding, is_unhindered};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use crate::solvers::{
-    ActiveGroup, Fit, PathPoint, Rung, Solver, Status, WeightPath, WeightRule, active_constraints,
-    timed,
+    ActiveGroup, Fit, Optimality, PathPoint, Rung, Solver, Status, WeightPath, WeightRule,
+    active_constraints, timed,
 };
 use std::collections::BTreeMap;
 use std::io;
@@ -101,6 +102,7 @@ impl FittedModel<'_> {
                 initial_norm_squared: fit.initial_norm_squared,
                 final_norm_squared: fit.best.gradient.norm_squared,
             },
+            optimality: fit.optimality.as_ref().map(optimality_summary),
             counts: CountsSummary {
                 iterations: fit.history.len() as u64,
                 forward: fit.counts.forward,
@@ -412,6 +414,16 @@ fn active_summary(group: ActiveGroup) -> ActiveSummary {
         rows: group.rows,
         spans: group.spans,
         multiplier: group.multiplier,
+    }
+}
+
+fn optimality_summary(measured: &Optimality) -> OptimalitySummary {
+    OptimalitySummary {
+        stationarity: measured.stationarity,
+        step: measured.step,
+        feasibility: measured.feasibility,
+        complementarity: measured.complementarity,
+        tolerance: measured.tolerance,
     }
 }
 

@@ -4,12 +4,13 @@ use super::ahead::Ahead;
 use super::gauss_newton::GaussNewton;
 use super::keep::{Bits, Memory, Standing, Watch};
 use super::lbfgs::Lbfgs;
+use super::optimality::measured;
 use super::outcome::{Outcome, Status};
 use super::point::{Counts, Point, Work};
 use super::projected_gradient::ProjectedGradient;
 use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
 use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Rung, Solver, Step, Timings, equation_error};
+use super::{Descend, FitSettings, Optimality, Rung, Solver, Step, Timings, equation_error};
 use crate::dynamics::{Breakdown, Cause};
 use crate::objective::{Channel, Evaluation, GradientKind};
 use crate::problem::Problem;
@@ -42,6 +43,8 @@ pub struct Fit {
     pub elapsed: Duration,
     /// The starts that were tried, in order.
     pub rungs: Vec<Rung>,
+    /// The first-order condition at the best point, once it is measured.
+    pub optimality: Option<Optimality>,
 }
 
 impl Fit {
@@ -147,7 +150,8 @@ pub fn fit_from(
     start: &[f64],
     settings: &FitSettings,
 ) -> Result<Fit, Breakdown> {
-    search(problem, start, settings, None, &mut Watch::new(&mut |_| {}))
+    let fit = search(problem, start, settings, None, &mut Watch::new(&mut |_| {}))?;
+    Ok(measured(problem, fit, settings))
 }
 
 fn method(solver: Solver) -> Box<dyn Descend> {
@@ -405,6 +409,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
             timings: self.before.timings + self.timings,
             elapsed,
             rungs: Vec::new(),
+            optimality: None,
         })
     }
 

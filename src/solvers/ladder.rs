@@ -9,6 +9,7 @@
 use super::all_at_once::all_at_once;
 use super::beginning::{begin, beginning, reference};
 use super::executor::{Prepared, search, search_prepared};
+use super::optimality::measured;
 use super::recorder::Reference;
 use super::timings::timed;
 use super::{
@@ -110,6 +111,17 @@ pub fn fit(
 /// # Errors
 /// As [`fit`].
 pub fn fit_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
+    let fit = climb(problem, start, settings, watch)?;
+    Ok(measured(problem, fit, settings))
+}
+
+/// [`fit_watched`] without a measurement of its end.
+pub(super) fn climb(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,

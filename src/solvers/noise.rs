@@ -1,7 +1,9 @@
 //! Sigmas that are estimated from the residuals.
 
 use super::executor::search;
-use super::{Fit, FitSettings, Row, Status, Watch, fit_watched};
+use super::ladder::climb;
+use super::optimality::measured;
+use super::{Fit, FitSettings, Row, Status, Watch};
 use crate::dynamics::Breakdown;
 use crate::objective::{Channel, Loss, Weighting};
 use crate::problem::Problem;
@@ -44,11 +46,12 @@ pub fn fit_with_noise_watched(
     watch: &mut Watch,
 ) -> Result<(Problem, Fit), Breakdown> {
     let mut problem = problem.clone();
-    let mut found = fit_watched(&problem, start, settings, watch)?;
+    let mut found = climb(&problem, start, settings, watch)?;
     let estimates = problem
         .channels()
         .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
     if !estimates {
+        let found = measured(&problem, found, settings);
         return Ok((problem, found));
     }
     for _ in 0..ROUNDS {
@@ -67,6 +70,7 @@ pub fn fit_with_noise_watched(
     if let Ok(evaluation) = problem.evaluate(start) {
         found.initial_cost = evaluation.cost;
     }
+    let found = measured(&problem, found, settings);
     Ok((problem, found))
 }
 

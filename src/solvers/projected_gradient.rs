@@ -39,8 +39,12 @@ impl Descend for ProjectedGradient {
         };
         let direction = difference(&target, &point.parameters);
         let slope = dot(&point.gradient.euclidean, &direction);
-        if slope.is_nan() || slope >= -f64::EPSILON * point.evaluation.cost {
+        if slope.abs() <= f64::EPSILON * point.evaluation.cost {
             return Step::Minimum("the projected gradient vanishes to rounding".into());
+        }
+        // Also of no number: towards a projection the cost falls, and where it does not the projection is wrong.
+        if slope.is_nan() || slope > 0.0 {
+            return Step::Stuck("the cost does not fall towards the projected gradient".into());
         }
         let mut evaluation = work.problem().workspace();
         let mut share = 1.0;

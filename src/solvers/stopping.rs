@@ -88,7 +88,9 @@ impl Stopping {
         })
     }
 
-    fn ratios_met(&self, row: &Row) -> Option<String> {
+    /// The limits on the ratios of cost and gradient that `row` is within, if it is within all that are given: what was asked
+    /// for, but no sign of a minimum.
+    pub(super) fn ratios_met(&self, row: &Row) -> Option<String> {
         let test = |name: &str, value: f64, limit: Option<f64>| {
             limit.map(|limit| (value <= limit, format!("{name} {value:.3e} <= {limit:.3e}")))
         };

@@ -2,8 +2,10 @@
 
 use super::executor::search;
 use super::gauss_newton::{linearisation_tangents, linearise_at};
+use super::ladder::climb;
+use super::optimality::measured;
 use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch, fit_watched};
+use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch};
 use crate::dynamics::Breakdown;
 use crate::objective::Channel;
 use crate::problem::Problem;
@@ -189,6 +191,7 @@ pub fn choose_weight_watched(
     if let Ok(evaluation) = weighted.evaluate(start) {
         found.initial_cost = evaluation.cost;
     }
+    let found = measured(&weighted, found, settings);
     let path = WeightPath {
         points,
         picks,
@@ -242,7 +245,7 @@ impl Walk<'_, '_> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
         let from = std::mem::take(&mut self.from);
         let found = match self.last {
-            None => fit_watched(&problem, &from, &self.settings, self.watch)?,
+            None => climb(&problem, &from, &self.settings, self.watch)?,
             Some(_) => search(&problem, &from, &self.settings, None, self.watch)?,
         };
         if self.last.is_none() {

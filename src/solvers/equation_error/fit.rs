@@ -7,6 +7,7 @@ use crate::objective::{Evaluation, Gradient};
 use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::gauss_newton::{add_penalties, add_variations};
+use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::recorder::ratio;
 use crate::solvers::timings::timed;
 use crate::solvers::{Counts, Fit, Outcome, Point, Row, Status, Timings};
@@ -41,6 +42,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
     };
     let first = cost.point(start.to_vec());
     let mut counts = Counts::default();
+    let mut optimality = None;
     let (outcome, found) = match cost.minimise(start, &mut timings) {
         Ok((minimum, programs)) => {
             counts.qp = programs;
@@ -53,7 +55,14 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
                 _ if !has_mass => Status::Infeasible,
                 _ => Status::Converged,
             };
-            (Outcome::new(status, reason), Some(point))
+            let mut outcome = Outcome::new(status, reason);
+            if problem.parameters() > 0 {
+                optimality = cost.optimality(&point, &mut timings);
+                if status == Status::Converged {
+                    outcome = judged(outcome, optimality.as_ref());
+                }
+            }
+            (outcome, Some(point))
         }
         Err(status) => {
             counts.qp = 1;
@@ -80,6 +89,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
         timings,
         elapsed: clock.elapsed(),
         rungs: Vec::new(),
+        optimality,
     }
 }
 
@@ -145,6 +155,7 @@ fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         rungs: Vec::new(),
+        optimality: None,
     }
 }
 
@@ -186,6 +197,27 @@ impl<'a> Cost<'a> {
             from = sizes;
         }
         Ok((minimum, programs))
+    }
+
+    /// The first-order condition at `point`: the problem is convex, so solving it again from there tells by how much its cost
+    /// is above the minimum. `None` if it cannot be solved again.
+    fn optimality(&self, point: &Point, timings: &mut Timings) -> Option<Optimality> {
+        let problem = self.problem;
+        // Not counted, so not timed as a program either: it is no part of the fit.
+        let mut own = Timings::default();
+        let again = self.minimise_from(&point.parameters, &mut own);
+        timings.linear_algebra += own.sum();
+        let again = again.ok()?;
+        let (here, next) = (point.evaluation.cost, self.point(again.parameters.clone()));
+        let gap = (here - next.evaluation.cost).abs();
+        let worst = problem.constraints.largest_violation(&point.parameters);
+        Some(Optimality {
+            stationarity: if gap == 0.0 { 0.0 } else { gap / here },
+            step: point.relative_change(problem, &again.parameters),
+            feasibility: worst.map_or(0.0, |v| v.relative),
+            complementarity: again.kkt.map_or(0.0, |kkt| kkt.complementarity),
+            tolerance: Optimality::LEAST,
+        })
     }
 
     fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {

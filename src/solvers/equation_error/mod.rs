@@ -19,7 +19,7 @@ use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::quadrature::trapezoid_weights;
 use crate::dynamics::{Device, Place, Term};
 use crate::problem::{Experiment, Problem};
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::{ConicStatus, Kkt, Subproblem};
 use measured::Measured;
 
 /// A pull towards the start, relative to the equation's own weight: it decides what the equation
@@ -99,6 +99,8 @@ struct Minimum {
     parameters: Vec<f64>,
     /// How the quadratic program ended, if one was needed.
     program: Option<ConicStatus>,
+    /// The residuals of its optimality conditions.
+    kkt: Option<Kkt>,
 }
 
 /// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
@@ -144,6 +146,7 @@ fn minimise(
             return Ok(Minimum {
                 parameters,
                 program: None,
+                kkt: None,
             });
         }
     }
@@ -160,6 +163,7 @@ fn minimise(
         ConicStatus::Solved | ConicStatus::Almost => Ok(Minimum {
             parameters: moved(&solution.z),
             program: Some(solution.status),
+            kkt: solution.kkt,
         }),
         status => Err(status),
     }

@@ -7,15 +7,18 @@
 //! step with those bounds held that it meets; only otherwise a quadratic program is solved.
 
 mod dense;
+mod proposal;
 mod structured;
 
 pub(crate) use dense::{Half, Reduced, halfway, is_wide, weighted_jacobian};
+
+pub(super) use proposal::response_rounding;
+use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
 
 use super::infeasible::no_step;
 use super::point::Work;
 use super::timings::timed;
 use super::{Bits, Descend, Memory, Point, Step, Timings};
-use crate::constraints;
 use crate::objective::{Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
@@ -33,19 +36,10 @@ const ACCEPTED: f64 = 0.05;
 /// Above this share the damping falls, below the next it rises.
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.3;
-/// A clipped step is used if it keeps this share of the plain step's predicted decrease.
-const CLIPPED: f64 = 0.9;
 /// A predicted decrease below this share of J0 is rounding: J0 is a sum of squares, so this is the
 /// square of the precision of its terms.
 const NO_DECREASE: f64 = 1e-30;
 
-/// A predicted decrease below this share of J that does not come true is within the accuracy to
-/// which a quadratic program is solved.
-const PROGRAM_ACCURACY: f64 = 1e-9;
-/// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
-const MOTION_ROUNDING: f64 = 1000.0;
-/// A relative change of the functions below this is not a step but rounding.
-const SMALLEST_CHANGE: f64 = 1e-9;
 /// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
 const NEARBY: f64 = 1e-2;
 /// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
@@ -71,19 +65,6 @@ impl Default for GaussNewton {
             spare: None,
         }
     }
-}
-
-/// A step of the parameters and the decrease of J that the model predicts for it.
-struct Proposal {
-    parameters: Vec<f64>,
-    predicted: f64,
-}
-
-/// What a subproblem gives.
-enum Answer {
-    Step(Proposal),
-    /// No step: the subproblem could not be solved, for this reason.
-    Unsolved(ConicStatus),
 }
 
 impl Descend for GaussNewton {
@@ -121,6 +102,9 @@ impl Descend for GaussNewton {
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
+                if trouble.is_none() && proposal.uncertainty > 0.0 {
+                    trouble = Some(ConicStatus::Almost);
+                }
                 if trouble.is_some() {
                     // The next programs are others: they get the chance to be solved with less.
                     self.damping = before;
@@ -145,6 +129,10 @@ impl Descend for GaussNewton {
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
                 return Step::Minimum(reason);
+            }
+            if proposal.uncertainty > 0.0 {
+                // A shorter step promises less for being short.
+                trouble = trouble.or(Some(ConicStatus::Almost));
             }
             self.damping *= 8.0;
         }
@@ -238,129 +226,6 @@ impl GaussNewton {
             self.damping *= 3.0;
         }
     }
-}
-
-/// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
-/// less than the rounding of the cost, or moves less than rounding moves the motion.
-fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<String> {
-    let cost = point.evaluation.cost;
-    // A motion that is off by its rounding changes a sum of squared residuals by their product.
-    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
-    let unseen = PROGRAM_ACCURACY * cost + 2.0 * rounding * cost.sqrt() + rounding * rounding;
-    if proposal.predicted <= unseen {
-        return Some("the linearised cost cannot be lowered any further".into());
-    }
-    let change = change(problem, point, proposal);
-    (change <= SMALLEST_CHANGE)
-        .then(|| format!("no function is to change by more than {change:.1e} of its size"))
-}
-
-/// The largest change of a function that a proposal asks for, relative to the function's size.
-fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
-    point.relative_change(problem, &proposal.parameters)
-}
-
-/// The best step that the subproblem offers in the constraint set.
-fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
-    let constraints = &work.problem().constraints;
-    let plain = work.algebra(|| sub.solve_plain());
-    let cost = point.evaluation.cost;
-    let moved = |z: &[f64]| -> Vec<f64> {
-        let mut moved: Vec<f64> = point.parameters.iter().zip(z).map(|(p, d)| p + d).collect();
-        constraints.clip(&mut moved);
-        moved
-    };
-    if let Some(z) = &plain {
-        let best = cost - sub.value(z);
-        if sub.holds(z, 0.1 * constraints::TOLERANCE) {
-            return Answer::Step(Proposal {
-                parameters: moved(z),
-                predicted: best,
-            });
-        }
-        if constraints.are_simple() {
-            let parameters = moved(z);
-            let predicted = cost - model_cost(work, sub, point, &parameters);
-            if predicted >= CLIPPED * best {
-                return Answer::Step(Proposal {
-                    parameters,
-                    predicted,
-                });
-            }
-            let near = 0.1 * constraints::TOLERANCE;
-            let held = work.algebra(|| sub.solve_held(z.clone(), near));
-            if let Some(z) = held
-                && cost - sub.value(&z) >= CLIPPED * best
-            {
-                return Answer::Step(Proposal {
-                    parameters: moved(&z),
-                    predicted: cost - sub.value(&z),
-                });
-            }
-        }
-    }
-    let iterations = work.program_iterations;
-    let solution = work.program(|| sub.solve_within(iterations));
-    match solution.status {
-        ConicStatus::Solved | ConicStatus::Almost => {
-            let parameters = moved(&solution.z);
-            if constraints.hold(&parameters, constraints::TOLERANCE) {
-                // Not the program's own value: its solution satisfies the steps only to its accuracy.
-                let predicted = cost - model_cost(work, sub, point, &parameters);
-                Answer::Step(Proposal {
-                    parameters,
-                    predicted,
-                })
-            } else {
-                Answer::Unsolved(ConicStatus::Stalled)
-            }
-        }
-        status => Answer::Unsolved(status),
-    }
-}
-
-/// The subproblem's cost for the step to `parameters`, by tangent solves.
-fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f64]) -> f64 {
-    let problem = work.problem();
-    work.count_tangents(1);
-    let delta: Vec<f64> = parameters
-        .iter()
-        .zip(&point.parameters)
-        .map(|(a, b)| a - b)
-        .collect();
-    let near: f64 = sub
-        .proximal
-        .iter()
-        .zip(&delta)
-        .map(|(d, z)| d * z * z)
-        .sum();
-    let misfit = timed(&mut work.timings.tangent, || {
-        linear_misfit(problem, &point.evaluation, &delta)
-    });
-    near + problem.regularisation(parameters) + misfit
-}
-
-/// The cost of the readings with every prediction replaced by its linearisation, and every loss by
-/// the squares that stand for it.
-fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
-    let changes = problem.predictions_tangent(evaluation, delta);
-    let mut misfit = robust_surplus(problem, evaluation);
-    let predictions = evaluation.predictions.iter().zip(&changes);
-    for (experiment, (predictions, changes)) in problem.experiments.iter().zip(predictions) {
-        let pairs = predictions.iter().zip(changes);
-        for (channel, (predicted, change)) in experiment.channels.iter().zip(pairs) {
-            if channel.loss() == Loss::Squares {
-                let moved: Vec<f64> = predicted.iter().zip(change).map(|(z, d)| z + d).collect();
-                misfit += channel.cost(&moved);
-            } else {
-                let residuals = channel.residuals(predicted).zip(change).enumerate();
-                misfit += residuals
-                    .map(|(i, (r, d))| channel.weight(i, r) * (r + d) * (r + d))
-                    .sum::<f64>();
-            }
-        }
-    }
-    misfit
 }
 
 /// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.

@@ -1,0 +1,395 @@
+//! Residuals of the optimality conditions: the judgement of every solution of a program.
+//!
+//! A status word of a solver says how its own iterates met its own tests, in its own scaling. Here the
+//! conditions of Karush, Kuhn and Tucker are computed from the program's data, each in a unit in which
+//! it means the same whatever the units of rows, variables and cost are.
+
+use super::{Candidate, Subproblem};
+use crate::constraints::{Rows, TOLERANCE};
+
+/// Error of a sum of a few products, relative to the sum of their sizes: each product and each partial sum is rounded.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Residuals of the optimality conditions at a point with multipliers. Multipliers have the right signs: they
+/// are projected onto their cones before, so that wrong ones count as a residual of the gradient.
+///
+/// The first three are shares of the cost: together they bound by how much the point's cost differs from the
+/// minimum, so far as the minimum is no farther away than the natural size of each variable. The
+/// reference is the larger of the cost at the point and at zero, `S` for half of it, but no less than the
+/// rounding of the residuals makes sense of. The natural size `X_j` of a
+/// variable is the larger of `|z_j|` and the change that costs as much as `S` by the residuals in which the variable
+/// stands and its proximal term, `sqrt(2 S / (|F_j|^2 + d_j))`; where it has none of these, what it takes to
+/// match the other terms of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kkt {
+    /// `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the decrease that it
+    /// promises where `sum_j (delta_j / X_j)^2 <= 1`; or `sum_j r_j^2 / (2 d_j) / S`, more than which proximal terms do not
+    /// allow, if that is smaller.
+    pub stationarity: f64,
+    /// `sum |multiplier| distance / S`: of each row from the bound at which its multiplier says that it is, of cones their
+    /// inner product, of absolute values `w |T z - t| / 2` less the multiplier's part.
+    pub complementarity: f64,
+    /// `sum |multiplier| violation / S`: what the violations are worth.
+    pub violation_cost: f64,
+    /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of
+    /// its parts.
+    pub feasibility: f64,
+}
+
+impl Kkt {
+    /// Largest sum of the shares of the cost of a solution. The least decrease that a fit distinguishes from none is
+    /// 1e-9 of the cost: a third of it, which is three times the gap at which the interior-point method ends.
+    pub const COST: f64 = 3e-10;
+    /// Largest violation of a solution, ten times what constraints may be violated by: a step is moved into its bounds and judged
+    /// there once more, and what violations of the linearised equation of motion are worth is a share of the cost.
+    pub const VIOLATION: f64 = 10.0 * TOLERANCE;
+    /// Both for a solution of reduced accuracy, which gives a step to be tried or a point to start from but is no minimum:
+    /// a step is taken if it lowers the cost by a twentieth of its prediction, which four digits show.
+    pub const REDUCED: f64 = 1e-4;
+
+    /// Sum of the shares of the cost.
+    pub fn cost(&self) -> f64 {
+        self.stationarity + self.complementarity + self.violation_cost
+    }
+
+    /// Whether the residuals are those of a solution.
+    pub fn is_solution(&self) -> bool {
+        // False for NaN.
+        self.cost() <= Self::COST && self.feasibility <= Self::VIOLATION
+    }
+
+    /// Whether the residuals are those of a solution of reduced accuracy.
+    pub fn is_reduced(&self) -> bool {
+        self.cost() <= Self::REDUCED && self.feasibility <= Self::REDUCED
+    }
+
+    /// Whether these residuals are smaller than `other`; also if the others are no numbers.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        self.size() < other.size() || (other.size().is_nan() && !self.size().is_nan())
+    }
+
+    /// The residuals relative to what they may be for a solution: at most 1 for one.
+    pub fn size(&self) -> f64 {
+        (self.cost() / Self::COST).max(self.feasibility / Self::VIOLATION)
+    }
+}
+
+/// Adds `factor_i a_i` for every row.
+fn add(gradient: &mut [f64], rows: &Rows, factors: &[f64]) {
+    for (i, factor) in factors.iter().enumerate() {
+        if *factor != 0.0 {
+            rows.row(i).for_each(|(j, a)| gradient[j] += factor * a);
+        }
+    }
+}
+
+/// `sum_j |a_ij| x_j`.
+fn terms(rows: &Rows, i: usize, x: &[f64]) -> f64 {
+    rows.row(i).map(|(j, a)| (a * x[j]).abs()).sum()
+}
+
+impl Subproblem {
+    /// The residuals of the optimality conditions at `candidate`.
+    pub fn kkt(&self, candidate: &Candidate) -> Kkt {
+        let mut candidate = candidate.clone();
+        candidate.project_multipliers(self);
+        let z = &candidate.z;
+        let mut residuals = self.residuals.multiply(z);
+        let right = self.residuals.right();
+        residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
+        let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
+        let joined = self.joined_sizes(z);
+        let scale = self.cost_scale(z, &joined, at_zero);
+        let natural = self.natural_sizes(z, &joined, scale);
+        let near = self.proximal.iter().zip(z);
+        let mut gradient: Vec<f64> = near.map(|(d, z)| d * z).collect();
+        for (rows, factors) in [
+            (&self.residuals, &residuals),
+            (&self.absolute, &candidate.absolute),
+            (&self.equalities, &candidate.equalities),
+            (&self.inequalities, &candidate.inequalities),
+        ] {
+            add(&mut gradient, rows, factors);
+        }
+        for (cone, multipliers) in self.cones.iter().zip(&candidate.cones) {
+            let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
+            add(&mut gradient, &cone.rows, &negative);
+        }
+        let within = gradient.iter().zip(&natural);
+        let within = within.map(|(r, x)| (r * x) * (r * x)).sum::<f64>().sqrt();
+        let near = gradient.iter().zip(&self.proximal);
+        let near: f64 = near
+            .map(|(r, d)| if *r == 0.0 { 0.0 } else { r * r / (2.0 * d) })
+            .sum();
+        // Not f64::min, which prefers a number to NaN.
+        let stationarity = if near < within { near } else { within };
+        let mut rows = RowResiduals::default();
+        self.add_rows(&candidate, &natural, &mut rows);
+        self.add_cones(&candidate, &mut rows);
+        // Half the cost is nowhere positive where it is zero at the point and at zero: then so are the shares.
+        let share = |x: f64| if x == 0.0 { 0.0 } else { x / scale };
+        Kkt {
+            stationarity: share(stationarity),
+            complementarity: share(rows.complementarity),
+            violation_cost: share(rows.violation_cost),
+            feasibility: rows.feasibility,
+        }
+    }
+
+    /// Half the cost that shares are of: the larger of the cost at `z` and `at_zero`, but no less than what makes a share of
+    /// [`Kkt::COST`] of the rounding of the residuals. Where residuals cancel to nothing, that is all that can be known of
+    /// the minimum.
+    fn cost_scale(&self, z: &[f64], joined: &[f64], at_zero: f64) -> f64 {
+        let sizes = z
+            .iter()
+            .zip(joined)
+            .map(|(z, joined)| match joined.is_finite() {
+                true => z.abs().max(*joined),
+                false => z.abs(),
+            });
+        let sizes: Vec<f64> = sizes.collect();
+        let rows = self.residuals.right().iter().enumerate();
+        let rounding = rows.map(|(i, f)| ROUNDING * (terms(&self.residuals, i, &sizes) + f.abs()));
+        let known: f64 = rounding.map(|r| r * r).sum::<f64>() / Kkt::COST;
+        0.5 * at_zero.max(self.value(z) - self.constant).max(known)
+    }
+
+    /// The change of each variable that is as large as the other terms or the bounds of a row, of the row in which that is
+    /// smallest; infinite if there is none.
+    fn joined_sizes(&self, z: &[f64]) -> Vec<f64> {
+        let mut joined = vec![f64::INFINITY; self.variables];
+        let mut join = |rows: &Rows, i: usize, bound: f64| {
+            let all = terms(rows, i, z);
+            for (j, a) in rows.row(i).filter(|(_, a)| *a != 0.0) {
+                let others = bound.max(all - (a * z[j]).abs());
+                if others > 0.0 {
+                    joined[j] = joined[j].min(others / a.abs());
+                }
+            }
+        };
+        for (i, right) in self.equalities.right().iter().enumerate() {
+            join(&self.equalities, i, right.abs());
+        }
+        for (i, lower) in self.inequalities.right().iter().enumerate() {
+            join(
+                &self.inequalities,
+                i,
+                finite(*lower).max(finite(self.upper[i])),
+            );
+        }
+        joined
+    }
+
+    /// `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; of variables without curvature the size by which rows join them.
+    fn natural_sizes(&self, z: &[f64], joined: &[f64], scale: f64) -> Vec<f64> {
+        let mut curvature = self.proximal.clone();
+        for i in 0..self.residuals.len() {
+            self.residuals
+                .row(i)
+                .for_each(|(j, a)| curvature[j] += a * a);
+        }
+        let size = |((z, c), joined): ((&f64, f64), &f64)| {
+            let own = match c > 0.0 {
+                true => (2.0 * scale / c).sqrt(),
+                false if joined.is_finite() => *joined,
+                false => 0.0,
+            };
+            z.abs().max(own)
+        };
+        z.iter().zip(curvature).zip(joined).map(size).collect()
+    }
+
+    fn add_rows(&self, candidate: &Candidate, natural: &[f64], sums: &mut RowResiduals) {
+        let z = &candidate.z;
+        let values = self.equalities.multiply(z);
+        for (i, (value, right)) in values.iter().zip(self.equalities.right()).enumerate() {
+            let size = terms(&self.equalities, i, natural).max(right.abs());
+            sums.violate((value - right).abs(), size, candidate.equalities[i]);
+        }
+        let values = self.inequalities.multiply(z);
+        for (i, value) in values.iter().enumerate() {
+            let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
+            let multiplier = candidate.inequalities[i];
+            let outside = (lower - value).max(value - upper);
+            let bound = if lower - value > value - upper {
+                lower
+            } else {
+                upper
+            };
+            if outside > 0.0 || outside.is_nan() {
+                let size = terms(&self.inequalities, i, natural).max(finite(bound));
+                sums.violate(outside, size, multiplier);
+            }
+            if multiplier != 0.0 {
+                let bound = if multiplier > 0.0 { upper } else { lower };
+                sums.complementarity += (multiplier * (bound - value)).abs();
+            }
+        }
+        let values = self.absolute.multiply(z);
+        for (i, (value, right)) in values.iter().zip(self.absolute.right()).enumerate() {
+            let jump = value - right;
+            let half = 0.5 * self.absolute_weights[i];
+            let lost = half - candidate.absolute[i] * jump.signum();
+            sums.complementarity += lost.max(0.0) * jump.abs();
+        }
+    }
+
+    fn add_cones(&self, candidate: &Candidate, sums: &mut RowResiduals) {
+        for (cone, multipliers) in self.cones.iter().zip(&candidate.cones) {
+            let values = cone.rows.multiply(&candidate.z);
+            let parts: Vec<f64> = values
+                .iter()
+                .zip(cone.rows.right())
+                .map(|(v, r)| v - r)
+                .collect();
+            let Some((bound, parts)) = parts.split_first() else {
+                continue;
+            };
+            let norm = parts.iter().map(|p| p * p).sum::<f64>().sqrt();
+            let outside = (norm - bound).max(0.0);
+            sums.violate(outside, norm.max(bound.abs()), multipliers[0]);
+            let products = std::iter::once(bound).chain(parts).zip(multipliers);
+            let inner: f64 = products.map(|(s, c)| s * c).sum();
+            sums.complementarity += inner.abs();
+        }
+    }
+}
+
+/// A bound's size; 0 if there is none.
+fn finite(bound: f64) -> f64 {
+    if bound.is_finite() { bound.abs() } else { 0.0 }
+}
+
+#[derive(Default)]
+struct RowResiduals {
+    complementarity: f64,
+    violation_cost: f64,
+    feasibility: f64,
+}
+
+impl RowResiduals {
+    fn violate(&mut self, violation: f64, size: f64, multiplier: f64) {
+        if violation == 0.0 {
+            return;
+        }
+        self.violation_cost += (multiplier * violation).abs();
+        let relative = violation / size;
+        // NaN is the largest violation.
+        self.feasibility = match relative.is_nan() {
+            true => f64::INFINITY,
+            false => self.feasibility.max(relative),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constraints::Cone;
+
+    /// `(z - 2)^2` for `z <= 1`: at 1 the multiplier is 1.
+    fn bounded() -> Subproblem {
+        let mut sub = Subproblem::new(1);
+        sub.residuals.push([(0, 1.0)], 2.0);
+        sub.bound([(0, 1.0)], f64::NEG_INFINITY, 1.0);
+        sub
+    }
+
+    fn at(sub: &Subproblem, z: f64, multiplier: f64) -> Kkt {
+        sub.kkt(&Candidate {
+            z: vec![z],
+            inequalities: vec![multiplier],
+            ..Candidate::zero(sub)
+        })
+    }
+
+    /// Half the cost at zero is 2, the natural size of z is 2.
+    #[test]
+    fn residuals_by_hand() {
+        let sub = bounded();
+        let solved = at(&sub, 1.0, 1.0);
+        assert!(solved.is_solution() && solved.size() == 0.0, "{solved:?}");
+        // Inside: the gradient is -1.5, times 2, over 2.
+        let inside = at(&sub, 0.5, 0.0);
+        assert_eq!(inside.stationarity, 1.5);
+        // The multiplier balances it half a unit from the bound.
+        let distant = at(&sub, 0.5, 1.5);
+        assert_eq!(
+            (distant.stationarity, distant.complementarity),
+            (0.0, 0.375)
+        );
+        // Outside by 0.5 of a terms' size of 2.
+        let outside = at(&sub, 1.5, 0.5);
+        assert_eq!((outside.violation_cost, outside.feasibility), (0.125, 0.25));
+        // A multiplier of the wrong sign is none.
+        assert_eq!(at(&sub, 2.0, -1.0).stationarity, 0.0);
+        assert!(!at(&sub, f64::NAN, 0.0).is_solution());
+    }
+
+    /// A proximal term bounds the decrease that a slope promises: `r^2 / (2 d)`.
+    #[test]
+    fn proximal_terms() {
+        let mut sub = bounded();
+        sub.proximal[0] = 1e6;
+        let kkt = at(&sub, 0.0, 0.0);
+        assert!(
+            (kkt.stationarity - 4.0 / 2e6 / 2.0).abs() < 1e-18,
+            "{kkt:?}"
+        );
+    }
+
+    /// Residuals say the same whatever the units of variables, rows and cost are.
+    #[test]
+    fn units_do_not_matter() {
+        let expected = at(&bounded(), 0.5, 0.7);
+        for (unit, row, cost) in [
+            (1e6, 1.0, 1.0),
+            (1.0, 1e-6, 1.0),
+            (1.0, 1.0, 1e9),
+            (1e-9, 1e5, 1e-7),
+        ] {
+            let mut sub = Subproblem::new(1);
+            sub.residuals.push([(0, unit * cost)], 2.0 * cost);
+            sub.bound([(0, unit * row)], f64::NEG_INFINITY, row);
+            let found = at(&sub, 0.5 / unit, 0.7 * cost * cost / row);
+            for (a, b) in [
+                (found.stationarity, expected.stationarity),
+                (found.complementarity, expected.complementarity),
+                (found.feasibility, expected.feasibility),
+            ] {
+                assert!((a - b).abs() <= 1e-12, "{found:?} {expected:?}");
+            }
+        }
+    }
+
+    /// The nearest point of the unit disc to (3, 4), and the soft threshold of `(z - 3)^2 + |z|`.
+    #[test]
+    fn cones_and_absolute_values() {
+        let mut sub = Subproblem::new(2);
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.residuals.push([(1, 1.0)], 4.0);
+        let mut rows = Rows::new();
+        rows.push([], -1.0);
+        rows.push([(0, 1.0)], 0.0);
+        rows.push([(1, 1.0)], 0.0);
+        sub.cones.push(Cone { rows });
+        let mut candidate = Candidate::zero(&sub);
+        candidate.z = vec![0.6, 0.8];
+        candidate.cones[0] = vec![4.0, -2.4, -3.2];
+        let kkt = sub.kkt(&candidate);
+        assert!(kkt.is_solution(), "{kkt:?}");
+        candidate.cones[0] = vec![0.0; 3];
+        assert!(sub.kkt(&candidate).stationarity > 0.1);
+
+        let mut sub = Subproblem::new(1);
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.absolute.push([(0, 1.0)], 0.0);
+        sub.absolute_weights.push(1.0);
+        let mut candidate = Candidate::zero(&sub);
+        candidate.z = vec![2.5];
+        candidate.absolute = vec![0.5];
+        assert_eq!(sub.kkt(&candidate).size(), 0.0);
+        candidate.absolute = vec![-0.5];
+        assert!(sub.kkt(&candidate).complementarity > 0.1);
+    }
+}

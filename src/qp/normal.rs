@@ -1,0 +1,161 @@
+//! A program in units in which its coefficients are near 1.
+
+use super::{Candidate, Subproblem};
+use crate::constraints::{Cone, Rows};
+
+/// Rounds of scaling by square roots: each halves the exponents that are left, and after twelve those of
+/// the largest and smallest numbers are below 1.
+const ROUNDS: usize = 12;
+
+/// A program with the variables `z_j / units_j`, every row and cone multiplied by a factor of its own, and half the cost by
+/// another. All factors are powers of two, which change no digit.
+pub struct Normalised {
+    /// The program.
+    pub sub: Subproblem,
+    units: Vec<f64>,
+    equalities: Vec<f64>,
+    inequalities: Vec<f64>,
+    absolute: Vec<f64>,
+    cones: Vec<f64>,
+    cost: f64,
+}
+
+impl Normalised {
+    /// In units in which the largest coefficients of every row and every column are near 1 (Ruiz), and so is the cost at zero.
+    pub fn new(original: &Subproblem) -> Self {
+        let units = units(original);
+        let scaled = original.in_units(&units);
+        let at_zero = scaled.value(&vec![0.0; scaled.variables]) - scaled.constant;
+        let near = scaled.proximal.iter().fold(0.0f64, |m, d| m.max(*d));
+        let size = if at_zero > 0.0 { at_zero } else { near };
+        // Its root is a power of two as well.
+        let root = match size > 0.0 && size.is_finite() {
+            true => power_of_two(1.0 / size.sqrt()),
+            false => 1.0,
+        };
+        let cost = root * root;
+        let factors = |rows: &Rows| -> Vec<f64> {
+            let each = (0..rows.len()).map(|i| row_factor(rows.scale(i)));
+            each.collect()
+        };
+        let equalities = factors(&scaled.equalities);
+        let inequalities = factors(&scaled.inequalities);
+        let absolute = factors(&scaled.absolute);
+        let scale =
+            |cone: &Cone| (0..cone.rows.len()).fold(0.0f64, |m, i| m.max(cone.rows.scale(i)));
+        let cones: Vec<f64> = scaled.cones.iter().map(|c| row_factor(scale(c))).collect();
+        let mut sub = Subproblem::new(scaled.variables);
+        let roots = vec![root; scaled.residuals.len()];
+        sub.residuals = times(&scaled.residuals, &roots);
+        sub.proximal = scaled.proximal.iter().map(|d| d * cost).collect();
+        sub.equalities = times(&scaled.equalities, &equalities);
+        sub.inequalities = times(&scaled.inequalities, &inequalities);
+        sub.upper = product(&scaled.upper, &inequalities);
+        sub.absolute = times(&scaled.absolute, &absolute);
+        let weights = scaled.absolute_weights.iter().zip(&absolute);
+        sub.absolute_weights = weights.map(|(w, factor)| w * cost / factor).collect();
+        let each = scaled.cones.iter().zip(&cones);
+        sub.cones = each
+            .map(|(cone, factor)| Cone {
+                rows: times(&cone.rows, &vec![*factor; cone.rows.len()]),
+            })
+            .collect();
+        Self {
+            sub,
+            units,
+            equalities,
+            inequalities,
+            absolute,
+            cones,
+            cost,
+        }
+    }
+
+    /// A point of the program as one of the original.
+    pub fn original(&self, point: &Candidate) -> Candidate {
+        let multipliers = |values: &[f64], factors: &[f64]| -> Vec<f64> {
+            let pairs = values.iter().zip(factors);
+            pairs.map(|(m, factor)| m * factor / self.cost).collect()
+        };
+        let cones = point.cones.iter().zip(&self.cones);
+        let cones = cones.map(|(c, factor)| multipliers(c, &vec![*factor; c.len()]));
+        Candidate {
+            z: product(&point.z, &self.units),
+            inequalities: multipliers(&point.inequalities, &self.inequalities),
+            equalities: multipliers(&point.equalities, &self.equalities),
+            absolute: multipliers(&point.absolute, &self.absolute),
+            cones: cones.collect(),
+        }
+    }
+}
+
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+/// The power of two nearest to a positive number, on the scale of exponents.
+fn power_of_two(x: f64) -> f64 {
+    x.log2().round().exp2()
+}
+
+/// The factor that brings a row of this size near 1.
+fn row_factor(size: f64) -> f64 {
+    if size > 0.0 && size.is_finite() {
+        power_of_two(1.0 / size)
+    } else {
+        1.0
+    }
+}
+
+/// Every row and its right-hand side times its factor.
+fn times(rows: &Rows, factors: &[f64]) -> Rows {
+    let mut scaled = Rows::new();
+    for (i, factor) in factors.iter().enumerate() {
+        let entries = rows.row(i).map(|(j, a)| (j, a * factor));
+        scaled.push(entries, rows.right()[i] * factor);
+    }
+    scaled
+}
+
+/// The units of the variables: rows of residuals are scaled one by one here, as their variables in a program are.
+fn units(sub: &Subproblem) -> Vec<f64> {
+    let cones = sub.cones.iter().map(|cone| &cone.rows);
+    let rows = [
+        &sub.residuals,
+        &sub.absolute,
+        &sub.equalities,
+        &sub.inequalities,
+    ];
+    let all: Vec<&Rows> = rows.into_iter().chain(cones).collect();
+    let mut scales: Vec<Vec<f64>> = all.iter().map(|rows| vec![1.0; rows.len()]).collect();
+    let mut units = vec![1.0; sub.variables];
+    for _ in 0..ROUNDS {
+        let mut largest = vec![0.0f64; sub.variables];
+        for (rows, scales) in all.iter().zip(&mut scales) {
+            for (i, scale) in scales.iter_mut().enumerate() {
+                let mut most = 0.0f64;
+                for (j, a) in rows.row(i) {
+                    let size = (a * units[j] * *scale).abs();
+                    most = most.max(size);
+                    largest[j] = largest[j].max(size);
+                }
+                if most > 0.0 {
+                    *scale /= most.sqrt();
+                }
+            }
+        }
+        for (unit, most) in units.iter_mut().zip(&largest) {
+            if *most > 0.0 {
+                *unit /= most.sqrt();
+            }
+        }
+    }
+    for (unit, d) in units.iter_mut().zip(&sub.proximal) {
+        // A variable that no row joins is measured by its proximal term.
+        if *unit == 1.0 && *d > 0.0 {
+            *unit = 1.0 / d.sqrt();
+        }
+        *unit = power_of_two(*unit);
+    }
+    units
+}

@@ -1,0 +1,261 @@
+//! Repair of a nearly optimal point: the program with its active rows held as equalities, which is linear.
+//!
+//! An interior-point method approaches its bounds and never reaches them, and where its systems are
+//! ill-conditioned it stops before it is near. Which rows are active shows long before that. With them held, one
+//! sparse factorisation finds the minimum to machine precision; multipliers of the wrong sign and rows that are violated
+//! then correct the active set.
+
+use super::factor::Symmetric;
+use super::{Candidate, Kkt, Subproblem};
+use crate::constraints::{Rows, TOLERANCE};
+
+/// Most corrections of the active set: of hundreds of rows few change after two, and sets that cycle
+/// do not end.
+const ROUNDS: usize = 12;
+/// Corrections in a row that bring no better point: two, since a wrong row is let go only after it was held.
+const IN_VAIN: usize = 2;
+
+/// Where a row or an absolute value is held.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Held {
+    /// Between its bounds.
+    Free,
+    /// At its lower bound; an absolute value is that of a negative number.
+    Lower,
+    /// At its upper bound; an absolute value is that of a positive number.
+    Upper,
+    /// An absolute value is zero.
+    Zero,
+}
+
+/// The active set.
+#[derive(Clone, PartialEq, Eq)]
+struct ActiveSet {
+    rows: Vec<Held>,
+    absolute: Vec<Held>,
+}
+
+impl Subproblem {
+    /// Whether [`Subproblem::polish`] applies: the boundary of a cone is curved.
+    pub fn can_be_polished(&self) -> bool {
+        self.cones.is_empty()
+    }
+
+    /// The best of `from` and the minima under the active sets that follow from it, with its residuals.
+    pub fn polish(&self, from: Candidate) -> (Candidate, Kkt) {
+        let kkt = self.kkt(&from);
+        let mut best = (from, kkt);
+        // A solution that is as near to its rows as constraints hold needs no repair.
+        let is_near = kkt.is_solution() && kkt.feasibility <= TOLERANCE;
+        if is_near || !self.can_be_polished() || !best.0.is_finite() {
+            return best;
+        }
+        let mut set = self.active_set(&best.0);
+        let mut seen = vec![set.clone()];
+        let mut point = best.0.clone();
+        let mut in_vain = 0;
+        for _ in 0..ROUNDS {
+            let Some(next) = self.minimum_on(&set, &point) else {
+                break;
+            };
+            let kkt = self.kkt(&next);
+            let is_better = kkt.is_better_than(&best.1);
+            if is_better {
+                best = (next.clone(), kkt);
+            }
+            in_vain = if is_better { 0 } else { in_vain + 1 };
+            if kkt.is_solution() || in_vain > IN_VAIN {
+                break;
+            }
+            let corrected = self.corrected(&set, &next);
+            // Where a system is nearly singular, a correction from the next point is another one.
+            if corrected != set && seen.contains(&corrected) {
+                break;
+            }
+            set = corrected;
+            seen.push(set.clone());
+            point = next;
+        }
+        best
+    }
+
+    /// The rows whose multipliers are larger than their distances, each in its natural size: the slack of a row
+    /// relative to its terms, what it would cost relative to the cost.
+    fn active_set(&self, candidate: &Candidate) -> ActiveSet {
+        let z = &candidate.z;
+        let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
+        let scale = 0.5 * at_zero.max(self.value(z) - self.constant);
+        let values = self.inequalities.multiply(z);
+        let row = |(i, value): (usize, &f64)| {
+            let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
+            if lower == upper {
+                return Held::Upper;
+            }
+            let multiplier = candidate.inequalities[i];
+            let (bound, held) = match multiplier > 0.0 {
+                true => (upper, Held::Upper),
+                false => (lower, Held::Lower),
+            };
+            let terms: f64 = self
+                .inequalities
+                .row(i)
+                .map(|(j, a)| (a * z[j]).abs())
+                .sum();
+            let size = terms.max(bound.abs()).max(f64::MIN_POSITIVE);
+            let distance = (bound - value).abs() / size;
+            let price = (multiplier * size).abs() / scale;
+            if multiplier != 0.0 && distance < price {
+                held
+            } else {
+                Held::Free
+            }
+        };
+        let rows = values.iter().enumerate().map(row).collect();
+        let values = self.absolute.multiply(z);
+        let absolute = values.iter().enumerate().map(|(i, value)| {
+            let jump = value - self.absolute.right()[i];
+            let half = 0.5 * self.absolute_weights[i];
+            let terms: f64 = self.absolute.row(i).map(|(j, a)| (a * z[j]).abs()).sum();
+            let size = terms
+                .max(self.absolute.right()[i].abs())
+                .max(f64::MIN_POSITIVE);
+            let room = (half - candidate.absolute[i].abs()) * size / scale;
+            match jump.abs() / size < room {
+                true => Held::Zero,
+                false if jump > 0.0 => Held::Upper,
+                false => Held::Lower,
+            }
+        });
+        ActiveSet {
+            rows,
+            absolute: absolute.collect(),
+        }
+    }
+
+    /// The active set after the minimum on `set`: rows whose multipliers have the wrong sign are let go, rows that are violated
+    /// are held.
+    fn corrected(&self, set: &ActiveSet, at: &Candidate) -> ActiveSet {
+        let values = self.inequalities.multiply(&at.z);
+        let row = |(i, held): (usize, &Held)| {
+            let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
+            let multiplier = at.inequalities[i];
+            match held {
+                _ if lower == upper => Held::Upper,
+                Held::Upper if multiplier < 0.0 => Held::Free,
+                Held::Lower if multiplier > 0.0 => Held::Free,
+                Held::Free if values[i] < lower => Held::Lower,
+                Held::Free if values[i] > upper => Held::Upper,
+                held => *held,
+            }
+        };
+        let rows = set.rows.iter().enumerate().map(row).collect();
+        let values = self.absolute.multiply(&at.z);
+        let absolute = set.absolute.iter().enumerate().map(|(i, held)| {
+            let jump = values[i] - self.absolute.right()[i];
+            let half = 0.5 * self.absolute_weights[i];
+            match held {
+                Held::Zero if at.absolute[i] > half => Held::Upper,
+                Held::Zero if at.absolute[i] < -half => Held::Lower,
+                Held::Upper if jump < 0.0 => Held::Zero,
+                Held::Lower if jump > 0.0 => Held::Zero,
+                held => *held,
+            }
+        });
+        ActiveSet {
+            rows,
+            absolute: absolute.collect(),
+        }
+    }
+
+    /// The minimum with the rows of `set` held as equalities, as a correction of `from`, by one symmetric
+    /// factorisation of
+    ///
+    /// ```text
+    /// [D F' A'; F -I 0; A 0 0] (z, F z - f, multipliers) = (-T' a, f, b)
+    /// ```
+    ///
+    /// with `a` of the absolute values that are not held at zero.
+    fn minimum_on(&self, set: &ActiveSet, from: &Candidate) -> Option<Candidate> {
+        let held = self.held_rows(set);
+        let (n, r) = (self.variables, self.residuals.len());
+        let signs = [vec![1i8; n], vec![-1; r + held.len()]].concat();
+        let mut matrix = Symmetric::new(signs);
+        for (j, d) in self.proximal.iter().enumerate() {
+            matrix.add(j, j, *d);
+        }
+        for i in 0..r {
+            self.residuals
+                .row(i)
+                .for_each(|(j, a)| matrix.add(j, n + i, a));
+            matrix.add(n + i, n + i, -1.0);
+        }
+        for i in 0..held.len() {
+            held.row(i).for_each(|(j, a)| matrix.add(j, n + r + i, a));
+        }
+        let mut side = [&vec![0.0; n], self.residuals.right(), held.right()].concat();
+        let mut next = from.clone();
+        for (i, held) in set.absolute.iter().enumerate() {
+            let half = 0.5 * self.absolute_weights[i];
+            next.absolute[i] = match held {
+                Held::Upper => half,
+                Held::Lower => -half,
+                Held::Zero | Held::Free => continue,
+            };
+            let multiplier = next.absolute[i];
+            self.absolute
+                .row(i)
+                .for_each(|(j, a)| side[j] -= multiplier * a);
+        }
+        // A correction of the multipliers as well: of those of rows that depend on each other the nearest ones are found.
+        let mut residuals = self.residuals.multiply(&from.z);
+        let right = self.residuals.right();
+        residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
+        let multipliers = held_multipliers(set, from);
+        let start = [&from.z, residuals.as_slice(), &multipliers].concat();
+        let solution = matrix.solve_from(&start, &side)?;
+        next.z.copy_from_slice(&solution[..n]);
+        let mut multipliers = solution[n + r..].iter().copied();
+        let mut take = || multipliers.next().unwrap_or(0.0);
+        next.equalities.fill_with(&mut take);
+        for (multiplier, held) in next.inequalities.iter_mut().zip(&set.rows) {
+            *multiplier = match held {
+                Held::Free => 0.0,
+                _ => take(),
+            };
+        }
+        for (multiplier, held) in next.absolute.iter_mut().zip(&set.absolute) {
+            if *held == Held::Zero {
+                *multiplier = take();
+            }
+        }
+        next.is_finite().then_some(next)
+    }
+
+    /// The equalities, the rows held at their bounds and the absolute values held at zero, in this order.
+    fn held_rows(&self, set: &ActiveSet) -> Rows {
+        let mut held = self.equalities.clone();
+        for (i, at) in set.rows.iter().enumerate() {
+            match at {
+                Held::Free | Held::Zero => {}
+                Held::Lower => held.push(self.inequalities.row(i), self.inequalities.right()[i]),
+                Held::Upper => held.push(self.inequalities.row(i), self.upper[i]),
+            }
+        }
+        for (i, at) in set.absolute.iter().enumerate() {
+            if *at == Held::Zero {
+                held.push(self.absolute.row(i), self.absolute.right()[i]);
+            }
+        }
+        held
+    }
+}
+
+/// The multipliers of the rows that [`Subproblem::held_rows`] are.
+fn held_multipliers(set: &ActiveSet, at: &Candidate) -> Vec<f64> {
+    let held = |(m, at): (&f64, &Held)| (*at != Held::Free).then_some(*m);
+    let zero = |(m, at): (&f64, &Held)| (*at == Held::Zero).then_some(*m);
+    let rows = at.inequalities.iter().zip(&set.rows).filter_map(held);
+    let absolute = at.absolute.iter().zip(&set.absolute).filter_map(zero);
+    let all = at.equalities.iter().copied().chain(rows).chain(absolute);
+    all.collect()
+}

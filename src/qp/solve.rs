@@ -1,0 +1,278 @@
+//! The whole program: attempts, each judged by the residuals of the optimality conditions.
+
+use super::clarabel::{Ending, Settings};
+use super::normal::Normalised;
+use super::{Candidate, Kkt, Subproblem};
+use crate::constraints::{Rows, TOLERANCE};
+
+/// How a program ended, by kmcfit's own judgement of the point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ConicStatus {
+    /// The residuals of the optimality conditions are those of a solution ([`Kkt::is_solution`]).
+    Solved,
+    /// They are those of a solution of reduced accuracy ([`Kkt::is_reduced`]): a step to be tried, a point to start from,
+    /// but no minimum.
+    Almost,
+    /// No point satisfies the constraints, as a combination of them proves.
+    Infeasible,
+    /// Refused: no attempt led to a solution, and nothing proves that there is none.
+    Stalled,
+}
+
+impl ConicStatus {
+    /// Whether there is a point that can be used, if not as a minimum.
+    pub fn is_point(self) -> bool {
+        matches!(self, ConicStatus::Solved | ConicStatus::Almost)
+    }
+
+    /// One sentence.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            ConicStatus::Solved => "the quadratic program was solved",
+            ConicStatus::Almost => "the quadratic program was solved to reduced accuracy",
+            ConicStatus::Infeasible => {
+                "no point satisfies all constraints of the quadratic program"
+            }
+            ConicStatus::Stalled => "the quadratic program could not be solved: its solver stalled",
+        }
+    }
+}
+
+/// The end of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// How it ended.
+    pub status: ConicStatus,
+    /// The variables: of the best point of all attempts.
+    pub z: Vec<f64>,
+    /// Multipliers of the inequality rows, positive where the upper bound pushes, negative where the
+    /// lower one does: `gradient of (cost/2) + G^T multipliers + ... = 0`.
+    pub multipliers: Vec<f64>,
+    /// Multipliers of the equality rows, same convention.
+    pub equality_multipliers: Vec<f64>,
+    /// For each cone the multiplier of its bound, the first part: not negative, and what half the
+    /// cost would lose per unit by which the bound gave way.
+    pub cone_multipliers: Vec<f64>,
+    /// The residuals of the optimality conditions; `None` where there is no finite point.
+    pub kkt: Option<Kkt>,
+    /// Runs of the interior-point solver.
+    pub attempts: u32,
+}
+
+/// One way to run the interior-point method.
+struct Attempt {
+    /// Shift of the diagonal of its systems.
+    regularisation: f64,
+    units: Units,
+}
+
+/// In which units the program is given to it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Units {
+    /// Its own.
+    Own,
+    /// Those of [`Normalised`].
+    Normalised,
+}
+
+/// All ways, in the order in which they are tried. No shift suits all programs: large ones drown the small coefficients of heavily
+/// weighted residuals, small ones leave nearly singular systems as they are. The first is the one that solves most
+/// programs of the shipped models; the normalised ones are for rows and variables whose units are decades apart.
+const ATTEMPTS: [Attempt; 5] = [
+    Attempt {
+        regularisation: 1e-14,
+        units: Units::Own,
+    },
+    Attempt {
+        regularisation: 1e-8,
+        units: Units::Own,
+    },
+    Attempt {
+        regularisation: 1e-8,
+        units: Units::Normalised,
+    },
+    Attempt {
+        regularisation: 1e-12,
+        units: Units::Normalised,
+    },
+    Attempt {
+        regularisation: 1e-10,
+        units: Units::Own,
+    },
+];
+
+impl Normalised {
+    /// [`Subproblem::run_clarabel`] in these units.
+    fn run(&self, settings: Settings) -> Ending {
+        let ending = self.sub.run_clarabel(settings);
+        match ending {
+            Ending::Point(point) => Ending::Point(self.original(&self.sub.repaired(point))),
+            Ending::Contradiction(proof) => Ending::Contradiction(self.original(&proof)),
+            Ending::Nothing => Ending::Nothing,
+        }
+    }
+}
+
+impl Subproblem {
+    /// Most iterations of Clarabel, unless told otherwise: it takes ten to thirty, and what is not
+    /// solved after a hundred does not get solved.
+    pub const ITERATIONS: u32 = 100;
+
+    /// The minimiser under all constraints.
+    pub fn solve(&self) -> Solution {
+        self.solve_within(Self::ITERATIONS)
+    }
+
+    /// [`Subproblem::solve`] with at most so many iterations of each attempt; with none it is refused.
+    ///
+    /// A status word of the interior-point solver decides nothing: its point is repaired where its active set tells how
+    /// and judged by its residuals, its proof of infeasibility is checked. What is refused is tried again with another
+    /// regularisation.
+    pub fn solve_within(&self, iterations: u32) -> Solution {
+        if iterations == 0 || !self.is_finite() {
+            return self.refused(None, 0);
+        }
+        if self.has_impossible_row() {
+            return self.solution(ConicStatus::Infeasible, None, 0);
+        }
+        // Where it costs nothing to stay there is no unit of the cost for an interior-point method to go by.
+        let zero = Candidate::zero(self);
+        let kkt = self.kkt(&zero);
+        if kkt.is_solution() {
+            return self.solution(ConicStatus::Solved, Some((zero, kkt)), 0);
+        }
+        let mut best: Option<(Candidate, Kkt)> = None;
+        let mut normalised = None;
+        for (attempts, attempt) in (1..).zip(ATTEMPTS) {
+            let settings = Settings {
+                regularisation: attempt.regularisation,
+                iterations,
+            };
+            let ending = match attempt.units {
+                Units::Own => match self.run_clarabel(settings) {
+                    Ending::Point(point) => Ending::Point(self.repaired(point)),
+                    ending => ending,
+                },
+                Units::Normalised => normalised
+                    .get_or_insert_with(|| Normalised::new(self))
+                    .run(settings),
+            };
+            match ending {
+                Ending::Point(point) => {
+                    let kkt = self.kkt(&point);
+                    if kkt.is_solution() {
+                        return self.solution(ConicStatus::Solved, Some((point, kkt)), attempts);
+                    }
+                    if best
+                        .as_ref()
+                        .is_none_or(|(_, best)| kkt.is_better_than(best))
+                    {
+                        best = Some((point, kkt));
+                    }
+                }
+                Ending::Contradiction(proof) if self.is_contradiction(&proof) => {
+                    return self.solution(ConicStatus::Infeasible, None, attempts);
+                }
+                Ending::Contradiction(_) | Ending::Nothing => {}
+            }
+        }
+        let attempts = ATTEMPTS.len() as u32;
+        let normalised = normalised.unwrap_or_else(|| Normalised::new(self));
+        if normalised.sub.has_violations(iterations) {
+            return self.solution(ConicStatus::Infeasible, best, attempts);
+        }
+        self.refused(best, attempts)
+    }
+
+    /// The point moved into its bounds and polished.
+    fn repaired(&self, mut point: Candidate) -> Candidate {
+        self.clip(&mut point.z);
+        self.polish(point).0
+    }
+
+    fn refused(&self, best: Option<(Candidate, Kkt)>, attempts: u32) -> Solution {
+        let is_reduced = best.as_ref().is_some_and(|(_, kkt)| kkt.is_reduced());
+        let status = match is_reduced {
+            true => ConicStatus::Almost,
+            false => ConicStatus::Stalled,
+        };
+        self.solution(status, best, attempts)
+    }
+
+    fn solution(
+        &self,
+        status: ConicStatus,
+        found: Option<(Candidate, Kkt)>,
+        attempts: u32,
+    ) -> Solution {
+        let kkt = found.as_ref().map(|(_, kkt)| *kkt);
+        let mut candidate = found.map_or_else(|| Candidate::zero(self), |(candidate, _)| candidate);
+        candidate.project_multipliers(self);
+        let first = |cone: &Vec<f64>| cone.first().copied().unwrap_or(0.0);
+        Solution {
+            status,
+            multipliers: candidate.inequalities,
+            equality_multipliers: candidate.equalities,
+            cone_multipliers: candidate.cones.iter().map(first).collect(),
+            z: candidate.z,
+            kkt,
+            attempts,
+        }
+    }
+
+    /// Moves every variable that a row bounds or fixes alone into its bounds: an interior-point method leaves it outside by its
+    /// accuracy, which for a variable of no other size is no small share of it.
+    fn clip(&self, z: &mut [f64]) {
+        let mut clip = |rows: &Rows, i: usize, upper: f64| {
+            let mut entries = rows.row(i).filter(|(_, a)| *a != 0.0);
+            if let (Some((j, a)), None) = (entries.next(), entries.next()) {
+                let (one, other) = (rows.right()[i] / a, upper / a);
+                // Not clamp(), which panics on bounds that cross.
+                z[j] = z[j].max(one.min(other)).min(one.max(other));
+            }
+        };
+        for (i, upper) in self.upper.iter().enumerate() {
+            clip(&self.inequalities, i, *upper);
+        }
+        for (i, right) in self.equalities.right().iter().enumerate() {
+            clip(&self.equalities, i, *right);
+        }
+    }
+
+    /// Whether a row by itself has no solution: its bounds cross by more than constraints may be violated by, or it has no entries
+    /// and excludes zero.
+    fn has_impossible_row(&self) -> bool {
+        let is_impossible = |rows: &Rows, i: usize, lower: f64, upper: f64| {
+            let crosses = lower > upper && lower - upper > TOLERANCE * (lower.abs() + upper.abs());
+            crosses || (rows.scale(i) == 0.0 && (lower > 0.0 || upper < 0.0))
+        };
+        let equalities = self.equalities.right().iter().enumerate();
+        let bounds = self.inequalities.right().iter().zip(&self.upper);
+        let rows = bounds.enumerate();
+        { equalities }.any(|(i, right)| is_impossible(&self.equalities, i, *right, *right)) || {
+            rows
+        }
+        .any(|(i, (l, u))| is_impossible(&self.inequalities, i, *l, *u))
+    }
+
+    /// Whether all coefficients are finite; bounds may be infinite on their own side.
+    fn is_finite(&self) -> bool {
+        let rows = [&self.residuals, &self.absolute, &self.equalities];
+        let cones = self.cones.iter().map(|cone| &cone.rows);
+        let finite = rows.into_iter().chain(cones).all(|rows| {
+            let right = rows.right().iter().all(|b| b.is_finite());
+            right && (0..rows.len()).all(|i| rows.scale(i).is_finite() && !has_nan(rows, i))
+        });
+        let bounds = self.inequalities.right().iter().zip(&self.upper);
+        let bounded = bounds.enumerate().all(|(i, (lower, upper))| {
+            let is_bound = *lower < f64::INFINITY && *upper > f64::NEG_INFINITY;
+            is_bound && self.inequalities.scale(i).is_finite() && !has_nan(&self.inequalities, i)
+        });
+        let weights = self.proximal.iter().chain(&self.absolute_weights);
+        finite && bounded && weights.fold(0.0, |sum: f64, w| sum + w).is_finite()
+    }
+}
+
+fn has_nan(rows: &Rows, i: usize) -> bool {
+    rows.row(i).any(|(_, a)| a.is_nan())
+}
