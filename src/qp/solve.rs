@@ -123,12 +123,23 @@ impl Subproblem {
         self.solve_within(Self::ITERATIONS)
     }
 
+    /// A step for a search that verifies every step by other means: the first point of reduced accuracy
+    /// ([`Kkt::is_reduced`]) ends the attempts.
+    pub fn solve_for_step(&self) -> Solution {
+        self.solve_until(Self::ITERATIONS, Kkt::is_reduced)
+    }
+
     /// [`Subproblem::solve`] with at most so many iterations of each attempt; with none it is refused.
     ///
     /// A status word of the interior-point solver decides nothing: its point is repaired where its active set tells how
     /// and judged by its residuals, its proof of infeasibility is checked. What is refused is tried again with another
     /// regularisation.
     pub fn solve_within(&self, iterations: u32) -> Solution {
+        self.solve_until(iterations, Kkt::is_solution)
+    }
+
+    /// Attempts until the residuals of a point are small enough.
+    fn solve_until(&self, iterations: u32, is_enough: impl Fn(&Kkt) -> bool) -> Solution {
         if iterations == 0 || !self.is_finite() {
             return self.refused(None, 0);
         }
@@ -160,8 +171,12 @@ impl Subproblem {
             match ending {
                 Ending::Point(point) => {
                     let kkt = self.kkt(&point);
-                    if kkt.is_solution() {
-                        return self.solution(ConicStatus::Solved, Some((point, kkt)), attempts);
+                    if is_enough(&kkt) {
+                        let status = match kkt.is_solution() {
+                            true => ConicStatus::Solved,
+                            false => ConicStatus::Almost,
+                        };
+                        return self.solution(status, Some((point, kkt)), attempts);
                     }
                     if best
                         .as_ref()

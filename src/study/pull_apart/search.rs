@@ -5,7 +5,7 @@ use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
 use crate::objective::{Channel, Evaluation, Loss};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::{ConicStatus, Kkt, Subproblem};
 use crate::solvers::{add_priors, linear_readings};
 use crate::study::functional::Target;
 use crate::study::refit::sizes;
@@ -16,8 +16,9 @@ const FIRST_RADIUS: f64 = 0.25;
 const RADII: [f64; 2] = [1e-7, 100.0];
 /// A step whose gain is below this share of the number's size ends the search.
 const SETTLED: f64 = 1e-9;
-/// Trials aim at this share of the level's root, so that rounding does not put them outside.
-const AIM: f64 = 1.0 - 1e-9;
+/// Trials aim at this share of the level's root: a program may violate a cone by [`Kkt::VIOLATION`], which must not put
+/// them outside.
+const AIM: f64 = 1.0 - 2.0 * Kkt::VIOLATION;
 /// Corrections of one trial.
 const CORRECTIONS: usize = 6;
 /// A step is good if it keeps this share of the predicted gain, poor below the next.
@@ -44,6 +45,15 @@ pub struct Within {
     parameters: Vec<f64>,
     evaluation: Evaluation,
     misfit: f64,
+}
+
+/// A step of the search.
+struct Proposal {
+    trial: Vec<f64>,
+    /// What the linearised problem promises.
+    gain: f64,
+    /// Whether no step in the trust region promises more.
+    is_largest: bool,
 }
 
 impl Search<'_> {
@@ -81,12 +91,12 @@ impl Search<'_> {
             }
             programs += 1;
             let proposal = self.push(&here, target, side, radius, reach, &sizes);
-            let gain = proposal.as_ref().map_or(0.0, |(_, gain)| *gain);
-            if proposal.is_some() && gain <= SETTLED * size {
+            let gain = proposal.as_ref().map_or(0.0, |p| p.gain);
+            if proposal.as_ref().is_some_and(|p| p.is_largest) && gain <= SETTLED * size {
                 ended = Ended::Settled;
                 break;
             }
-            let next = proposal.and_then(|(trial, _)| self.restored(trial, &sizes));
+            let next = proposal.and_then(|p| self.restored(p.trial, &sizes));
             let gained = next
                 .as_ref()
                 .map_or(f64::NAN, |n| side * (target.of(&n.parameters) - value));
@@ -167,7 +177,7 @@ impl Search<'_> {
         units
     }
 
-    /// The step that gains most in the linearised problem, and its gain.
+    /// The step that gains most in the linearised problem.
     fn push(
         &self,
         here: &Within,
@@ -176,7 +186,7 @@ impl Search<'_> {
         radius: f64,
         reach: f64,
         sizes: &[f64],
-    ) -> Option<(Vec<f64>, f64)> {
+    ) -> Option<Proposal> {
         let theta = &here.parameters;
         let slopes = target.slopes(theta);
         let mut sub = self.linearised(theta, &here.evaluation);
@@ -194,10 +204,13 @@ impl Search<'_> {
         sub.bound(row.iter().copied(), f64::NEG_INFINITY, left.max(0.0));
         sub.absolute.push(row.iter().copied(), 1.0);
         sub.absolute_weights.push(1.0);
-        let delta = self.solved(&sub, &here.evaluation, sizes)?;
+        let (delta, is_largest) = self.solved(&sub, &here.evaluation, sizes)?;
         let gain: f64 = row.iter().map(|(j, a)| a * delta[*j]).sum();
-        let trial = self.moved(theta, &delta);
-        Some((trial, gain * most))
+        Some(Proposal {
+            trial: self.moved(theta, &delta),
+            gain: gain * most,
+            is_largest,
+        })
     }
 
     fn moved(&self, theta: &[f64], delta: &[f64]) -> Vec<f64> {
@@ -206,12 +219,22 @@ impl Search<'_> {
         moved
     }
 
-    fn solved(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Option<Vec<f64>> {
+    /// The changes of the parameters that solve a linearised problem, and whether they are its minimum. Every trial is
+    /// simulated, so a point within the constraints is tried although it may not be the best.
+    fn solved(
+        &self,
+        sub: &Subproblem,
+        evaluation: &Evaluation,
+        sizes: &[f64],
+    ) -> Option<(Vec<f64>, bool)> {
         let units = self.units(sub, evaluation, sizes);
-        let solution = sub.in_units(&units).solve();
-        matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost).then(|| {
+        let solution = sub.in_units(&units).solve_for_step();
+        let is_within = (solution.kkt).is_some_and(|kkt| kkt.feasibility <= Kkt::REDUCED);
+        let is_point = is_within && solution.status != ConicStatus::Infeasible;
+        is_point.then(|| {
             let pairs = solution.z.iter().zip(&units).take(sizes.len());
-            pairs.map(|(z, unit)| z * unit).collect()
+            let delta = pairs.map(|(z, unit)| z * unit).collect();
+            (delta, solution.status == ConicStatus::Solved)
         })
     }
 
@@ -236,7 +259,7 @@ impl Search<'_> {
             }
             // The proximal term alone is zero at no step, which scales nothing: a constant does.
             sub.constant = 1.0;
-            let delta = self.solved(&sub, &evaluation, sizes)?;
+            let (delta, _) = self.solved(&sub, &evaluation, sizes)?;
             theta = self.moved(&theta, &delta);
         }
         self.point(&theta)
