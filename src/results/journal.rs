@@ -10,7 +10,7 @@ use super::heading::Heading;
 use super::system::{self, Writer};
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
-use crate::input::read_bytes;
+use crate::input::{open, read_bytes};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
@@ -139,17 +139,19 @@ fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
 /// The command whose work a journal or checkpoint holds; `None` for a file without the heading of a journal and its
 /// checksum, which kmcfit did not write.
 pub(super) fn command_of(path: &Path) -> Option<String> {
-    if !path.symlink_metadata().is_ok_and(|m| m.is_file()) {
-        return None;
-    }
-    let mut line = Vec::new();
-    let file = BufReader::new(File::open(path).ok()?);
-    file.take(LONGEST_HEADING)
-        .read_until(b'\n', &mut line)
-        .ok()?;
+    let (file, _) = open(path, "a journal").ok()?;
+    let line = first_line(file).ok()?;
     let (json, _) = checked(&line, Mark::default())?;
     let heading: Heading = serde_json::from_slice(json).ok()?;
-    Some(heading.command)
+    (!path.is_symlink()).then_some(heading.command)
+}
+
+/// The first line of a file, as far as a heading may be long.
+fn first_line(file: File) -> io::Result<Vec<u8>> {
+    let mut line = Vec::new();
+    let file = BufReader::new(file);
+    file.take(LONGEST_HEADING).read_until(b'\n', &mut line)?;
+    Ok(line)
 }
 
 /// A journal at work. Lines are appended and never changed.
@@ -227,12 +229,11 @@ impl JournalText {
         if path.is_symlink() {
             return Err(InputError::file(path, "this is a link").expected(what));
         }
-        let bytes = read_bytes(path, what, LONGEST)?;
-        let length = bytes
-            .iter()
-            .position(|b| *b == b'\n')
-            .map_or(bytes.len(), |i| i + 1);
-        let line = &bytes[..length];
+        // Of a file that is no journal nothing more is read.
+        let (file, _) = open(path, what)?;
+        let line = first_line(file)
+            .map_err(|error| InputError::file(path, "the file cannot be read").found(error))?;
+        let line = line.as_slice();
         // The version of the format comes first: another one may have another kind of line.
         let json = line.split(|b| matches!(b, b'\t' | b'\n')).next();
         let value: serde_json::Value = serde_json::from_slice(json.unwrap_or_default())
@@ -243,7 +244,7 @@ impl JournalText {
         let heading =
             serde_json::from_value(value).map_err(|error| no_journal(path, what).found(error))?;
         Ok(Self {
-            bytes,
+            bytes: read_bytes(path, what, LONGEST)?,
             heading,
             begin,
         })

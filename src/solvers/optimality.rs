@@ -8,9 +8,16 @@ use super::gauss_newton::{linearise_at, response_rounding};
 
 use super::{Fit, FitSettings, Outcome, Point, Row, Solver, Status};
 use crate::constraints::TOLERANCE;
+use crate::memory;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Solution, Subproblem};
 use std::time::Instant;
+
+/// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
+/// measurements.
+const EXACT: f64 = 1e-20;
+/// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
+const BYTES_PER_NODE: u64 = 4000;
 
 /// The first-order condition at a point, all numbers without unit.
 ///
@@ -75,9 +82,35 @@ impl Optimality {
         format!("the linearised cost can be lowered by a fraction of {stationarity:.1e}")
     }
 
-    /// At `point`; `None` if the linearised problem could not be solved.
+    /// The cost of which shares are taken: J, or 1e-12 of the misfit of zero response where J is less. A fit whose residuals
+    /// are below 1e-10 of the measurements then has a share below [`Optimality::LEAST`], for no step lowers J by
+    /// more than J.
+    pub fn reference(problem: &Problem, cost: f64) -> f64 {
+        cost.max(EXACT * problem.misfit_of_silence() / Self::LEAST)
+    }
+
+    /// Whether J is so small that no step can lower it by a share that counts.
+    pub fn is_exact(problem: &Problem, cost: f64) -> bool {
+        cost <= EXACT * problem.misfit_of_silence()
+    }
+
+    /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
     pub fn at(problem: &Problem, point: &Point, tolerance: f64) -> Option<Self> {
         let cost = point.evaluation.cost;
+        let worst = problem.constraints.largest_violation(&point.parameters);
+        let feasibility = worst.map_or(0.0, |v| v.relative);
+        let reference = Self::reference(problem, cost);
+        if Self::is_exact(problem, cost) {
+            return Some(Self {
+                stationarity: cost / reference,
+                step: 0.0,
+                feasibility,
+                complementarity: 0.0,
+                tolerance,
+            });
+        }
+        let nodes: usize = problem.experiments.iter().map(|e| e.nodes).sum();
+        memory::check(BYTES_PER_NODE.saturating_mul(nodes as u64)).ok()?;
         let (mut sub, _) = linearise_at(problem, point, &mut super::Timings::default());
         let scales = point.relative_metric(problem);
         for (d, s) in sub.proximal.iter_mut().zip(&scales) {
@@ -92,12 +125,11 @@ impl Optimality {
             .collect();
         let promised = cost - sub.value(&found.z) + found.accuracy * cost;
         let promised = (promised - response_rounding(problem, cost)).max(0.0);
-        let share = |x: f64| if x == 0.0 { 0.0 } else { x / cost };
-        let worst = problem.constraints.largest_violation(&point.parameters);
+        let share = |x: f64| if x == 0.0 { 0.0 } else { x / reference };
         Some(Self {
             stationarity: share(promised),
             step: point.relative_change(problem, &parameters),
-            feasibility: worst.map_or(0.0, |v| v.relative),
+            feasibility,
             complementarity: share(found.complementarity),
             tolerance,
         })
@@ -154,23 +186,19 @@ fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
 pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) -> Fit {
     let status = fit.outcome.status;
     let cost = fit.best.evaluation.cost;
-    let is_end = !matches!(
-        status,
-        Status::Interrupted | Status::Infeasible | Status::Failed
-    );
+    let is_asked = |row: &Row| settings.stopping.ratios_met(row).is_some();
     // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
     let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
     let is_measurable = cost > 0.0 && cost.is_finite();
-    if !is_end || !is_search || !is_measurable {
+    // A fit that has done what it was asked for claims no minimum, and linearising takes time and memory.
+    let is_claimed = status == Status::Converged && !fit.history.last().is_some_and(is_asked);
+    if !is_search || !is_measurable || !is_claimed {
         return fit;
     }
     let clock = Instant::now();
     let tolerance = settings.stopping.tolerance.unwrap_or(0.0);
     fit.optimality = Optimality::at(problem, &fit.best, tolerance.max(Optimality::LEAST));
-    let is_asked = |row: &Row| settings.stopping.ratios_met(row).is_some();
-    if status == Status::Converged && !fit.history.last().is_some_and(is_asked) {
-        fit.outcome = judged(fit.outcome, fit.optimality.as_ref());
-    }
+    fit.outcome = judged(fit.outcome, fit.optimality.as_ref());
     let took = clock.elapsed();
     fit.timings.linear_algebra += took;
     fit.elapsed += took;

@@ -452,9 +452,22 @@ fn a_resumption_that_is_refused() {
         &journal.replacen("\"version\":\"", "\"version\":\"9.", 1),
     );
     let other_version = refused(&bench);
+    bench.write("run/fit.journal", &journal);
+    let text = bench.read("run/fit.journal");
+    let heading = text.lines().next().and_then(|line| line.rsplit_once('\t'));
+    let mut heading: kmcfit::results::Heading =
+        serde_json::from_str(heading.expect("a checksum").0).expect("a heading");
+    heading.version = "0.0.9".into();
+    let older = kmcfit::results::with_checksums(&heading, b"").expect("text");
+    std::fs::write(bench.path("run/fit.journal"), older).expect("room");
+    let older_version = refused(&bench);
+    assert!(
+        older_version.contains("this fit was begun by another version of kmcfit"),
+        "{older_version}"
+    );
     bench.write(
         "run/fit.journal",
-        &journal.replacen("\"format\":1", "\"format\":7", 1),
+        &journal.replacen("\"format\":2", "\"format\":7", 1),
     );
     let other_format = refused(&bench);
     bench.write("run/fit.journal", "no journal\n");
@@ -470,26 +483,26 @@ fn a_resumption_that_is_refused() {
         nothing,
     ];
     insta::assert_snapshot!(all.join("\n"), @"
-    error: models/paper.yaml: this file is not as it was when the fit was begun
+    error: models/paper.yaml: this file has changed since the fit was begun
       expected: the same model and data, or a new fit
 
-    error: models/../data/paper.csv: this file is not as it was when the fit was begun
+    error: models/../data/paper.csv: this file has changed since the fit was begun
       expected: the same model and data, or a new fit
 
-    error: run/fit.journal: this fit was begun by another version of kmcfit
-      found: version 9.0.1.0
-      expected: version 0.1.0, or a new fit
+    error: run/fit.journal: this is no journal of kmcfit, or it was edited
+      found: a first line with a wrong checksum
+      expected: the journal of a fit that was begun by `kmcfit fit`
 
     error: run/fit.journal: the journal has another format version
       found: 7
-      expected: 1
+      expected: 2
 
-    error: run/fit.journal: this is no journal of a fit
+    error: run/fit.journal: this is no journal of kmcfit, or it was edited
       found: expected ident at line 1 column 2
       expected: the journal of a fit that was begun by `kmcfit fit`
 
     error: run: there is nothing to go on with in this folder
-      expected: the folder of a fit or study that did not come to its end
+      expected: the folder of a fit, study or comparison that did not come to its end
     ");
 }
 

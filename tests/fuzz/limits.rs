@@ -45,7 +45,7 @@ fn files_of_ten_gigabytes() {
     hole("long.yaml");
     let said = refused(folder.path(), &["fit", "m.yaml"]);
     assert!(
-        said.contains("experiments[0].data") && said.contains("longer than 1073741824 bytes"),
+        said.contains("experiments[0].data") && said.contains("longer than 4294967296 bytes"),
         "{said}"
     );
     let said = refused(folder.path(), &["fit", "long.yaml"]);
@@ -56,7 +56,8 @@ fn files_of_ten_gigabytes() {
     let commands: [&[&str]; 2] = [&["predict", "run", "--initial", "1,0"], &["resume", "run"]];
     for arguments in commands {
         let said = refused(folder.path(), arguments);
-        assert!(said.contains("longer than"), "{said}");
+        let is_named = said.contains("longer than") || said.contains("this is no journal");
+        assert!(is_named, "{said}");
     }
 }
 

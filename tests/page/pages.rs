@@ -25,7 +25,7 @@ functions:
 truth: {data: truth.csv}
 predict:
   - {displacement: 2.0, velocity: 0.0}
-fit: {stop: {iterations: 30, tolerance: 1e-10}}
+fit: {initial: functions, stop: {iterations: 30, tolerance: 1e-10}}
 study: {starts: 2}
 ";
 

@@ -16,6 +16,7 @@ pub(super) use proposal::response_rounding;
 use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
 
 use super::infeasible::no_step;
+use super::optimality::Optimality;
 use super::point::Work;
 use super::timings::timed;
 use super::{Bits, Descend, Memory, Point, Step, Timings};
@@ -87,6 +88,11 @@ impl Descend for GaussNewton {
             }
             let proposal = match propose(work, &sub, point) {
                 Answer::Step(proposal) => proposal,
+                Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
+                    return Step::Minimum(
+                        "the residuals are below 1e-10 of the measurements".into(),
+                    );
+                }
                 Answer::Unsolved(status) => {
                     trouble = Some(status);
                     self.damping *= 10.0;
