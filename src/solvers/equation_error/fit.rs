@@ -16,6 +16,9 @@ use std::time::Instant;
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.
 const FAR: f64 = 1e4;
 const AGAIN: usize = 3;
+/// Relative rounding of a term of the equation of motion: of derivatives of smoothed readings, and of parameters that are known to
+/// the accuracy of a factorisation.
+const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
 /// Minimises over the readings of all experiments
 ///
@@ -57,7 +60,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
             };
             let mut outcome = Outcome::new(status, reason);
             if problem.parameters() > 0 {
-                optimality = cost.optimality(&point, &mut timings);
+                optimality = cost.optimality(&point, &minimum, &mut timings);
                 if status == Status::Converged {
                     outcome = judged(outcome, optimality.as_ref());
                 }
@@ -199,17 +202,25 @@ impl<'a> Cost<'a> {
         Ok((minimum, programs))
     }
 
-    /// The first-order condition at `point`: the problem is convex, so solving it again from there tells by how much its cost
-    /// is above the minimum. `None` if it cannot be solved again.
-    fn optimality(&self, point: &Point, timings: &mut Timings) -> Option<Optimality> {
+    /// The first-order condition at `point`, the `minimum`: the problem is convex, so solving it again from there tells by how
+    /// much its cost is above the minimum; of J and of the pull towards where the step began, which decides what
+    /// the equation leaves open. `None` if it cannot be solved again.
+    fn optimality(
+        &self,
+        point: &Point,
+        minimum: &Minimum,
+        timings: &mut Timings,
+    ) -> Option<Optimality> {
         let problem = self.problem;
         // Not counted, so not timed as a program either: it is no part of the fit.
         let mut own = Timings::default();
         let again = self.minimise_from(&point.parameters, &mut own);
         timings.linear_algebra += own.sum();
         let again = again.ok()?;
-        let (here, next) = (point.evaluation.cost, self.point(again.parameters.clone()));
-        let gap = (here - next.evaluation.cost).abs();
+        let here = point.evaluation.cost;
+        let cost = |theta: &[f64]| self.point(theta.to_vec()).evaluation.cost + minimum.pull(theta);
+        let gap = cost(&point.parameters) - cost(&again.parameters);
+        let gap = (gap - self.rounding(point)).max(0.0);
         let worst = problem.constraints.largest_violation(&point.parameters);
         Some(Optimality {
             stationarity: if gap == 0.0 { 0.0 } else { gap / here },
@@ -218,6 +229,15 @@ impl<'a> Cost<'a> {
             complementarity: again.kkt.map_or(0.0, |kkt| kkt.complementarity),
             tolerance: Optimality::LEAST,
         })
+    }
+
+    /// The rounding of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With twice the
+    /// parameters its error is the sum of those that they stand in.
+    fn rounding(&self, point: &Point) -> f64 {
+        let twice: Vec<f64> = point.parameters.iter().map(|p| 2.0 * p).collect();
+        let terms = self.point(twice).evaluation.misfit;
+        let rounding = TERM_ROUNDING * terms.sqrt();
+        2.0 * rounding * point.evaluation.cost.sqrt() + rounding * rounding
     }
 
     fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {

@@ -101,6 +101,19 @@ struct Minimum {
     program: Option<ConicStatus>,
     /// The residuals of its optimality conditions.
     kkt: Option<Kkt>,
+    /// Where the step began, and the weights of the pull towards there.
+    from: Vec<f64>,
+    pull: Vec<f64>,
+}
+
+impl Minimum {
+    /// What the pull adds to the cost at `theta`.
+    fn pull(&self, theta: &[f64]) -> f64 {
+        let steps = theta.iter().zip(&self.from).zip(&self.pull);
+        steps
+            .map(|((t, from), d)| d * (t - from) * (t - from))
+            .sum()
+    }
 }
 
 /// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
@@ -127,6 +140,7 @@ fn minimise(
     for (proximal, m) in sub.proximal.iter_mut().zip(&metric) {
         *proximal = m * weight;
     }
+    let pull: Vec<f64> = metric.iter().map(|m| m * weight).collect();
     let moved = |z: &[f64]| -> Vec<f64> {
         let mut theta: Vec<f64> = start.iter().zip(z).map(|(s, d)| s + d).collect();
         problem.constraints.clip(&mut theta);
@@ -147,6 +161,8 @@ fn minimise(
                 parameters,
                 program: None,
                 kkt: None,
+                from: start.to_vec(),
+                pull,
             });
         }
     }
@@ -164,6 +180,8 @@ fn minimise(
             parameters: moved(&solution.z),
             program: Some(solution.status),
             kkt: solution.kkt,
+            from: start.to_vec(),
+            pull,
         }),
         status => Err(status),
     }
