@@ -223,7 +223,7 @@ impl<'a> Cost<'a> {
         let gap = (gap - self.rounding(point)).max(0.0);
         let worst = problem.constraints.largest_violation(&point.parameters);
         Some(Optimality {
-            stationarity: if gap == 0.0 { 0.0 } else { gap / here },
+            stationarity: gap / Optimality::reference(problem, here),
             step: point.relative_change(problem, &again.parameters),
             feasibility: worst.map_or(0.0, |v| v.relative),
             complementarity: again.kkt.map_or(0.0, |kkt| kkt.complementarity),
