@@ -259,26 +259,18 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
         for (name, entry) in before.iter().filter(|(name, _)| !is_result(name)) {
             assert!(after.get(name) == Some(entry), "{what}: {name} changed");
         }
-        let one_of = |name: &&str| {
-            let new = new_files.get(*name).cloned();
-            let (found, old) = (after.get(*name), before.get(*name));
+        let one_of = |name: &str| {
+            let new = new_files.get(name).cloned();
+            let (found, old) = (after.get(name), before.get(name));
             assert!(found == old || found == new.as_ref(), "{what}: {name}");
             found == old
         };
-        if mode != Mode::Kill {
-            // Files that belong together are all old or all new.
-            let states: Vec<bool> = case.files.iter().map(|name| one_of(&name)).collect();
-            let is_mixed = states.windows(2).any(|pair| pair[0] != pair[1]);
-            let is_same = new_files == after;
-            assert!(
-                !is_mixed || is_same || code == Some(2),
-                "{what}: {states:?}"
-            );
-        } else {
-            case.files.iter().for_each(|name| {
-                one_of(&name);
-            });
-        }
+        // Files that belong together are all old or all new; a kill may come between them.
+        let states: Vec<bool> = case.files.iter().map(|name| one_of(name)).collect();
+        let is_mixed = states.windows(2).any(|pair| pair[0] != pair[1]);
+        let is_same = new_files == after;
+        let may_be_mixed = mode == Mode::Kill || is_same || code == Some(2);
+        assert!(!is_mixed || may_be_mixed, "{what}: {states:?}");
         // Without a fault the same command works.
         let is_done = match case.arguments[0] {
             "init" => bench.path("new/other.yaml").exists(),
