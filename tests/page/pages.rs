@@ -20,12 +20,12 @@ experiments:
 grid: {nodes: 201}
 functions:
   mass: {basis: polynomial, degree: 1, start: [1.5, 0.0]}
-  damping: {basis: constant, start: 0.3, min: 0.11}
+  damping: {basis: constant, start: 0.3, min: 0.107}
   stiffness: {fixed: 1.0}
 truth: {data: truth.csv}
 predict:
   - {displacement: 2.0, velocity: 0.0}
-fit: {initial: functions, stop: {iterations: 30, tolerance: 1e-10}}
+fit: {stop: {iterations: 30, tolerance: 1e-10}}
 study: {starts: 2}
 ";
 
