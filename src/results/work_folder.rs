@@ -26,6 +26,15 @@ pub(super) fn fresh_name() -> String {
     format!("{PREFIX}{}-{count}", std::process::id())
 }
 
+/// Whether a name has the form of [`fresh_name`].
+fn is_fresh_name(name: &str) -> bool {
+    let numbers = name
+        .strip_prefix(PREFIX)
+        .and_then(|rest| rest.split_once('-'));
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    numbers.is_some_and(|(process, count)| is_number(process) && is_number(count))
+}
+
 /// A folder that is removed with its contents when this is dropped.
 #[derive(Debug)]
 pub(super) struct WorkFolder {
@@ -108,7 +117,7 @@ pub(super) fn remove_leftovers(parent: &Path) {
         let name = entry.file_name();
         let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
         let name = name.to_string_lossy();
-        if !is_folder || !name.starts_with(PREFIX) || name == EXCHANGE {
+        if !is_folder || !is_fresh_name(&name) {
             continue;
         }
         let path = entry.path();
@@ -164,7 +173,8 @@ mod tests {
         let folder = WorkFolder::create_in(place.path()).expect("a folder");
         fs::write(folder.path().join("half.csv"), "1,2").expect("a file");
         std::mem::forget(folder);
-        fs::create_dir(place.path().join(".kmcfit-1-empty")).expect("a folder");
+        fs::create_dir(place.path().join(".kmcfit-1-2")).expect("a folder");
+        fs::create_dir(place.path().join(".kmcfit-empty")).expect("a folder");
         let foreign = place.path().join(".kmcfit-notes");
         fs::create_dir(&foreign).expect("a folder");
         fs::write(foreign.join("notes.txt"), "mine").expect("a file");
@@ -175,7 +185,7 @@ mod tests {
             .map(|entry| entry.expect("an entry").file_name())
             .collect();
         names.sort();
-        assert_eq!(names, [".kmcfit-file", ".kmcfit-notes"]);
+        assert_eq!(names, [".kmcfit-empty", ".kmcfit-file", ".kmcfit-notes"]);
         assert!(foreign.join("notes.txt").exists());
     }
 

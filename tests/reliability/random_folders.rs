@@ -137,11 +137,10 @@ fn edit(bench: &Workbench, random: &mut ChaCha8Rng) {
 /// The entries that belong to runs, by the manifests in the folder and in those below it.
 fn own(bench: &Workbench, before: &Tree) -> Vec<String> {
     let mut own = Vec::new();
-    for run in ["", "model/"] {
-        let folder = bench.path(OUT).join(run);
-        if folder.is_symlink() {
-            continue;
-        }
+    let below = before.iter().filter(|(_, entry)| **entry == Entry::Folder);
+    let runs = below.map(|(name, _)| format!("{name}/"));
+    for run in std::iter::once(String::new()).chain(runs) {
+        let folder = bench.path(OUT).join(&run);
         let Ok(Some(manifest)) = kmcfit::results::Manifest::read(&folder) else {
             continue;
         };
