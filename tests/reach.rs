@@ -152,7 +152,8 @@ fn the_share_of_starts_that_reach_the_answer_does_not_fall() {
         (Solver::GaussNewton, false, [20; 6]),
         (Solver::GaussNewton, true, [20; 6]),
         (Solver::ProjectedGradient, false, [11, 20, 20, 20, 20, 16]),
-        // The slowest start is at its limit of iterations with one value per node.
+        // With one value per node the slowest start is 1.2e-3 from the answer after 400 iterations and within
+        // 1e-3 of it after 600: the least leaves room for one more of its kind.
         (Solver::ProjectedGradient, true, [18, 20, 20, 20, 20, 20]),
         (lbfgs, false, [20; 6]),
         (Solver::SteepestDescent, false, [2, 20, 20, 20, 20, 16]),
