@@ -14,8 +14,8 @@ mod common;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-use kmcfit::objective::GradientKind;
-use kmcfit::study::multistart::multistart;
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::study::multistart::multistart;
 use std::hint::black_box;
 use std::time::Instant;
 

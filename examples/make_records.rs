@@ -3,11 +3,11 @@
 //!
 //! `cargo run --example make_records -- data`
 
-use kmcfit::dynamics::{
+use kmcfit::results::write_whole;
+use kmcfit_core::internals::dynamics::{
     ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
     Surroundings, Term, Trajectory,
 };
-use kmcfit::results::write_whole;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,10 +1,10 @@
 // The paper's record: what turns an optimum that matches the data into the device that made them.
 
-use kmcfit::builder::{Builder, Part, Record};
-use kmcfit::constraints::{Shape, Statement};
-use kmcfit::dynamics::Method;
-use kmcfit::functions::Quantity;
 use kmcfit::observations::Table;
+use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::constraints::{Shape, Statement};
+use kmcfit_core::internals::dynamics::Method;
+use kmcfit_core::internals::functions::Quantity;
 use std::error::Error;
 
 /// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.

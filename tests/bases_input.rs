@@ -3,7 +3,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit::functions::{Basis, Functions};
+use kmcfit_core::internals::functions::{Basis, Functions};
 use std::path::PathBuf;
 
 const COLUMN: &str = "t_s,m_kg\n0,1\n2.5,0.8\n10,0.2\n";

@@ -2,7 +2,7 @@
 //! linearised equation of motion finds, in double and in extended precision.
 
 use kmcfit::config::{Model, ModelFile, Override, Purpose, build};
-use kmcfit::solvers::{Fit, Status, WeightPath, choose_weight};
+use kmcfit_core::internals::solvers::{Fit, Status, WeightPath, choose_weight};
 
 /// `models/noisy.yaml` with `values` set, fitted along its path of weights.
 fn noisy(values: &[&str]) -> (WeightPath, Fit) {

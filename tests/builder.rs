@@ -1,12 +1,12 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
-use kmcfit::builder::{Builder, Part, Record};
 use kmcfit::config::{ModelFile, Purpose, build};
-use kmcfit::constraints::{Shape, Statement};
-use kmcfit::dynamics::Method;
-use kmcfit::functions::{Basis, Quantity};
 use kmcfit::observations::Table;
-use kmcfit::problem::Problem;
+use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::constraints::{Shape, Statement};
+use kmcfit_core::internals::dynamics::Method;
+use kmcfit_core::internals::functions::{Basis, Quantity};
+use kmcfit_core::internals::problem::Problem;
 use std::path::Path;
 
 /// The columns of a file in `data/`.
@@ -18,7 +18,7 @@ fn columns<const N: usize>(file: &str, names: [&str; N]) -> [Vec<f64>; N] {
     names.map(|name| table.column(name).unwrap().to_vec())
 }
 
-fn from_file(yaml: &str) -> (Problem, kmcfit::solvers::FitSettings) {
+fn from_file(yaml: &str) -> (Problem, kmcfit_core::internals::solvers::FitSettings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/built-by-the-test.yaml");
     let model = build(&ModelFile::parse(&path, yaml).unwrap(), Purpose::Fit).unwrap();
     (model.problem, model.settings)
@@ -32,7 +32,7 @@ fn paper_record() -> Record {
 }
 
 /// Both problems take the same way, to the last bit.
-fn same_way(built: &Problem, written: &(Problem, kmcfit::solvers::FitSettings)) {
+fn same_way(built: &Problem, written: &(Problem, kmcfit_core::internals::solvers::FitSettings)) {
     let (written, settings) = written;
     assert_eq!(built.start(), written.start());
     let [a, b] = [built, written].map(|p| p.fit_with(settings).unwrap());

@@ -4,16 +4,18 @@ mod common;
 
 use insta::assert_snapshot;
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit::constraints::RowGroup;
-use kmcfit::dynamics::{
+use kmcfit::report::{CostKind, cost_definition};
+use kmcfit_core::internals::constraints::RowGroup;
+use kmcfit_core::internals::dynamics::{
     ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
 };
-use kmcfit::functions::basis::uniform_knots;
-use kmcfit::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
-use kmcfit::objective::{Channel, GradientKind, View, Weighting};
-use kmcfit::problem::{Experiment, Problem};
-use kmcfit::report::{CostKind, cost_definition};
-use kmcfit::solvers::{Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
+use kmcfit_core::internals::objective::{Channel, GradientKind, View, Weighting};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::solvers::{
+    Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

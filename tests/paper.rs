@@ -2,11 +2,11 @@
 
 mod common;
 
-use kmcfit::dynamics::quadrature::trapezoid;
-use kmcfit::dynamics::{Oscillator, State};
-use kmcfit::objective::GradientKind;
 use kmcfit::report::predict;
-use kmcfit::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::dynamics::quadrature::trapezoid;
+use kmcfit_core::internals::dynamics::{Oscillator, State};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
 use std::sync::OnceLock;
 
 /// Iteration, J/J0 after it, G^2/G0^2 before it: computed from the formulas of the paper in plain
@@ -176,7 +176,8 @@ fn the_paper_s_optimum_does_not_predict() {
         (-1.0, 0.0, 0.91209, 10.89),
         (-3.3, 1.0, 39.730, 126.9),
     ];
-    let oscillator: Oscillator = common::oscillator(2000, kmcfit::dynamics::Method::Midpoint);
+    let oscillator: Oscillator =
+        common::oscillator(2000, kmcfit_core::internals::dynamics::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()
         .map(|&(displacement, velocity, ..)| State {

@@ -15,9 +15,9 @@ mod library {
 use common::pages::{Tour, blocks, blocks_in, fresh_clone, output, page};
 use common::repository;
 use kmcfit::config::{ModelFile, Purpose, build};
-use kmcfit::dynamics::Method;
-use kmcfit::objective::GradientKind;
-use kmcfit::solvers::{FitSettings, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::dynamics::Method;
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
 use serde_json::Value;
 use std::fs;
 use std::sync::OnceLock;
@@ -212,7 +212,7 @@ fn the_run_hangs_on_its_rounding() {
     let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
-        initial: kmcfit::solvers::Initial::Functions,
+        initial: kmcfit_core::internals::solvers::Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping: Stopping::exactly(1000),
         interrupt: None,

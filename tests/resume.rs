@@ -2,7 +2,7 @@
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
 use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
-use kmcfit::solvers::{
+use kmcfit_core::internals::solvers::{
     Fit, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
 };
 use std::path::Path;

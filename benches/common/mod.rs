@@ -2,12 +2,14 @@
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit::dynamics::{ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term};
-use kmcfit::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit::objective::{Channel, GradientKind, Weighting};
-use kmcfit::problem::{Experiment, Problem};
-use kmcfit::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
-use kmcfit::study::multistart::{Multistart, Ranges};
+use kmcfit_core::internals::dynamics::{
+    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term,
+};
+use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
 use std::fmt::Write;
 use std::path::Path;
 

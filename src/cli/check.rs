@@ -2,11 +2,11 @@
 
 use super::{Failure, NOT_CONVERGED, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{Model, Purpose, build};
-use crate::dynamics::Breakdown;
-use crate::objective::GradientKind;
 use crate::report::figures::{self, GradientCurve};
 use crate::report::{CsvTable, render};
 use crate::results::{Claim, OutputFolder};
+use kmcfit_core::internals::dynamics::Breakdown;
+use kmcfit_core::internals::objective::GradientKind;
 use std::path::PathBuf;
 
 /// Read and validate a model, then test its gradient against differences.

@@ -10,7 +10,7 @@ use crate::report::{fit_claim, json};
 use crate::results::{
     AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, MANIFEST, OutputFolder, RESULT,
 };
-use crate::solvers::Status;
+use kmcfit_core::internals::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

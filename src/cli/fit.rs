@@ -3,18 +3,18 @@
 use super::progress::Progress;
 use super::{Failure, Overrides, exit_code, inputs, interrupt, print, say, stem, unwritable};
 use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
-use crate::dynamics::{Breakdown, State};
 use crate::error::{InputError, Place};
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
     Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
-use crate::solvers::{
+use console::Term;
+use kmcfit_core::internals::dynamics::{Breakdown, State};
+use kmcfit_core::internals::solvers::{
     Fit, Keeper, Moment, Row, Status, Watch, WeightPath, choose_weight_watched,
     fit_with_noise_watched, without_motion,
 };
-use console::Term;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

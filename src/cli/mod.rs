@@ -4,6 +4,7 @@ mod arguments;
 mod check;
 mod compare;
 mod demo;
+mod environment;
 mod explain;
 mod fit;
 mod init;
@@ -20,8 +21,9 @@ mod study;
 
 use crate::config::ModelFile;
 use crate::error::{InputError, Place};
-use crate::solvers::Status;
 use clap::{CommandFactory, Parser, Subcommand};
+use environment::{check_arithmetic, provide_host};
+use kmcfit_core::internals::solvers::Status;
 use output::{complain, print, say};
 use overrides::Overrides;
 use std::io;
@@ -96,7 +98,8 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    if let Err(error) = crate::lanes::check_limit().and_then(|()| crate::memory::check_base()) {
+    provide_host();
+    if let Err(error) = check_arithmetic().and_then(|()| crate::memory::check_base()) {
         complain(&error);
         return ExitCode::from(BAD_INPUT);
     }

@@ -1,12 +1,12 @@
 //! `kmcfit predict`
 
 use super::{Failure, OK, print, unwritable};
-use crate::dynamics::State;
 use crate::error::{InputError, Place};
 use crate::report::{
     CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
 use crate::results::{Claim, OutputFolder};
+use kmcfit_core::internals::dynamics::State;
 use std::path::PathBuf;
 
 /// Predict the free motion of a found device from other initial states.

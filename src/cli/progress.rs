@@ -1,7 +1,7 @@
 //! A progress line on a terminal, nothing elsewhere.
 
-use crate::solvers::{Moment, Stopping};
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use kmcfit_core::internals::solvers::{Moment, Stopping};
 use std::cell::Cell;
 use std::time::Duration;
 
@@ -95,7 +95,7 @@ fn message(moment: &Moment, number: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solvers::Row;
+    use kmcfit_core::internals::solvers::Row;
 
     #[test]
     fn the_line_says_what_there_is_to_say() {

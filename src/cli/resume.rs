@@ -5,7 +5,7 @@ use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, compare, say, study};
 use crate::error::InputError;
 use crate::report::Run;
 use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
-use crate::solvers::Status;
+use kmcfit_core::internals::solvers::Status;
 use std::path::PathBuf;
 
 /// Go on with a fit, study or comparison that was killed or interrupted, to the same bits.

@@ -8,15 +8,15 @@ use super::{
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
-use crate::identifiability::count;
-use crate::objective::Evaluation;
-use crate::problem::Problem;
 use crate::report::study::{FitPiece, StudyDocument, gather};
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
 };
-use crate::solvers::{Keeper, Status};
+use kmcfit_core::internals::identifiability::count;
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{Keeper, Status};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -228,7 +228,7 @@ fn study(
 
 /// A study is of a simulated motion.
 fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
-    use crate::solvers::Solver;
+    use kmcfit_core::internals::solvers::Solver;
     match model.settings.solver {
         Solver::EquationError => Err(file
             .error_at(

@@ -7,7 +7,7 @@
 //! 3. [`theory`] has the equations: the device, the cost, the adjoints, Gauss–Newton, and what a record can
 //!    show.
 //!
-//! Whoever writes Rust rather than model files goes on with [`builder`](crate::builder); [`Run`](crate::Run)
+//! Whoever writes Rust rather than model files goes on with [`builder`](kmcfit_core::internals::builder); [`Run`](crate::Run)
 //! loads results back.
 //!
 //! The pages are those of `docs/`, their equations turned into MathML, which browsers draw by themselves.

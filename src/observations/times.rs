@@ -2,6 +2,7 @@
 
 use super::Table;
 use crate::error::InputError;
+use kmcfit_core::internals::signal::median;
 
 /// How far a spacing may be from the step, and a time from its place, as a part of the step.
 ///
@@ -130,36 +131,6 @@ fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> Inp
     InputError::new(table.place(row, Some(column)), problem)
         .found(format!("{here} after {before} in line {line}"))
         .expected(format!("a time greater than {before}"))
-}
-
-/// How far readings may be from equal spacing, in spacings.
-const REGULAR: f64 = 1e-6;
-
-/// The spacing of equally spaced times; `None` where they are not, or fewer than two.
-pub(crate) fn even_spacing(times: &[f64]) -> Option<f64> {
-    let (&[first, .., last], intervals) = (times, times.len().checked_sub(1)?) else {
-        return None;
-    };
-    let spacing = (last - first) / intervals as f64;
-    let astray =
-        |(i, t): (usize, &f64)| (t - (first + i as f64 * spacing)).abs() > REGULAR * spacing;
-    (!times.iter().enumerate().any(astray)).then_some(spacing)
-}
-
-/// The median distance of neighbours.
-///
-/// # Panics
-/// If there are fewer than two times.
-pub(crate) fn median_spacing(times: &[f64]) -> f64 {
-    let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    median(&spacings)
-}
-
-/// The median of values that are not empty.
-fn median(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A spacing without the last digits, which are rounding of the difference.

@@ -3,10 +3,10 @@
 use super::document::{ExperimentSummary, ResultDocument};
 use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
 use super::measured::{ChannelSummary, PatternSummary};
-use crate::diagnostics::SIGNIFICANCE;
 use crate::digits::significant;
-use crate::dynamics::Method;
-use crate::solvers::{Solver, Status};
+use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
+use kmcfit_core::internals::dynamics::Method;
+use kmcfit_core::internals::solvers::{Solver, Status};
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;

@@ -1,10 +1,10 @@
 //! What the cost J of a problem is, in words and by its kind.
 
-use crate::constraints::RowGroup;
-use crate::functions::{Penalty, Quantity};
-use crate::objective::Loss;
-use crate::problem::Problem;
-use crate::solvers::Solver;
+use kmcfit_core::internals::constraints::RowGroup;
+use kmcfit_core::internals::functions::{Penalty, Quantity};
+use kmcfit_core::internals::objective::Loss;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::Solver;
 use serde::{Deserialize, Serialize};
 
 /// How the misfit in J is measured.

@@ -5,8 +5,8 @@ use super::measured::{
     ChannelSummary, HoldOutSummary, RefinedSummary, ScalarSummary, StatisticsSummary,
 };
 use super::timings::TimingsSummary;
-use crate::dynamics::Grid;
-use crate::functions::Quantity;
+use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::functions::Quantity;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -134,7 +134,7 @@ impl ModelSummary {
 /// How the run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutcomeSummary {
-    /// One of the words of [`crate::solvers::Status`].
+    /// One of the words of [`kmcfit_core::internals::solvers::Status`].
     pub status: String,
     /// In one sentence.
     pub reason: String,
@@ -172,7 +172,7 @@ pub struct GradientSummary {
 }
 
 /// The first-order condition of a minimum under the constraints, measured at the best point by the linearised problem
-/// ([`crate::solvers::Optimality`]). All numbers have no unit.
+/// ([`kmcfit_core::internals::solvers::Optimality`]). All numbers have no unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OptimalitySummary {
     /// The share of J by which the solution of the linearised problem promises to lower it.
@@ -452,7 +452,9 @@ impl FailureDocument {
             title: title.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             outcome: OutcomeSummary {
-                status: crate::solvers::Status::Failed.name().into(),
+                status: kmcfit_core::internals::solvers::Status::Failed
+                    .name()
+                    .into(),
                 reason: reason.into(),
             },
         }

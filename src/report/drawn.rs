@@ -3,9 +3,9 @@
 use super::FittedModel;
 use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
-use crate::functions::{CoefficientFunction, Ratios};
-use crate::identifiability::{Band, Bands};
-use crate::solvers::Row;
+use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
+use kmcfit_core::internals::identifiability::{Band, Bands};
+use kmcfit_core::internals::solvers::Row;
 
 impl FittedModel<'_> {
     /// The figures of a fit.

@@ -3,9 +3,9 @@
 use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
 use super::predict::PredictedMotion;
-use crate::diagnostics::ResidualDiagnostics;
-use crate::dynamics::Trajectory;
-use crate::solvers::{PathPoint, WeightPath, WeightRule};
+use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
+use kmcfit_core::internals::dynamics::Trajectory;
+use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;

@@ -2,13 +2,13 @@
 
 use super::columns::Columns;
 use super::document::{FORMAT, ResultDocument};
-use crate::dynamics::{Device, Method, Oscillator, Term};
 use crate::error::InputError;
-use crate::functions::Quantity;
 use crate::input::{JSON, read_text_within};
 use crate::memory;
 use crate::results;
-use crate::solvers::Row;
+use kmcfit_core::internals::dynamics::{Device, Method, Oscillator, Term};
+use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::solvers::Row;
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

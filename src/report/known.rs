@@ -4,11 +4,11 @@ use super::meaning::Doubts;
 use super::measured::{self, HalfStep, StatisticsSummary};
 use super::seen::SeenChannel;
 use crate::config::{HoldOut, Model};
-use crate::dynamics::Breakdown;
-use crate::identifiability::{BandSettings, Bands, Judgement, verdicts};
-use crate::objective::Evaluation;
-use crate::problem::Problem;
-use crate::solvers::{Fit, Solver, Status, predict_held_out};
+use kmcfit_core::internals::dynamics::Breakdown;
+use kmcfit_core::internals::identifiability::{BandSettings, Bands, Judgement, verdicts};
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{Fit, Solver, Status, predict_held_out};
 use nalgebra::DMatrix;
 
 /// Up to so many free values the bands are computed with every fit: some milliseconds.

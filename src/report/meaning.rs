@@ -1,11 +1,11 @@
 //! Whether what a fit came to is a device to speak of, and the only one of its kind.
 
 use super::measured::{HalfStep, StatisticsSummary, diagnostics};
-use crate::diagnostics::rms;
-use crate::dynamics::{Excitation, Term};
-use crate::functions::Quantity;
-use crate::objective::{Channel, Evaluation, Loss};
-use crate::problem::Problem;
+use kmcfit_core::internals::diagnostics::rms;
+use kmcfit_core::internals::dynamics::{Excitation, Term};
+use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::objective::{Channel, Evaluation, Loss};
+use kmcfit_core::internals::problem::Problem;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 

@@ -3,16 +3,16 @@
 use super::document::number_or_null;
 use super::known::HeldOut;
 use crate::config::ChannelNote;
-use crate::diagnostics::{
+use kmcfit_core::internals::diagnostics::{
     InformationCriteria, ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift,
     with_estimated_sigma, with_known_sigma,
 };
-use crate::dynamics::Breakdown;
-use crate::functions::{Basis, CoefficientFunction};
-use crate::objective::{Channel, Evaluation, Loss, Refined, Weighting};
-use crate::observations::times::even_spacing;
-use crate::problem::Problem;
-use crate::signal::Spectrum;
+use kmcfit_core::internals::dynamics::Breakdown;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
+use kmcfit_core::internals::objective::{Channel, Evaluation, Loss, Refined, Weighting};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::signal::Spectrum;
+use kmcfit_core::internals::signal::even_spacing;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -40,7 +40,7 @@ pub struct ChannelSummary {
     /// Readings that are not used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
-    /// Single readings far off ([`crate::diagnostics::far_off`]), under a robust loss: rms, fit and whiteness are those of
+    /// Single readings far off ([`kmcfit_core::internals::diagnostics::far_off`]), under a robust loss: rms, fit and whiteness are those of
     /// the others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub left_aside: usize,
@@ -85,7 +85,7 @@ fn is_zero(count: &usize) -> bool {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PatternSummary {
-    /// Single readings far off ([`crate::diagnostics::far_off`]), under least squares.
+    /// Single readings far off ([`kmcfit_core::internals::diagnostics::far_off`]), under least squares.
     FarOff {
         /// How many.
         readings: usize,
@@ -372,7 +372,7 @@ pub fn refined(problem: &Problem, evaluation: &Evaluation) -> HalfStep {
         .zip(evaluation.predictions.iter().flatten());
     for ((channel, predicted), change) in channels.zip(changes.into_iter().flatten()) {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        let rms = crate::diagnostics::rms(&residuals);
+        let rms = kmcfit_core::internals::diagnostics::rms(&residuals);
         let largest = channel
             .observed()
             .iter()

@@ -1,8 +1,8 @@
 //! The motion of a found device from other initial states, against the true device's.
 
 use super::document::Prediction;
-use crate::dynamics::quadrature::trapezoid;
-use crate::dynamics::{Breakdown, Device, Oscillator, State, Trajectory};
+use kmcfit_core::internals::dynamics::quadrature::trapezoid;
+use kmcfit_core::internals::dynamics::{Breakdown, Device, Oscillator, State, Trajectory};
 
 /// A prediction and the motions that it sums up.
 #[derive(Debug, Clone)]

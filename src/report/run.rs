@@ -17,12 +17,14 @@ use super::render;
 use super::seen::SeenChannel;
 use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
-use crate::dynamics::{Excitation, Term};
-use crate::functions::basis::physical_powers;
-use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{Bands, Judgement, Verdict, count, is_rounding, is_unhindered};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
-use crate::solvers::{
+use kmcfit_core::internals::dynamics::{Excitation, Term};
+use kmcfit_core::internals::functions::basis::physical_powers;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
+use kmcfit_core::internals::identifiability::{
+    Bands, Judgement, Verdict, count, is_rounding, is_unhindered,
+};
+use kmcfit_core::internals::solvers::{
     ActiveGroup, Fit, Optimality, PathPoint, Rung, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
 };

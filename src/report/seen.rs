@@ -4,7 +4,7 @@ use super::csv::CsvTable;
 use super::figure::Figure;
 use super::{figures, measured};
 use crate::config::ChannelNote;
-use crate::objective::Channel;
+use kmcfit_core::internals::objective::Channel;
 
 /// A channel, what the model says of its readings, and how reports speak of it.
 #[derive(Debug, Clone, Copy)]

@@ -5,8 +5,8 @@ use super::cost::CostKind;
 use super::document::{Prediction, ResultDocument};
 use super::measured::ChannelSummary;
 use crate::digits::significant;
-use crate::identifiability::Verdict;
-use crate::solvers::CONTINUED;
+use kmcfit_core::internals::identifiability::Verdict;
+use kmcfit_core::internals::solvers::CONTINUED;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.

@@ -3,8 +3,8 @@
 use super::FittedModel;
 use super::csv::CsvTable;
 use super::drawn::ends;
-use crate::functions::{Quantity, Ratios};
-use crate::solvers::Row;
+use kmcfit_core::internals::functions::{Quantity, Ratios};
+use kmcfit_core::internals::solvers::Row;
 
 impl FittedModel<'_> {
     pub(super) fn history(&self) -> CsvTable {

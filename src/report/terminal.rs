@@ -3,7 +3,7 @@
 use super::columns::Columns;
 use super::document::ResultDocument;
 use crate::error::InputError;
-use crate::functions::Quantity;
+use kmcfit_core::internals::functions::Quantity;
 use std::path::Path;
 
 /// Columns for the numbers beside a chart.

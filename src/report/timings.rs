@@ -1,7 +1,7 @@
 //! Where the time of a run went.
 
-use crate::dynamics::arithmetic;
-use crate::solvers::Fit;
+use kmcfit_core::internals::dynamics::arithmetic;
+use kmcfit_core::internals::solvers::Fit;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::time::Duration;

@@ -20,7 +20,7 @@ use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
 use crate::digest::digest;
 use crate::error::InputError;
 use crate::input::read_text;
-use crate::threads;
+use kmcfit_core::internals::threads;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

@@ -5,7 +5,6 @@
 use kmcfit::Run;
 use kmcfit::config::scalar::{Count, Nodes};
 use kmcfit::config::{Model, ModelFile, Override, Purpose, Story, build};
-use kmcfit::dynamics::State;
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
@@ -14,7 +13,8 @@ use kmcfit::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
     STUDY_JOURNAL, with_checksums,
 };
-use kmcfit::solvers::{Fit, Watch, fit_with_noise_watched};
+use kmcfit_core::internals::dynamics::State;
+use kmcfit_core::internals::solvers::{Fit, Watch, fit_with_noise_watched};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;

@@ -2,6 +2,7 @@
 #![allow(clippy::result_large_err, reason = "as in the library")]
 
 mod arbitrary;
+mod constraint_messages;
 mod instruments;
 mod instruments_errors;
 mod keys;

@@ -10,10 +10,10 @@ use super::functions::{Assemblies, slots};
 use super::listed;
 use crate::config::ModelFile;
 use crate::config::spec::ConstraintSpec;
-use crate::constraints::{Constraints, Impossible, Statement};
 use crate::error::InputError;
-use crate::functions::Quantity;
-use crate::problem::Problem;
+use kmcfit_core::internals::constraints::{Constraints, Impossible, Statement};
+use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::problem::Problem;
 
 /// The name of a group of rows, and the key of the model that it comes from.
 pub(super) struct Place {

@@ -5,9 +5,9 @@ use super::experiments::is_held_out;
 use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
-use crate::objective::GradientKind;
-use crate::problem::Problem;
-use crate::solvers::{FitSettings, Initial, Measurements, Solver, Stopping};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{FitSettings, Initial, Measurements, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only

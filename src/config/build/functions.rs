@@ -9,9 +9,9 @@ use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
 use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, OwnFunctionsSpec};
-use crate::dynamics::{Device, Grid, Term};
 use crate::error::InputError;
-use crate::functions::{self, CoefficientFunction, Quantity};
+use kmcfit_core::internals::dynamics::{Device, Grid, Term};
+use kmcfit_core::internals::functions::{self, CoefficientFunction, Quantity};
 
 /// A function as the model gives it, and where.
 pub(super) struct Slot<'a> {

@@ -8,9 +8,9 @@ use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
 use crate::config::spec::StepMethod;
-use crate::dynamics::{Grid, Method};
 use crate::error::{InputError, Place};
 use crate::memory;
+use kmcfit_core::internals::dynamics::{Grid, Method};
 
 /// Most nodes that are chosen for the user: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;

@@ -16,12 +16,12 @@ pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 use super::scalar::ScalarOr;
 use super::spec::InitialSpec;
 use super::{ModelFile, Source};
-use crate::dynamics::{Device, Oscillator, State};
 use crate::error::{InputError, Place};
-use crate::functions::Functions;
 use crate::memory;
-use crate::problem::Problem;
-use crate::solvers::{self, FitSettings, timed};
+use kmcfit_core::internals::dynamics::{Device, Oscillator, State};
+use kmcfit_core::internals::functions::Functions;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{self, FitSettings, timed};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

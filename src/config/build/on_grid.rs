@@ -2,10 +2,10 @@
 
 use super::asked_for;
 use crate::config::ModelFile;
-use crate::dynamics::Grid;
 use crate::error::InputError;
 use crate::observations::{Table, increasing};
 use crate::units::Kind;
+use kmcfit_core::internals::dynamics::Grid;
 
 /// Column of times in files of functions.
 const TIME_COLUMN: &str = "t_s";

@@ -6,9 +6,9 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Sigma, Weight};
 use crate::config::spec::{SmoothSpec, WeightRule};
 use crate::error::InputError;
-use crate::functions::{Basis, Design, Penalty, Variation};
-use crate::problem::Problem;
-use crate::solvers::{self, Measurements};
+use kmcfit_core::internals::functions::{Basis, Design, Penalty, Variation};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{self, Measurements};
 
 /// A weight that is still to be chosen from the data.
 #[derive(Debug, Clone, PartialEq)]

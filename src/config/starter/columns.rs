@@ -1,10 +1,10 @@
 //! Which column of a table is what.
 
 use super::quoted;
-use crate::diagnostics::spread;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use crate::units::{Kind, Unit};
+use kmcfit_core::internals::diagnostics::spread;
 
 /// What a column may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

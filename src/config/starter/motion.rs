@@ -1,11 +1,11 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
 use super::columns::{Column, Columns, Role};
-use crate::diagnostics::{far_off, offset_and_drift, spread, without_line};
 use crate::digits::clock;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
-use crate::signal::{Spectrum, onset};
+use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, without_line};
+use kmcfit_core::internals::signal::{Spectrum, onset};
 
 /// Fewest readings of which a model can be made.
 const FEWEST: usize = 8;

@@ -4,10 +4,10 @@ use super::Comparison;
 use super::measures::Measures;
 use super::run::ComparedRun;
 use super::table::short;
-use crate::dynamics::Device;
-use crate::functions::Ratios;
 use crate::report::figure::{Axis, Figure, Panel};
 use crate::report::mark::{Colour, Dash, Mark, Style};
+use kmcfit_core::internals::dynamics::Device;
+use kmcfit_core::internals::functions::Ratios;
 
 /// The colours of runs; black and grey are left to the truth.
 const COLOURS: [Colour; 6] = [

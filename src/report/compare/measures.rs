@@ -2,11 +2,11 @@
 
 use super::run::ComparedRun;
 use super::verdict;
-use crate::dynamics::Device;
-use crate::functions::Ratios;
 use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
+use kmcfit_core::internals::dynamics::Device;
+use kmcfit_core::internals::functions::Ratios;
 use serde::Serialize;
 
 /// The numbers of one run, and what they mean in one line.

@@ -1,14 +1,14 @@
 //! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
 
 use super::table::{list, number, table};
-use crate::identifiability::Verdict;
 use crate::report::advice;
 use crate::report::cost::CostKind;
 use crate::report::document::{FunctionSummary, ResultDocument};
 use crate::report::measured::ChannelSummary;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use crate::solvers::Status;
+use kmcfit_core::internals::identifiability::Verdict;
+use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
 pub(super) fn opening(document: &ResultDocument) -> String {

@@ -2,10 +2,10 @@
 
 use super::table::{pairs, paragraph, table};
 use crate::config::Source;
-use crate::dynamics::arithmetic;
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use crate::report::text::escape;
+use kmcfit_core::internals::dynamics::arithmetic;
 
 /// The command, what it was run with, the model and its data.
 pub(super) fn repeat(run: &FittedModel, document: &ResultDocument) -> String {

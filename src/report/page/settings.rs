@@ -3,7 +3,7 @@
 use super::table::{number, pairs};
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
-use crate::solvers::Stopping;
+use kmcfit_core::internals::solvers::Stopping;
 
 /// Grid, method, cost and stopping rules.
 pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {

@@ -13,7 +13,7 @@ use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, path_in, push_l
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
-use crate::solvers::{Bits, Keeper, Kept, Row, Standing};
+use kmcfit_core::internals::solvers::{Bits, Keeper, Kept, Row, Standing};
 use read::{Contents, Reader};
 use serde::{Deserialize, Serialize};
 use std::io;

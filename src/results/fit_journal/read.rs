@@ -3,7 +3,7 @@
 use super::{Entry, Line};
 use crate::error::InputError;
 use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark, path_in};
-use crate::solvers::{Kept, Row, Standing};
+use kmcfit_core::internals::solvers::{Kept, Row, Standing};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

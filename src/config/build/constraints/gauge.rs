@@ -8,9 +8,9 @@ use crate::config::ModelFile;
 use crate::config::build::functions::slots;
 use crate::config::scalar::NumberOrColumn;
 use crate::config::spec::FunctionSpec;
-use crate::constraints::{Shape, Statement};
-use crate::functions::{Basis, CoefficientFunction, Quantity};
-use crate::problem::Problem;
+use kmcfit_core::internals::constraints::{Shape, Statement};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
+use kmcfit_core::internals::problem::Problem;
 
 /// A warning where `statement`, which stands at `key`, means nothing.
 pub(super) fn says_nothing(

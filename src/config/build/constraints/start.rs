@@ -2,10 +2,10 @@
 
 use super::Place;
 use crate::config::ModelFile;
-use crate::constraints::TOLERANCE;
 use crate::error::{self, InputError};
-use crate::problem::Problem;
-use crate::solvers::Start;
+use kmcfit_core::internals::constraints::TOLERANCE;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::Start;
 
 /// Moves the functions' start into the constraints, with a warning unless it only was off by
 /// rounding.

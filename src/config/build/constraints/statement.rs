@@ -4,11 +4,11 @@ use crate::config::ModelFile;
 use crate::config::build::functions::values;
 use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
-use crate::constraints::{Limit, Shape, Statement};
 use crate::digits::clock;
-use crate::dynamics::Grid;
 use crate::error::InputError;
-use crate::functions::Quantity;
+use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
+use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::functions::Quantity;
 
 /// How far outside the record a time may be, in steps, to be taken for its end.
 const SAME_TIME: f64 = 1e-6;

@@ -4,11 +4,11 @@ use super::source::{self, Wanted};
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
-use crate::dynamics::Grid;
 use crate::error::InputError;
-use crate::problem::{BaseMotion, Drive, Experiment, Waveform};
-use crate::signal::{Interpolation, Shape, Signal, SweepLaw};
 use crate::units::Kind;
+use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::problem::{BaseMotion, Drive, Experiment, Waveform};
+use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]

@@ -5,10 +5,10 @@ use super::{Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, InitialSpec};
-use crate::dynamics::{ChannelKind, State};
 use crate::error::InputError;
-use crate::functions::{Scalar, Value};
-use crate::objective::state_sizes;
+use kmcfit_core::internals::dynamics::{ChannelKind, State};
+use kmcfit_core::internals::functions::{Scalar, Value};
+use kmcfit_core::internals::objective::state_sizes;
 
 /// The initial state, and which scalars it is where it is sought.
 pub fn build(

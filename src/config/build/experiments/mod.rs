@@ -12,15 +12,15 @@ use super::functions::Assemblies;
 use super::{Purpose, listed};
 use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, FitMethod};
-use crate::dynamics::{ChannelKind, Grid};
 use crate::error::InputError;
-use crate::functions::Scalar;
-use crate::objective::Weighting;
 use crate::observations::resample;
-use crate::problem::Experiment;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
+use kmcfit_core::internals::dynamics::{ChannelKind, Grid};
+use kmcfit_core::internals::functions::Scalar;
+use kmcfit_core::internals::objective::Weighting;
+use kmcfit_core::internals::problem::Experiment;
 
 pub(super) use doubts::unidentifiable;
 pub(super) use excitation::shape;
@@ -305,7 +305,9 @@ fn place(
 /// The nodes that a motion needs to reach `end`.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
-    let steps = (steps - crate::dynamics::Place::SAME_TIME).ceil().max(0.0);
+    let steps = (steps - kmcfit_core::internals::dynamics::Place::SAME_TIME)
+        .ceil()
+        .max(0.0);
     (steps as usize + 1).clamp(Grid::FEWEST_NODES, grid.nodes())
 }
 

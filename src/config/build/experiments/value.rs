@@ -4,7 +4,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::EstimateValue;
 use crate::error::InputError;
-use crate::functions::{Prior, Scalar, Value};
+use kmcfit_core::internals::functions::{Prior, Scalar, Value};
 
 /// A number of the model and what a report calls it.
 pub struct Named<'a> {

@@ -4,11 +4,11 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Count, Knots, Number};
 use crate::config::spec::{Basis as Kind, FunctionSpec};
 use crate::digits::clock;
-use crate::dynamics::Grid;
-use crate::dynamics::quadrature::trapezoid_weights;
 use crate::error::InputError;
-use crate::functions::basis::uniform_knots;
-use crate::functions::{Basis, Design, Gram};
+use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::dynamics::quadrature::trapezoid_weights;
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{Basis, Design, Gram};
 
 /// How near the first and last knot must be to the ends of the record, in steps.
 const SAME_TIME: f64 = 1e-6;

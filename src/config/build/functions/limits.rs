@@ -4,8 +4,8 @@ use super::values;
 use crate::config::ModelFile;
 use crate::config::scalar::{Number, Weight};
 use crate::config::spec::{FunctionSpec, SmoothSpec};
-use crate::dynamics::Grid;
 use crate::error::InputError;
+use kmcfit_core::internals::dynamics::Grid;
 
 /// Highest derivative that can be penalised.
 const HIGHEST_ORDER: usize = 2;

@@ -9,7 +9,7 @@ use crate::config::build::fit::DEFAULT_MEMORY;
 use crate::config::build::functions::{Slot, slots};
 use crate::config::scalar::Knots;
 use crate::config::spec::{Basis, FitMethod};
-use crate::solvers::FEW_PARAMETERS;
+use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
 /// Bytes per node of every run: times, tables and figures.
 const RUN: usize = 200;

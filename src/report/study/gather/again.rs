@@ -2,13 +2,13 @@
 
 use super::linear;
 use crate::config::{Model, StudyPlan};
-use crate::functions::Functions;
-use crate::problem::Problem;
 use crate::report::study::pieces::*;
-use crate::study::Linear;
-use crate::study::bootstrap::{Noise, bootstrap};
-use crate::study::multistart::{self, Multistart, Ranges, between};
-use crate::study::variation::{Asking, variation};
+use kmcfit_core::internals::functions::Functions;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::study::Linear;
+use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
+use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges, between};
+use kmcfit_core::internals::study::variation::{Asking, variation};
 
 /// Steps of the paths between two optima.
 const PATH: usize = 40;
@@ -133,7 +133,7 @@ pub fn varies(
         ..Asking::default()
     };
     let found = variation(problem, theta, &asking).map_err(|breakdown| breakdown.to_string())?;
-    let record = |v: crate::study::variation::Varies| VariesRecord {
+    let record = |v: kmcfit_core::internals::study::variation::Varies| VariesRecord {
         sentence: v.sentence(),
         p_value: v.p_value,
         name: v.function,

@@ -1,12 +1,12 @@
 //! What comes next: other experiments, and other motions.
 
 use crate::config::{Candidate, Model};
-use crate::identifiability::{self, CandidateChannel, rank_experiments};
-use crate::objective::Evaluation;
-use crate::problem::Problem;
 use crate::report::study::pieces::*;
-use crate::study::prediction;
-use crate::study::pull_apart::Extreme;
+use kmcfit_core::internals::identifiability::{self, CandidateChannel, rank_experiments};
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::study::prediction;
+use kmcfit_core::internals::study::pull_apart::Extreme;
 
 /// The candidates, best first.
 pub fn candidates(
@@ -54,7 +54,7 @@ fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
         .zip(evaluation.predictions.iter().flatten());
     let mut spreads = pairs.map(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        crate::diagnostics::rms(&residuals)
+        kmcfit_core::internals::diagnostics::rms(&residuals)
     });
     spreads.next().unwrap_or(1.0).max(f64::MIN_POSITIVE.sqrt())
 }

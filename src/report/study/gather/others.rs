@@ -1,15 +1,17 @@
 //! Other devices that match: tubes, and those with the same motion.
 
 use crate::config::{Equivalent, StudyPlan};
-use crate::diagnostics::chi_square_one;
-use crate::dynamics::{Device, Grid, State};
-use crate::functions::Quantity;
-use crate::objective::Evaluation;
-use crate::problem::Problem;
 use crate::report::study::pieces::*;
 use crate::report::study::text::ENDED;
-use crate::study::equivalent::{Motion, Wish, equivalent};
-use crate::study::pull_apart::{Ended, Extreme, Level, ratios_at, tube, values_at};
+use kmcfit_core::internals::diagnostics::chi_square_one;
+use kmcfit_core::internals::dynamics::{Device, Grid, State};
+use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::study::equivalent::{Motion, Wish, equivalent};
+use kmcfit_core::internals::study::pull_apart::{
+    Ended, Extreme, Level, ratios_at, tube, values_at,
+};
 
 /// Roughness that the devices in a tube may have, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
@@ -203,8 +205,8 @@ fn record(grid: &Grid, name: &str, device: &Device, motion_error: f64) -> Equiva
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::Grid;
+    use kmcfit_core::internals::builder::{Builder, Part, Record};
+    use kmcfit_core::internals::dynamics::Grid;
 
     /// What is listed of a ring-down of six periods by the midpoint rule, on 61 nodes.
     fn listed(asked: impl Fn(usize) -> Option<f64>) -> Vec<EquivalentRecord> {

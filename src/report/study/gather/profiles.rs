@@ -1,11 +1,11 @@
 //! Profiles of single numbers.
 
 use crate::config::{StudyPlan, StudyTarget};
-use crate::diagnostics::chi_square_one;
-use crate::problem::Problem;
 use crate::report::study::pieces::*;
-use crate::study::Linear;
-use crate::study::profile::{ProfileSettings, Verdict as ProfileVerdict, profile};
+use kmcfit_core::internals::diagnostics::chi_square_one;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::study::Linear;
+use kmcfit_core::internals::study::profile::{ProfileSettings, Verdict as ProfileVerdict, profile};
 
 /// The number that a target asks about.
 pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {

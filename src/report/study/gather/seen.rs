@@ -1,17 +1,17 @@
 //! What the readings see: the spectrum of the sensitivity, bands and verdicts.
 
 use crate::config::StudyPlan;
-use crate::diagnostics::normal_half_width;
-use crate::dynamics::Device;
-use crate::functions::Ratios;
-use crate::identifiability::{
-    self, BandSettings, Bands, Gauge, Sensitivity, Spectrum, anchors, verdicts,
-};
-use crate::objective::Evaluation;
-use crate::problem::Problem;
 use crate::report::meaning::Doubts;
 use crate::report::measured;
 use crate::report::study::pieces::*;
+use kmcfit_core::internals::diagnostics::normal_half_width;
+use kmcfit_core::internals::dynamics::Device;
+use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::identifiability::{
+    self, BandSettings, Bands, Gauge, Sensitivity, Spectrum, anchors, verdicts,
+};
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
 
 /// Directions that are drawn of each end of the spectrum.
 const DIRECTIONS: usize = 3;

@@ -11,12 +11,12 @@ use super::{ChannelNote, names};
 use crate::config::ModelFile;
 use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
-use crate::dynamics::{ChannelKind, Grid};
 use crate::error::InputError;
-use crate::objective::{Loss, Weighting};
-use crate::observations::times::{even_spacing, median_spacing};
-use crate::signal::SecondOrder;
 use crate::units::{Kind, Unit};
+use kmcfit_core::internals::dynamics::{ChannelKind, Grid};
+use kmcfit_core::internals::objective::{Loss, Weighting};
+use kmcfit_core::internals::signal::SecondOrder;
+use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use noise::{loss, weighting};
 use sampling::{band, decimate, nearly_equal};
 

@@ -5,12 +5,12 @@ use super::super::value::{Named, value};
 use super::{RawChannel, Spec, spec_of};
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
-use crate::dynamics::{ChannelKind, Grid, Surroundings};
 use crate::error::InputError;
-use crate::functions::{Scalar, Value};
-use crate::objective::{Channel, Sensor, Weighting, integral_over};
-use crate::observations::times::even_spacing;
-use crate::problem::Experiment;
+use kmcfit_core::internals::dynamics::{ChannelKind, Grid, Surroundings};
+use kmcfit_core::internals::functions::{Scalar, Value};
+use kmcfit_core::internals::objective::{Channel, Sensor, Weighting, integral_over};
+use kmcfit_core::internals::problem::Experiment;
+use kmcfit_core::internals::signal::even_spacing;
 
 /// Puts a channel on the grid.
 pub fn place(

@@ -4,8 +4,8 @@ use super::super::source;
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
-use crate::observations::times::{even_spacing, median_spacing};
-use crate::signal::{self, SecondOrder};
+use kmcfit_core::internals::signal::{self, SecondOrder};
+use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 
 /// Order of the filter of a band, run forward and backward.
 const BAND_ORDER: usize = 2;

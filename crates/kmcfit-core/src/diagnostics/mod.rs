@@ -1,0 +1,25 @@
+//! What the residuals say about a fit: how large they are, whether they are noise, and whether more
+//! parameters are worth it.
+//!
+//! Everything here is a pure function of numbers; nothing knows of problems or files.
+
+mod autocorrelation;
+mod information;
+#[cfg(test)]
+mod noise;
+mod pattern;
+mod quantiles;
+mod record;
+mod residuals;
+mod whiteness;
+mod words;
+
+pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
+pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+pub(crate) use pattern::median_size;
+pub use pattern::{far_off, offset_and_drift};
+pub use quantiles::{chi_square_one, normal_half_width};
+pub use record::{ResidualDiagnostics, ResidualRecord};
+pub use residuals::{fit_percent, reduced_chi_square, rms};
+pub use residuals::{spread, without_line};
+pub use whiteness::{FEWEST_READINGS, Reason, SIGNIFICANCE, Verdict, Whiteness, whiteness};

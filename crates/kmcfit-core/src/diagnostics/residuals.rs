@@ -1,0 +1,176 @@
+//! How far a model is from the readings, in one number.
+//!
+//! Readings and model values come in pairs; a pair with a value that is not finite is a missing
+//! reading and is left out, and so are values beyond the end of the shorter slice.
+
+/// The NRMSE fit, in per cent:
+///
+/// ```text
+/// 100 (1 - |observed - model| / |observed - mean of observed|)
+/// ```
+///
+/// with Euclidean norms. 100 is a perfect model, 0 is as good as a flat line at the mean, a negative
+/// number is worse than that. No units. Readings that are all the same give 100 if the model has
+/// them exactly and minus infinity if not; no readings give NaN.
+///
+/// Source: MathWorks, *System Identification Toolbox*, `compare` and `goodnessOfFit` (NRMSE).
+pub fn fit_percent(observed: &[f64], model: &[f64]) -> f64 {
+    let known = || pairs(observed, model);
+    let count = known().count();
+    if count == 0 {
+        return f64::NAN;
+    }
+    let mean = known().map(|(o, _)| o / count as f64).sum::<f64>();
+    let missed = norm(known().map(|(o, m)| o - m));
+    let varied = norm(known().map(|(o, _)| o - mean));
+    if missed == 0.0 {
+        100.0
+    } else {
+        100.0 * (1.0 - missed / varied)
+    }
+}
+
+/// The root mean square, `sqrt(sum of r_i^2 / n)` over the finite values, in their unit; NaN if
+/// there are none.
+pub fn rms(residuals: &[f64]) -> f64 {
+    let finite = || residuals.iter().copied().filter(|r| r.is_finite());
+    norm(finite()) / (finite().count() as f64).sqrt()
+}
+
+/// Chi-square per degree of freedom,
+///
+/// ```text
+/// sum of z_i^2 / (n - p)          z_i = (observed_i - model_i) / sigma_i
+/// ```
+///
+/// for `standardised` residuals `z` and `p` fitted `parameters`: a whole number for a plain fit, the
+/// effective number (the trace of the matrix from readings to model values) for a penalised one.
+/// About 1, give or take `sqrt(2 / (n - p))`, where the model is right and sigma is too; well above,
+/// the model misses something or sigma is too small; well below, sigma is too large.
+///
+/// `None` unless there are more readings than parameters.
+///
+/// Source: P. R. Bevington, D. K. Robinson, *Data Reduction and Error Analysis for the Physical
+/// Sciences*, 3rd ed., section 11.1.
+pub fn reduced_chi_square(standardised: &[f64], parameters: f64) -> Option<f64> {
+    let finite = || standardised.iter().filter(|z| z.is_finite());
+    let freedom = finite().count() as f64 - parameters;
+    (freedom > 0.0).then(|| finite().map(|z| z * z).sum::<f64>() / freedom)
+}
+
+/// The pairs in which both values are finite.
+fn pairs<'a>(
+    observed: &'a [f64],
+    model: &'a [f64],
+) -> impl Iterator<Item = (f64, f64)> + Clone + 'a {
+    let both = observed.iter().copied().zip(model.iter().copied());
+    both.filter(|(o, m)| o.is_finite() && m.is_finite())
+}
+
+/// The Euclidean norm, without overflow or underflow on the way.
+fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = values.clone().fold(0.0f64, |most, v| most.max(v.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    largest * values.map(|v| (v / largest).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Standard deviation, 0 of none.
+pub fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
+}
+
+/// What is left of values without their straight line over the times.
+pub fn without_line(times: &[f64], values: &[f64]) -> Vec<f64> {
+    let n = values.len() as f64;
+    let [middle, level] = [times, values].map(|x| x.iter().sum::<f64>() / n);
+    let (mut along, mut spread) = (0.0, 0.0);
+    for (t, y) in times.iter().zip(values) {
+        along += (t - middle) * (y - level);
+        spread += (t - middle) * (t - middle);
+    }
+    let slope = along / spread;
+    let pairs = times.iter().zip(values);
+    pairs
+        .map(|(t, y)| y - (level + slope * (t - middle)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{a} is not {b}");
+    }
+
+    #[test]
+    fn a_perfect_model_fits_fully_and_the_mean_not_at_all() {
+        let observed = [1.0, 2.0, 6.0];
+        near(fit_percent(&observed, &observed), 100.0);
+        near(fit_percent(&observed, &[3.0; 3]), 0.0);
+    }
+
+    #[test]
+    fn the_fit_by_hand() {
+        // Residuals (1, 0, -1, 0), deviations from the mean 0: (2, -2, 2, -2).
+        let fit = fit_percent(&[2.0, -2.0, 2.0, -2.0], &[1.0, -2.0, 3.0, -2.0]);
+        near(fit, 100.0 * (1.0 - 2.0f64.sqrt() / 4.0));
+    }
+
+    #[test]
+    fn the_fit_depends_neither_on_the_unit_nor_on_the_zero() {
+        let observed = [0.3, -0.2, 0.9, 0.4];
+        let model = [0.2, -0.1, 1.0, 0.1];
+        let other = |x: &[f64]| x.iter().map(|x| 1e200 * x - 3e200).collect::<Vec<f64>>();
+        let fit = fit_percent(&observed, &model);
+        assert!((fit_percent(&other(&observed), &other(&model)) - fit).abs() < 1e-9);
+    }
+
+    #[test]
+    fn missing_readings_do_not_count() {
+        let observed = [2.0, f64::NAN, -2.0, 2.0, -2.0, 5.0];
+        let model = [1.0, 7.0, -2.0, 3.0, -2.0, f64::NAN];
+        near(
+            fit_percent(&observed, &model),
+            100.0 * (1.0 - 2.0f64.sqrt() / 4.0),
+        );
+        near(rms(&[3.0, f64::NAN, -4.0]), 12.5f64.sqrt());
+    }
+
+    #[test]
+    fn edges_of_the_fit() {
+        assert!(fit_percent(&[], &[]).is_nan());
+        near(fit_percent(&[2.0, 2.0], &[2.0, 2.0]), 100.0);
+        assert_eq!(fit_percent(&[2.0, 2.0], &[2.0, 3.0]), f64::NEG_INFINITY);
+        assert!(rms(&[]).is_nan());
+        assert_eq!(rms(&[0.0, 0.0]), 0.0);
+    }
+
+    #[test]
+    fn chi_square_per_degree_of_freedom() {
+        near(reduced_chi_square(&[1.0, -2.0, 2.0], 1.0).unwrap(), 4.5);
+        near(
+            reduced_chi_square(&[1.0, f64::NAN, 2.0], 0.5).unwrap(),
+            5.0 / 1.5,
+        );
+        assert_eq!(reduced_chi_square(&[1.0, 2.0], 2.0), None);
+    }
+
+    #[test]
+    fn a_line_and_what_is_left_of_it() {
+        let times: Vec<f64> = (0..5).map(f64::from).collect();
+        let wiggle = [1.0, -2.0, 2.0, -2.0, 1.0];
+        let values: Vec<f64> = times
+            .iter()
+            .zip(wiggle)
+            .map(|(t, w)| 3.0 + 0.5 * t + w)
+            .collect();
+        assert_eq!(without_line(&times, &values), wiggle);
+        assert_eq!(spread(&wiggle), (14.0f64 / 5.0).sqrt());
+        assert_eq!(spread(&[]), 0.0);
+    }
+}

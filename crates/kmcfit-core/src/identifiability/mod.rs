@@ -1,0 +1,40 @@
+//! What the readings can show of the functions, before a fit and after it, and which experiment would
+//! show more.
+//!
+//! * [`count`]: from the problem alone, how many directions of the parameters can be seen at most, and
+//!   which scale stays free;
+//! * [`Sensitivity`] and [`Spectrum`]: how well each direction is seen at a point;
+//! * [`Gauge`]: the directions that leave the motion unchanged, and whether an unseen direction is one;
+//! * [`Bands`]: how far each function and ratio may be off;
+//! * [`verdicts`]: the same in words; [`anchors`]: the instants at which a ratio is fixed;
+//! * [`rank_experiments`]: which further record adds most.
+
+mod active;
+mod anchors;
+mod bands;
+mod components;
+mod counting;
+mod covariance;
+mod directions;
+mod experiments;
+mod gauge;
+mod linear;
+mod sensitivity;
+mod verdict;
+pub use verdict::is_rounding;
+
+use crate::problem::Problem;
+
+/// Whether the readings alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
+pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
+    !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
+}
+
+pub use anchors::{Anchors, anchors};
+pub use bands::{Band, BandSettings, Bands, Side};
+pub use counting::{Count, Statement, Symmetry, count};
+pub use directions::Directions;
+pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
+pub use gauge::{Gauge, GaugeDirection, MOSTLY, Named};
+pub use sensitivity::{RANK, Seen, Sensitivity, Spectrum};
+pub use verdict::{IDENTIFIED, Judgement, LEAST, MOST, Verdict, verdicts};

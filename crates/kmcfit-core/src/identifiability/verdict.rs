@@ -1,0 +1,193 @@
+//! What the bands say of each function and ratio, in words.
+
+use super::bands::{Band, Bands};
+use super::linear::{span_words, spans};
+use crate::diagnostics::{NORMAL_975, median_size};
+use crate::dynamics::Term;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+
+/// A function is identified where the half-width of its 95 % band is at most this share of its
+/// size at most times ([`Problem::natural_sizes`] with the median of its values in place of the largest): a quarter
+/// tells half of it from the whole.
+pub const IDENTIFIED: f64 = 0.25;
+/// It is identified on the whole if it is so at this share of the nodes: the ends of a record are
+/// always seen less.
+pub const MOST: f64 = 0.95;
+/// Below this share of the nodes it is not seen.
+pub const LEAST: f64 = 0.05;
+
+/// What is known of a function or ratio.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// Known at (nearly) all times.
+    Identified {
+        /// Largest half-width of the 95 % band there, relative to that size.
+        relative: f64,
+    },
+    /// Not known itself, but this ratio with it is.
+    OnlyRatio(String),
+    /// Known on these spans of time, s.
+    OnlyOn(Vec<[f64; 2]>),
+    /// Not known.
+    NotSeen,
+    /// Not sought.
+    Fixed,
+}
+
+impl Verdict {
+    /// Its name in files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Identified { .. } => "identified",
+            Self::OnlyRatio(_) => "only-ratio",
+            Self::OnlyOn(_) => "only-on",
+            Self::NotSeen => "not-seen",
+            Self::Fixed => "fixed",
+        }
+    }
+}
+
+/// A verdict on one function or ratio.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// Name of the function or ratio.
+    pub name: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The same as a sentence.
+    pub sentence: String,
+    /// Smallest and largest value at the nodes where it is known; `None` where there is no such node.
+    pub known_range: Option<[f64; 2]>,
+}
+
+impl Judgement {
+    /// Whether it says what stays open, and not what is known or given.
+    pub fn is_open(&self) -> bool {
+        match self.verdict {
+            Verdict::Identified { .. } | Verdict::Fixed => false,
+            Verdict::OnlyRatio(_) | Verdict::OnlyOn(_) | Verdict::NotSeen => true,
+        }
+    }
+}
+
+/// Beside the size at which a function would matter, less than this is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether a value is zero but for rounding, beside the size at which it would matter.
+pub fn is_rounding(value: f64, size: f64) -> bool {
+    value.abs() <= ROUNDING * size
+}
+
+/// By how much a number of this size is known where it is known at all: as a share of its own largest value
+/// there, or where that is within the band, as a number beside which the value cannot be told from zero. In between it
+/// is small beside the size at which it would matter, and that is what is known of it.
+fn identified(name: &str, band: &Band, size: f64) -> String {
+    let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
+    let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
+    let unit = &band.unit;
+    if is_rounding(half.max(own), size) {
+        return format!("{name} is identified: zero, but for rounding");
+    }
+    if half >= own {
+        return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
+    }
+    let share = half / own;
+    if share > IDENTIFIED {
+        return format!(
+            "{name} is small, and known to within {half:.1e} {unit}: {:.0} % of its largest value (95 %)",
+            100.0 * share
+        );
+    }
+    let share = match () {
+        () if is_rounding(share, 1.0) => return format!("{name} is identified, but for rounding"),
+        () if share < 1e-4 => format!("{share:.0e}"),
+        () => format!("{:.2} %", 100.0 * share),
+    };
+    format!("{name} is identified, to {share} of its largest value (95 %)")
+}
+
+/// Whether a function of this size is known at a node.
+fn is_known(band: &Band, size: f64, i: usize) -> bool {
+    band.values[i].is_finite() && NORMAL_975 * band.standard_error[i] / size <= IDENTIFIED
+}
+
+/// Verdicts on every function of the list, then on `k/m` and `c/m`.
+pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
+    let sizes = problem.middle_sizes(evaluation);
+    let assembly = problem.functions.assembly(0);
+    let mass = median_size(&evaluation.device.mass);
+    let of = |term: Term| {
+        let place = problem.oscillator.terms.iter().position(|t| *t == term)?;
+        Some(assembly[place + 1])
+    };
+    let named = [("k/m", of(Term::Stiffness)), ("c/m", of(Term::Damping))];
+    let ratios: Vec<(&str, usize, f64, Verdict)> = (named.into_iter())
+        .filter_map(|(name, function)| {
+            let (band, f) = (bands.ratio(name)?, function?);
+            let size = median_size(&band.values).max(sizes[f] / mass);
+            Some((name, f, size, judge(&bands.times, band, size)))
+        })
+        .collect();
+    let known = |f: usize| {
+        let with = |(_, function, _, verdict): &&(&str, usize, f64, Verdict)| {
+            (*function == f || f == assembly[0]) && matches!(verdict, Verdict::Identified { .. })
+        };
+        ratios
+            .iter()
+            .find(with)
+            .map(|(name, ..)| (*name).to_owned())
+    };
+    let functions = bands.functions.iter().enumerate().map(|(f, band)| {
+        let verdict = match problem.functions.get(f).parameters() {
+            0 => Verdict::Fixed,
+            _ => match judge(&bands.times, band, sizes[f]) {
+                identified @ Verdict::Identified { .. } => identified,
+                other => known(f).map_or(other, Verdict::OnlyRatio),
+            },
+        };
+        judgement(&band.name, verdict, band, sizes[f])
+    });
+    let functions: Vec<Judgement> = functions.collect();
+    let ratios = (ratios.into_iter())
+        .filter_map(|(name, _, size, v)| Some(judgement(name, v, bands.ratio(name)?, size)));
+    functions.into_iter().chain(ratios).collect()
+}
+
+fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
+    let known = |i: usize| is_known(band, size, i);
+    let count = (0..times.len()).filter(|i| known(*i)).count();
+    let share = count as f64 / times.len() as f64;
+    if share >= MOST {
+        let relative = |i: usize| NORMAL_975 * band.standard_error[i] / size;
+        let known = (0..times.len()).filter(|i| known(*i));
+        return Verdict::Identified {
+            relative: known.map(relative).fold(0.0, f64::max),
+        };
+    }
+    match share < LEAST {
+        true => Verdict::NotSeen,
+        false => Verdict::OnlyOn(spans(times, known)),
+    }
+}
+
+fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement {
+    let sentence = match &verdict {
+        Verdict::Identified { .. } => identified(name, band, size),
+        Verdict::OnlyRatio(ratio) => {
+            format!("{name} is not identified by itself, only the ratio {ratio} is")
+        }
+        Verdict::OnlyOn(spans) => format!("{name} is identified only on {}", span_words(spans)),
+        Verdict::NotSeen => format!("{name} is not seen by the readings"),
+        Verdict::Fixed => format!("{name} is given"),
+    };
+    let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    let known_range = known.map(|i| [band.values[i]; 2]);
+    Judgement {
+        name: name.to_owned(),
+        verdict,
+        sentence,
+        known_range: known_range.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
+    }
+}

@@ -1,0 +1,144 @@
+//! Numerics of kmcfit: time-varying mass, damping and stiffness of an oscillator from its measured motion.
+//!
+//! Modules, in the order in which data flow:
+//!
+//! 1. `problem`: system, records, penalties and constraints.
+//! 2. `functions`: from parameters to mass, damping and stiffness at the nodes, their roughness and variation;
+//!    `dynamics`: from those to the response, its linearisation, its adjoints.
+//! 3. `objective`: the cost of the parameters and its gradient, from one simulation per point.
+//! 4. `constraints`: from statements about the functions to rows and cones in the parameters.
+//! 5. `qp`: the convex subproblems; without active inequalities by an elimination along time or a sparse factorisation,
+//!    otherwise by Clarabel.
+//! 6. `solvers`: steepest descent, L-BFGS, projected gradient, Gauss–Newton, the equation error; starting points, the
+//!    choice of a weight.
+//! 7. `diagnostics`: tests of the residuals, comparison of models.
+//! 8. `identifiability`: what records can determine, confidence bands, experiment design; `study`: profiles,
+//!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction.
+//! 9. `builder`: a problem in a few lines of Rust.
+//!
+//! Beside these, `signal` has interpolation, excitation, filters and spectra; `lanes` vector arithmetic.
+//!
+//! # Example
+//!
+//! A device whose mass falls along a line is simulated, and found again from its motion:
+//!
+//! ```
+//! use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator, State, Term};
+//! use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
+//! use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
+//! use kmcfit_core::internals::problem::{Experiment, Problem};
+//! use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+//!
+//! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
+//! let grid = Grid::new(0.0, 25.0, 1001).expect("a grid");
+//! let nodes = grid.nodes();
+//! let truth = Device {
+//!     mass: grid.times().iter().map(|t| 1.0 - t / 50.0).collect(),
+//!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
+//! };
+//! let oscillator = Oscillator {
+//!     grid,
+//!     method: Method::Rk4,
+//!     terms: vec![Term::Damping, Term::Stiffness],
+//! };
+//! let initial = State { displacement: 3.3, velocity: 1.0 };
+//! let motion = oscillator.forward(&truth, initial, None).expect("a motion");
+//!
+//! // What is sought: a line for the mass and a constant for the damping; the stiffness is known.
+//! let line = Basis::Polynomial { degree: 1 };
+//! let start = line.constant(&grid, 2.0);
+//! let list = vec![
+//!     CoefficientFunction::free(Quantity::Mass, line, &grid, start),
+//!     CoefficientFunction::constant(Quantity::Damping, 1.0, nodes),
+//!     CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+//! ];
+//! let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
+//! let weighting = Weighting::Integral { spacing: grid.step() };
+//! let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
+//! let record = Experiment::free("free decay", initial, nodes).with_channel(channel);
+//! let problem = Problem::new(oscillator, functions, vec![record]);
+//!
+//! let settings = FitSettings {
+//!     solver: Solver::GaussNewton,
+//!     initial: Initial::Functions,
+//!     gradient: GradientKind::Discrete,
+//!     stopping: Stopping::default(),
+//!     interrupt: None,
+//! };
+//! let found = fit(&problem, &problem.functions.start(), &settings, &mut |_| {}).expect("a motion");
+//! assert_eq!(found.outcome.status, Status::Converged);
+//! let mass = &found.best.evaluation.device.mass;
+//! let error = mass.iter().zip(&truth.mass).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
+//! assert!(error < 1e-9, "{error}");
+//! ```
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
+#![allow(
+    clippy::result_large_err,
+    reason = "what failed is returned to be used again"
+)]
+mod builder;
+mod constraints;
+mod diagnostics;
+mod dynamics;
+mod functions;
+mod host;
+mod identifiability;
+mod lanes;
+mod objective;
+mod problem;
+mod qp;
+mod signal;
+mod solvers;
+mod study;
+mod threads;
+
+/// Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API; outside semantic
+/// versioning.
+#[doc(hidden)]
+pub mod internals {
+    pub mod builder {
+        pub use crate::builder::*;
+    }
+    pub mod constraints {
+        pub use crate::constraints::*;
+    }
+    pub mod diagnostics {
+        pub use crate::diagnostics::*;
+    }
+    pub mod dynamics {
+        pub use crate::dynamics::*;
+    }
+    pub mod functions {
+        pub use crate::functions::*;
+    }
+    pub mod host {
+        pub use crate::host::*;
+    }
+    pub mod identifiability {
+        pub use crate::identifiability::*;
+    }
+    pub mod lanes {
+        pub use crate::lanes::*;
+    }
+    pub mod objective {
+        pub use crate::objective::*;
+    }
+    pub mod problem {
+        pub use crate::problem::*;
+    }
+    pub mod qp {
+        pub use crate::qp::*;
+    }
+    pub mod signal {
+        pub use crate::signal::*;
+    }
+    pub mod solvers {
+        pub use crate::solvers::*;
+    }
+    pub mod study {
+        pub use crate::study::*;
+    }
+    pub mod threads {
+        pub use crate::threads::*;
+    }
+}

@@ -1,0 +1,288 @@
+//! The cost of a parameter vector and its derivatives, from one trajectory per point.
+
+mod channel;
+mod cost_and_gradient;
+mod gradient;
+mod jacobian;
+mod loss;
+mod on_nodes;
+mod refine;
+mod sensor;
+mod sizes;
+mod verify;
+mod weighting;
+
+pub use channel::{Channel, View, ViewTangent, integral_over};
+pub use gradient::{Gradient, GradientKind};
+pub use loss::Loss;
+pub use refine::Refined;
+pub use sensor::Sensor;
+pub use sizes::state_sizes;
+pub use verify::GradientError;
+pub use weighting::Weighting;
+
+use crate::dynamics::{
+    Breakdown, Cause, Device, DeviceTangent, Oscillator, Place, State, Trajectory,
+};
+use crate::problem::Problem;
+
+/// The cost at one point and everything that it was computed from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// Cost `J`, the sum of the next two.
+    pub cost: f64,
+    /// Part of the readings.
+    pub misfit: f64,
+    /// Part of the penalties.
+    pub regularisation: f64,
+    /// The main device at this point.
+    pub device: Device,
+    /// The other devices of [`Functions::assemblies`](crate::functions::Functions::assemblies).
+    pub own_devices: Vec<Device>,
+    /// The scalars at this point.
+    pub scalars: Vec<f64>,
+    /// The motion in each experiment.
+    pub trajectories: Vec<Trajectory>,
+    /// What the model says of the readings, for each experiment and each of its channels.
+    pub predictions: Vec<Vec<Vec<f64>>>,
+}
+
+/// In which order a motion and its cost are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    /// One step and one reading after the other.
+    Steps,
+    /// Several at once, where that is possible.
+    Blocks,
+}
+
+impl Evaluation {
+    /// Device `which` of [`Functions::assemblies`](crate::functions::Functions::assemblies).
+    pub fn device_of(&self, which: usize) -> &Device {
+        match which {
+            0 => &self.device,
+            own => &self.own_devices[own - 1],
+        }
+    }
+}
+
+impl Problem {
+    /// Storage for evaluations, used again and again by [`Problem::evaluate_into`].
+    pub fn workspace(&self) -> Evaluation {
+        let devices = self.functions.assemblies().len();
+        Evaluation {
+            cost: f64::NAN,
+            misfit: f64::NAN,
+            regularisation: f64::NAN,
+            device: self.functions.empty_device(),
+            own_devices: vec![self.functions.empty_device(); devices - 1],
+            scalars: vec![0.0; self.functions.scalars().len()],
+            trajectories: (self.experiments.iter())
+                .map(|e| Trajectory::zeros(e.nodes))
+                .collect(),
+            predictions: (self.experiments.iter())
+                .map(|e| vec![Vec::new(); e.channels.len()])
+                .collect(),
+        }
+    }
+
+    /// Cost, devices and motions for the parameters `theta`.
+    ///
+    /// The cost is the sum over the channels of [`Channel::cost`] plus the sum over the penalties
+    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
+    /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
+    /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
+    /// ([`crate::functions::Scalar::price`]).
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if a motion does not exist (the mass is not positive, or it overflows), or the
+    /// cost overflows.
+    pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, Breakdown> {
+        let mut evaluation = self.workspace();
+        self.evaluate_into(theta, &mut evaluation)?;
+        Ok(evaluation)
+    }
+
+    /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
+    /// error.
+    ///
+    /// Linear free motion is computed in blocks of the record at once
+    /// ([`Oscillator::forward_in_blocks_into`](crate::dynamics::Oscillator::forward_in_blocks_into)).
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    pub fn evaluate_into(
+        &self,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.evaluate_by(Order::Blocks, theta, evaluation)
+    }
+
+    /// [`Problem::evaluate_into`] one step and one reading after the other, in the paper's order of
+    /// operations: its run depends on every bit.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    pub fn evaluate_in_order_into(
+        &self,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.evaluate_by(Order::Steps, theta, evaluation)
+    }
+
+    fn evaluate_by(
+        &self,
+        order: Order,
+        theta: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.functions.device_into(theta, 0, &mut evaluation.device);
+        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+            self.functions.device_into(theta, i + 1, own);
+        }
+        evaluation.scalars.copy_from_slice(self.scalars(theta));
+        self.motions(order, evaluation)?;
+        evaluation.regularisation = self.regularisation(theta);
+        evaluation.cost = evaluation.misfit + evaluation.regularisation;
+        if !evaluation.cost.is_finite() {
+            return Err(self.cost_overflow(evaluation));
+        }
+        Ok(())
+    }
+
+    /// Motions, predictions and misfit of the devices and scalars that `evaluation` holds; its cost
+    /// and regularisation stay as they are.
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if a motion does not exist.
+    pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+        self.motions(Order::Blocks, evaluation)
+    }
+
+    fn motions(&self, order: Order, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+        evaluation.misfit = 0.0;
+        for (e, experiment) in self.experiments.iter().enumerate() {
+            let device = match experiment.device {
+                0 => &evaluation.device,
+                own => &evaluation.own_devices[own - 1],
+            };
+            let motion = &mut evaluation.trajectories[e];
+            let solve = match order {
+                Order::Steps => Oscillator::forward_into,
+                Order::Blocks => Oscillator::forward_in_blocks_into,
+            };
+            let initial = experiment.initial_state(&evaluation.scalars);
+            let excitation = experiment.excitation.as_ref();
+            solve(&self.oscillator, device, initial, excitation, motion)?;
+            let view = View {
+                oscillator: &self.oscillator,
+                device,
+                excitation: experiment.excitation.as_ref(),
+                motion,
+                scalars: &evaluation.scalars,
+            };
+            let predictions = experiment
+                .channels
+                .iter()
+                .zip(&mut evaluation.predictions[e]);
+            for (channel, predicted) in predictions {
+                channel.predict_into(view, predicted);
+                evaluation.misfit += channel.cost(predicted);
+            }
+        }
+        Ok(())
+    }
+
+    /// What the channels of experiment `e` look at, at an evaluated point.
+    pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> View<'a> {
+        let experiment = &self.experiments[e];
+        View {
+            oscillator: &self.oscillator,
+            device: evaluation.device_of(experiment.device),
+            excitation: experiment.excitation.as_ref(),
+            motion: &evaluation.trajectories[e],
+            scalars: &evaluation.scalars,
+        }
+    }
+
+    /// The change of all predictions along a direction of the parameters, for each experiment and
+    /// each of its channels: one tangent solve.
+    pub fn predictions_tangent(
+        &self,
+        evaluation: &Evaluation,
+        along: &[f64],
+    ) -> Vec<Vec<Vec<f64>>> {
+        let scalars = self.scalars(along);
+        let devices: Vec<Device> = (0..self.functions.assemblies().len())
+            .map(|d| self.functions.direction(along, d))
+            .collect();
+        let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
+            let view = self.view(evaluation, e);
+            let change = |sought: Option<usize>| sought.map_or(0.0, |i| scalars[i]);
+            let direction = DeviceTangent {
+                device: devices[experiment.device].clone(),
+                initial: State {
+                    displacement: change(experiment.sought[0]),
+                    velocity: change(experiment.sought[1]),
+                },
+            };
+            let motion =
+                self.oscillator
+                    .tangent(view.device, view.excitation, view.motion, &direction);
+            let along = ViewTangent {
+                device: &direction.device,
+                motion: &motion,
+                scalars,
+            };
+            let channels = experiment.channels.iter();
+            channels.map(|c| c.predict_tangent(view, along)).collect()
+        });
+        each.collect()
+    }
+
+    /// Where the largest residual stands, for a cost that has left the finite numbers.
+    fn cost_overflow(&self, evaluation: &Evaluation) -> Breakdown {
+        let mut worst = (
+            Place {
+                step: 0,
+                fraction: 0.0,
+            },
+            0.0f64,
+        );
+        for (experiment, predictions) in self.experiments.iter().zip(&evaluation.predictions) {
+            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+                for (place, r) in channel.places().iter().zip(channel.residuals(predicted)) {
+                    if r.abs() > worst.1.abs() {
+                        worst = (*place, r);
+                    }
+                }
+            }
+        }
+        let node = worst.0.as_node().unwrap_or(worst.0.step);
+        Breakdown {
+            cause: Cause::CostOverflow,
+            node,
+            time: self.oscillator.grid.time(node),
+            value: worst.1,
+        }
+    }
+
+    /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
+    /// `weight sum |D theta|` plus soft constraints `weight mean excess^2` plus priors of scalars.
+    pub fn regularisation(&self, theta: &[f64]) -> f64 {
+        let ranges = self.functions.ranges();
+        let smooth = self.penalties.iter().map(|penalty| {
+            penalty.weight * penalty.roughness(&theta[ranges[penalty.function].clone()])
+        });
+        let jumps = self.variations.iter().map(|variation| {
+            variation.weight * variation.total(&theta[ranges[variation.function].clone()])
+        });
+        let broken = self.soft.iter().map(|group| group.price(theta));
+        let scalars = self.functions.scalars().iter().zip(self.scalars(theta));
+        let priors = scalars.map(|(scalar, x)| scalar.price(*x));
+        // An empty sum is -0.0.
+        0.0 + smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>() + priors.sum::<f64>()
+    }
+}

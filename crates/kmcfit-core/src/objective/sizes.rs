@@ -1,0 +1,252 @@
+//! How large a change of a function is large.
+
+use super::Evaluation;
+use crate::diagnostics::median_size;
+use crate::dynamics::quadrature::curvature_into;
+use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
+use crate::lanes::sum::{dot, largest};
+use crate::problem::{Experiment, LONG, Problem};
+use crate::signal::Spectrum;
+use std::f64::consts::TAU;
+
+impl Problem {
+    /// For each function of the list the larger of its own largest value and of the value at which
+    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
+    /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
+    /// of a damping that matters.
+    pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+        self.sizes(evaluation, largest)
+    }
+
+    /// [`Problem::natural_sizes`] with the median of the sizes of a function's own values in place of the largest one: what
+    /// a function is like at most times, whatever it does where nothing is seen of it.
+    pub(crate) fn middle_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+        self.sizes(evaluation, median_size)
+    }
+
+    fn sizes(&self, evaluation: &Evaluation, size_of: fn(&[f64]) -> f64) -> Vec<f64> {
+        let terms = &self.oscillator.terms;
+        let step = self.oscillator.grid.step();
+        let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
+            .map(|motion| squares(motion, terms, step))
+            .collect();
+        let any_read = self.experiments.iter().any(Experiment::is_read);
+        let mut sizes = vec![0.0f64; self.functions.ranges().len()];
+        for (which, assembly) in self.functions.assemblies().iter().enumerate() {
+            let device = evaluation.device_of(which);
+            // Of the accelerations first, then of what each term sees.
+            let root = |what: usize| -> f64 {
+                let own = self.experiments.iter().zip(&squares);
+                let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
+                own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
+            };
+            let mass = size_of(&device.mass);
+            let inertia = mass * root(0);
+            let natural = |j: usize| match root(j + 1) {
+                response if response > 0.0 => inertia / response,
+                _ => 0.0,
+            };
+            let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
+            let own = device.functions().map(size_of);
+            for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
+                sizes[f] = sizes[f].max(own).max(natural);
+            }
+        }
+        sizes
+    }
+
+    /// The largest change of a function or scalar from one point to the parameters `after`, relative
+    /// to [`Problem::natural_sizes`] at the first, or to the scalar's own size.
+    pub fn relative_change(&self, before: &Evaluation, from: &[f64], after: &[f64]) -> f64 {
+        self.change_in_sizes(&self.natural_sizes(before), from, after)
+    }
+
+    /// [`Problem::relative_change`] with the natural sizes at hand.
+    pub(crate) fn change_in_sizes(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
+        let ranges = self.functions.ranges().iter().zip(sizes);
+        let mut most = 0.0f64;
+        for (index, (range, size)) in ranges.enumerate() {
+            let change =
+                (self.functions).largest_change(index, &from[range.clone()], &after[range.clone()]);
+            if change != 0.0 {
+                most = most.max(change / size);
+            }
+        }
+        let changes = self
+            .scalars(after)
+            .iter()
+            .zip(self.scalars(from))
+            .map(|(a, b)| a - b);
+        let scalars = self.functions.scalars().iter().zip(changes);
+        scalars.fold(most, |most, (scalar, x)| most.max(x.abs() / scalar.size))
+    }
+}
+
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term; of a long motion in lanes.
+fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    let Trajectory {
+        displacement: y,
+        velocity: v,
+    } = motion;
+    let mut acceleration = [0.0; PART];
+    let mut sums = vec![0.0; terms.len() + 1];
+    let mut phi = [[0.0; PART]; MOST_TERMS];
+    for from in (0..motion.nodes()).step_by(PART) {
+        let range = from..(from + PART).min(motion.nodes());
+        curvature_into(y, step, from, &mut acceleration[..range.len()]);
+        let (y, v) = (&y[range.clone()], &v[range.clone()]);
+        for (term, phi) in terms.iter().zip(&mut phi) {
+            if !matches!(term, Term::Damping | Term::Stiffness) {
+                let pairs = y.iter().zip(v);
+                let values = phi.iter_mut().zip(pairs);
+                values.for_each(|(phi, (y, v))| *phi = term.phi(*y, *v));
+            }
+        }
+        let seen = terms.iter().zip(&phi).map(|(term, phi)| match term {
+            Term::Damping => v,
+            Term::Stiffness => y,
+            _ => &phi[..range.len()],
+        });
+        let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
+            .chain(seen)
+            .collect();
+        if motion.nodes() > LONG {
+            for (column, sum) in columns.iter().zip(&mut sums) {
+                *sum += dot(column, column);
+            }
+            continue;
+        }
+        for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {
+            add_squares(columns, sums);
+        }
+    }
+    sums
+}
+
+/// Nodes whose terms are looked at together.
+const PART: usize = 256;
+
+/// Adds the squares of each column in their order: up to four sums side by side, as each waits for
+/// itself.
+fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
+    let column = |c: usize| columns[c.min(columns.len() - 1)];
+    let (zero, one, two, three) = (column(0), column(1), column(2), column(3));
+    let mut four = [0.0; 4];
+    four[..sums.len()].copy_from_slice(sums);
+    for (((a, b), c), d) in zero.iter().zip(one).zip(two).zip(three) {
+        four[0] += a * a;
+        four[1] += b * b;
+        four[2] += c * c;
+        four[3] += d * d;
+    }
+    sums.copy_from_slice(&four[..sums.len()]);
+}
+
+/// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
+/// (s) apart: their rms, and their dominant frequency.
+pub fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+    let rms = (centred.iter().map(|v| v * v).sum::<f64>() / centred.len() as f64).sqrt();
+    let spectrum = Spectrum::of(&centred, spacing);
+    let omega = TAU * spectrum.map_or(1.0, |s| s.dominant());
+    let omega = if omega > 0.0 { omega } else { 1.0 };
+    let displacement = match kind {
+        ChannelKind::Displacement => rms,
+        ChannelKind::Velocity => rms / omega,
+        ChannelKind::Acceleration => rms / (omega * omega),
+    };
+    [displacement, displacement * omega]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::dynamics::Grid;
+
+    /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it, by a sensor with
+    /// an offset.
+    #[test]
+    fn the_state_of_a_sine_has_its_size_whatever_was_read() {
+        let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
+        let readings = |size: f64, phase: f64| -> Vec<f64> {
+            let at = |i: usize| size * (5.0 + (omega * spacing * i as f64 + phase).sin());
+            (0..400).map(at).collect()
+        };
+        let quarter = TAU / 4.0;
+        let cases = [
+            (ChannelKind::Displacement, amplitude, 0.0),
+            (ChannelKind::Velocity, amplitude * omega, quarter),
+            (
+                ChannelKind::Acceleration,
+                amplitude * omega * omega,
+                2.0 * quarter,
+            ),
+        ];
+        let rms = amplitude / 2f64.sqrt();
+        for (kind, size, phase) in cases {
+            let [displacement, velocity] = state_sizes(kind, &readings(size, phase), spacing);
+            // The dominant frequency is known to a small part of its distance to the next.
+            assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
+            assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
+            assert_eq!(state_sizes(kind, &[2.0; 400], spacing), [0.0; 2]);
+        }
+    }
+
+    /// One period of `y = size cos(w t)` with m = 1 and k = w^2, a cubic stiffness of next to nothing, and
+    /// another such motion of three times the size, read or not.
+    fn swinging(size: f64, other_is_read: bool) -> Problem {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let record = |size: f64| {
+            let readings: Vec<f64> = times
+                .iter()
+                .map(|t| size * (TAU * t / 10.0).cos())
+                .collect();
+            Record::new("swinging")
+                .from_state(size, 0.0)
+                .displacement(&times, &readings)
+        };
+        let stiffness = (TAU / 10.0).powi(2);
+        let parts = [1.0, 0.0, stiffness].map(Part::fixed);
+        let mut problem = Builder::new(parts)
+            .cubic_stiffness(Part::constant(1e-9))
+            .record(record(size))
+            .record(record(3.0 * size))
+            .build()
+            .unwrap();
+        if !other_is_read {
+            problem.experiments[1].channels.clear();
+        }
+        problem
+    }
+
+    fn sizes(problem: &Problem) -> Vec<f64> {
+        problem.natural_sizes(&problem.evaluate(&problem.start()).unwrap())
+    }
+
+    /// A force as large as the mass's, in the mean of squares: that of a damping is `m w`, that of a
+    /// cubic stiffness `m w^2 / y^2` with `mean y^6 / mean y^2 = 5/8 y^4`.
+    #[test]
+    fn the_natural_size_makes_a_force_as_large_as_that_of_the_mass() {
+        let omega = TAU / 10.0;
+        // One motion of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
+        // sixth powers.
+        for (read, six_over_two) in [(false, 1.0), (true, 73.0)] {
+            let found = sizes(&swinging(0.5, read));
+            let cubic = omega * omega / (0.625f64 * 0.0625 * six_over_two).sqrt();
+            let expected = [1.0, omega, omega * omega, cubic];
+            for (found, expected) in found.iter().zip(expected) {
+                // Sums over nodes and differences of second order.
+                assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+            }
+        }
+    }
+
+    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
+    /// then the size of its own values, and not an infinite one.
+    #[test]
+    fn a_term_that_sees_nothing_has_its_own_size() {
+        assert_eq!(sizes(&swinging(1e-60, true))[3], 1e-9);
+    }
+}

@@ -1,0 +1,33 @@
+//! Signals over time, without knowledge of the device: values between samples, shapes of
+//! excitation, filters, spectra.
+//!
+//! ```
+//! use kmcfit_core::internals::signal::{Interpolation, Signal};
+//! let times: Vec<f64> = (0..11).map(|i| 0.1 * f64::from(i)).collect();
+//! let values = times.iter().map(|t| t * t * t).collect();
+//! let signal = Signal::new(times, values, Interpolation::Cubic).expect("increasing times");
+//! assert!((signal.value(0.25) - 0.25_f64.powi(3)).abs() < 1e-15);
+//! assert!((signal.second_derivative(0.25) - 6.0 * 0.25).abs() < 1e-12);
+//! ```
+
+mod clipping;
+mod decimate;
+mod filter;
+mod interpolate;
+mod onset;
+mod shape;
+mod spacing;
+mod spectrum;
+mod spline;
+
+pub use clipping::clipped;
+pub use decimate::{decimate, decimation_filter};
+pub use filter::{
+    SecondOrder, apply, band_pass, high_pass, low_pass, zero_phase, zero_phase_padded,
+    zero_phase_transpose,
+};
+pub use interpolate::{Interpolation, Signal};
+pub use onset::onset;
+pub use shape::{Shape, SweepLaw};
+pub use spacing::{even_spacing, median, median_spacing};
+pub use spectrum::Spectrum;

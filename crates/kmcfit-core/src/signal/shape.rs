@@ -1,0 +1,217 @@
+//! Shapes of excitation that are given by a formula.
+
+use std::f64::consts::{PI, TAU};
+
+/// How far, relative to a time, one that is computed on a grid may be from it and still be it.
+const ROUNDING: f64 = 1e-12;
+
+/// How the frequency of a sweep goes from its first to its last value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SweepLaw {
+    /// By equal differences in equal times: `f = f0 + (f1 - f0) s/T`.
+    #[default]
+    Linear,
+    /// By equal factors in equal times: `f = f0 (f1/f0)^(s/T)`.
+    Logarithmic,
+}
+
+/// A shape over time. Amplitudes are in the unit of the signal, times in s, frequencies in Hz,
+/// phases in rad.
+///
+/// ```
+/// use kmcfit_core::internals::signal::Shape;
+/// let step = Shape::Step { amplitude: 2.0, at: 1.0 };
+/// assert_eq!((step.value_before(1.0), step.value(1.0)), (0.0, 2.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// `a`.
+    Constant {
+        /// `a`.
+        amplitude: f64,
+    },
+    /// `a sin(2π f t + phase)`.
+    Sine {
+        /// `a`.
+        amplitude: f64,
+        /// `f`, Hz.
+        frequency: f64,
+        /// At time zero, rad.
+        phase: f64,
+    },
+    /// `a sin(2π ∫ f ds)` for `0 <= s < T`, zero elsewhere, with `s = t - start`:
+    ///
+    /// ```text
+    /// linear       ∫ f ds = f0 s + (f1 - f0) s²/(2 T)
+    /// logarithmic  ∫ f ds = f0 T/ln(f1/f0) ((f1/f0)^(s/T) - 1)
+    /// ```
+    ///
+    /// It may jump at the end. A logarithmic one needs frequencies above zero.
+    Sweep {
+        /// `a`.
+        amplitude: f64,
+        /// `f0`, Hz.
+        from: f64,
+        /// `f1`, Hz.
+        to: f64,
+        /// Where it begins, s.
+        start: f64,
+        /// `T`, s.
+        duration: f64,
+        /// How the frequency goes from `f0` to `f1`.
+        law: SweepLaw,
+    },
+    /// Zero before `at`, `a` from there.
+    Step {
+        /// `a`.
+        amplitude: f64,
+        /// Where it jumps, s.
+        at: f64,
+    },
+    /// `a sin(π (t - at)/T)` for `at <= t < at + T`, zero elsewhere: a soft blow.
+    HalfSine {
+        /// `a`.
+        amplitude: f64,
+        /// Where it begins, s.
+        at: f64,
+        /// `T`, s.
+        duration: f64,
+    },
+}
+
+impl Shape {
+    /// The value at a time; where it jumps, the value after the jump.
+    pub fn value(&self, t: f64) -> f64 {
+        self.on(t, |time| t >= time - ROUNDING * time.abs())
+    }
+
+    /// The limit of the value from the left: where it jumps, the value before the jump.
+    pub fn value_before(&self, t: f64) -> f64 {
+        self.on(t, |time| t > time + ROUNDING * time.abs())
+    }
+
+    /// The times, increasing, where it jumps or has a kink, so that no step should cross them.
+    pub fn breaks(&self) -> Vec<f64> {
+        match *self {
+            Self::Constant { .. } | Self::Sine { .. } => Vec::new(),
+            Self::Step { at, .. } => vec![at],
+            Self::Sweep {
+                start: at,
+                duration,
+                ..
+            }
+            | Self::HalfSine { at, duration, .. } => vec![at, at + duration],
+        }
+    }
+
+    /// The value at `t`, where `has_come` says whether a break is past.
+    fn on(&self, t: f64, has_come: impl Fn(f64) -> bool) -> f64 {
+        let during = |from: f64, to: f64| has_come(from) && !has_come(to);
+        match *self {
+            Self::Constant { amplitude } => amplitude,
+            Self::Sine {
+                amplitude,
+                frequency,
+                phase,
+            } => amplitude * (TAU * frequency * t + phase).sin(),
+            Self::Step { amplitude, at } if has_come(at) => amplitude,
+            Self::Sweep {
+                amplitude,
+                from,
+                to,
+                start,
+                duration,
+                law,
+            } if during(start, start + duration) => {
+                amplitude * (TAU * cycles(from, to, duration, law, t - start)).sin()
+            }
+            Self::HalfSine {
+                amplitude,
+                at,
+                duration,
+            } if during(at, at + duration) => amplitude * (PI * (t - at) / duration).sin(),
+            Self::Step { .. } | Self::Sweep { .. } | Self::HalfSine { .. } => 0.0,
+        }
+    }
+}
+
+/// Cycles of a sweep after `s` seconds.
+fn cycles(from: f64, to: f64, duration: f64, law: SweepLaw, s: f64) -> f64 {
+    let octaves = (to / from).ln();
+    match law {
+        // Without change of frequency, the two laws are one.
+        SweepLaw::Logarithmic if octaves != 0.0 => {
+            from * duration / octaves * (octaves * s / duration).exp_m1()
+        }
+        _ => from * s + (to - from) * s * s / (2.0 * duration),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SWEEP: Shape = Shape::Sweep {
+        amplitude: 2.0,
+        from: 1.0,
+        to: 4.0,
+        start: 0.5,
+        duration: 3.0,
+        law: SweepLaw::Linear,
+    };
+
+    #[test]
+    fn shapes_have_their_values() {
+        assert_eq!(Shape::Constant { amplitude: 3.0 }.value(-1.0), 3.0);
+        let sine = Shape::Sine {
+            amplitude: 2.0,
+            frequency: 0.25,
+            phase: PI / 2.0,
+        };
+        assert_eq!(sine.value(0.0), 2.0);
+        assert!(sine.value(1.0).abs() < 1e-15);
+        assert!((sine.value(2.0) + 2.0).abs() < 1e-15);
+        let blow = Shape::HalfSine {
+            amplitude: 5.0,
+            at: 1.0,
+            duration: 0.5,
+        };
+        assert_eq!(
+            (blow.value(0.9), blow.value(1.25), blow.value(1.6)),
+            (0.0, 5.0, 0.0)
+        );
+        assert_eq!(blow.breaks(), [1.0, 1.5]);
+    }
+
+    #[test]
+    fn jumps_have_two_sides() {
+        let step = Shape::Step {
+            amplitude: 2.0,
+            at: 0.3,
+        };
+        // 3 * 0.1 is above 0.3 by rounding, 0.3 (1 - 1e-16) below.
+        for t in [0.3, 3.0 * 0.1, 0.3 * (1.0 - 2e-16)] {
+            assert_eq!((step.value_before(t), step.value(t)), (0.0, 2.0));
+        }
+        assert_eq!((step.value(0.29), step.value_before(0.31)), (0.0, 2.0));
+        // 1 + 4 Hz in 3 s: 7.5 cycles, where a sine is zero; 0.01 s earlier it is not.
+        assert_eq!((SWEEP.value(0.4), SWEEP.value(3.5)), (0.0, 0.0));
+        assert!(SWEEP.value_before(3.5).abs() < 1e-13);
+        assert!(SWEEP.value(3.45).abs() > 1.0);
+    }
+
+    #[test]
+    fn sweeps_have_the_frequencies_they_say() {
+        for (law, middle) in [(SweepLaw::Linear, 2.5), (SweepLaw::Logarithmic, 2.0)] {
+            let h = 1e-5;
+            let frequency = |s: f64| {
+                (cycles(1.0, 4.0, 3.0, law, s + h) - cycles(1.0, 4.0, 3.0, law, s - h)) / (2.0 * h)
+            };
+            // Central differences: h² times a third derivative below 1, and rounding 1e-16/h.
+            for (s, expected) in [(0.0, 1.0), (1.5, middle), (3.0, 4.0)] {
+                assert!((frequency(s) - expected).abs() < 1e-9, "{law:?} {s}");
+            }
+        }
+        assert_eq!(cycles(2.0, 2.0, 3.0, SweepLaw::Logarithmic, 1.5), 3.0);
+    }
+}

@@ -1,0 +1,31 @@
+//! The spacing of sampling times.
+
+/// How far readings may be from equal spacing, in spacings.
+const REGULAR: f64 = 1e-6;
+
+/// The spacing of equally spaced times; `None` where they are not, or fewer than two.
+pub fn even_spacing(times: &[f64]) -> Option<f64> {
+    let (&[first, .., last], intervals) = (times, times.len().checked_sub(1)?) else {
+        return None;
+    };
+    let spacing = (last - first) / intervals as f64;
+    let astray =
+        |(i, t): (usize, &f64)| (t - (first + i as f64 * spacing)).abs() > REGULAR * spacing;
+    (!times.iter().enumerate().any(astray)).then_some(spacing)
+}
+
+/// The median distance of neighbours.
+///
+/// # Panics
+/// If there are fewer than two times.
+pub fn median_spacing(times: &[f64]) -> f64 {
+    let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    median(&spacings)
+}
+
+/// The median of values that are not empty.
+pub fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -1,0 +1,227 @@
+//! The first-order condition of the constrained problem, measured at the end of a fit.
+//!
+//! A stopping test sees the last steps, and steps may be short for other reasons than a minimum. So the problem is
+//! linearised once more at the point that is returned, and solved under its constraints; how much of J that solution promises is
+//! what the point is short of a minimum.
+
+use super::gauss_newton::{linearise_at, response_rounding};
+
+use super::{Fit, FitSettings, Outcome, Point, Row, Solver, Status};
+use crate::constraints::TOLERANCE;
+use crate::host;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Solution, Subproblem};
+use std::time::Instant;
+
+/// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
+/// measurements.
+const EXACT: f64 = 1e-20;
+/// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
+const BYTES_PER_NODE: u64 = 4000;
+
+/// The first-order condition at a point, all numbers without unit.
+///
+/// With the linearised predictions `z + Z delta`, the linearised problem at the parameters `theta` is
+///
+/// ```text
+/// minimise  L(delta) = misfit(z + Z delta) + penalties(theta + delta) + J |delta|^2
+/// under the constraints at theta + delta,
+/// ```
+///
+/// `|delta|^2 = sum_f 1/T integral (delta p_f / size of p_f)^2 dt`: a change of a function by its size costs as
+/// much as J, so that directions that the readings do not show promise nothing. Without constraints
+/// the decrease is `g' (4 H)^-1 g` with the gradient `g` and the Gauss-Newton Hessian `2 H`, penalties and `J |.|^2` included.
+/// It is zero exactly where the conditions of Karush, Kuhn and Tucker hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Optimality {
+    /// `(J - min L) / J`, less the rounding of the response: the share of J that the linearised problem promises. With the
+    /// residuals of the optimality conditions of the program that it was solved by, if there was one.
+    pub stationarity: f64,
+    /// The largest change of a function by that step, relative to its size. In a fit without residuals it is this
+    /// that goes to zero.
+    pub step: f64,
+    /// Largest violation of a constraint, relative to its scale.
+    pub feasibility: f64,
+    /// `sum |multiplier| distance / J` of all bounds at the point, with the multipliers of the linearised problem.
+    pub complementarity: f64,
+    /// What `complementarity` and one of `stationarity` and `step` may be at a minimum: the tolerance of the stopping test,
+    /// or [`Optimality::LEAST`].
+    pub tolerance: f64,
+}
+
+impl Optimality {
+    /// Least tolerance: ten times the share of J that is the accuracy of a program ([`crate::qp::Kkt::COST`] is a third of it).
+    pub const LEAST: f64 = 1e-8;
+
+    /// Whether the point satisfies the first-order condition.
+    pub fn holds(&self) -> bool {
+        let is_flat = self.stationarity <= self.tolerance;
+        let is_settled = self.step <= self.tolerance;
+        (is_flat || is_settled)
+            && self.complementarity <= self.tolerance
+            && self.feasibility <= TOLERANCE
+    }
+
+    /// Which part of the condition does not hold.
+    fn failure(&self) -> String {
+        let Self {
+            stationarity,
+            feasibility,
+            complementarity,
+            tolerance,
+            ..
+        } = self;
+        if *feasibility > TOLERANCE {
+            return format!("a constraint is violated by {feasibility:.1e} of its scale");
+        }
+        if *complementarity > *tolerance {
+            return format!(
+                "moving to its bounds promises to lower J by a fraction of {complementarity:.1e}"
+            );
+        }
+        format!("the linearised cost can be lowered by a fraction of {stationarity:.1e}")
+    }
+
+    /// The cost of which shares are taken: J, or 1e-12 of the misfit of zero response where J is less. A fit whose residuals
+    /// are below 1e-10 of the measurements then has a share below [`Optimality::LEAST`], for no step lowers J by
+    /// more than J.
+    pub fn reference(problem: &Problem, cost: f64) -> f64 {
+        cost.max(EXACT * problem.misfit_of_silence() / Self::LEAST)
+    }
+
+    /// Whether J is so small that no step can lower it by a share that counts.
+    pub fn is_exact(problem: &Problem, cost: f64) -> bool {
+        cost <= EXACT * problem.misfit_of_silence()
+    }
+
+    /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
+    pub fn at(problem: &Problem, point: &Point, tolerance: f64) -> Option<Self> {
+        let cost = point.evaluation.cost;
+        let worst = problem.constraints.largest_violation(&point.parameters);
+        let feasibility = worst.map_or(0.0, |v| v.relative);
+        let reference = Self::reference(problem, cost);
+        if Self::is_exact(problem, cost) {
+            return Some(Self {
+                stationarity: cost / reference,
+                step: 0.0,
+                feasibility,
+                complementarity: 0.0,
+                tolerance,
+            });
+        }
+        let nodes: usize = problem.experiments.iter().map(|e| e.nodes).sum();
+        if !host::has_memory(BYTES_PER_NODE.saturating_mul(nodes as u64)) {
+            return None;
+        }
+        let (mut sub, _) = linearise_at(problem, point, &mut super::Timings::default());
+        let scales = point.relative_metric(problem);
+        for (d, s) in sub.proximal.iter_mut().zip(&scales) {
+            *d = cost * s;
+        }
+        let found = Minimum::of(&sub)?;
+        let parameters: Vec<f64> = point
+            .parameters
+            .iter()
+            .zip(&found.z)
+            .map(|(p, d)| p + d)
+            .collect();
+        let promised = cost - sub.value(&found.z) + found.accuracy * cost;
+        let promised = (promised - response_rounding(problem, cost)).max(0.0);
+        let share = |x: f64| if x == 0.0 { 0.0 } else { x / reference };
+        Some(Self {
+            stationarity: share(promised),
+            step: point.relative_change(problem, &parameters),
+            feasibility,
+            complementarity: share(found.complementarity),
+            tolerance,
+        })
+    }
+}
+
+/// The minimum of a linearised problem.
+struct Minimum {
+    z: Vec<f64>,
+    /// `sum |multiplier| distance` at zero, of the whole cost.
+    complementarity: f64,
+    /// The residuals of its own optimality conditions.
+    accuracy: f64,
+}
+
+impl Minimum {
+    fn of(sub: &Subproblem) -> Option<Self> {
+        if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, 0.1 * TOLERANCE)) {
+            return Some(Self {
+                z,
+                complementarity: 0.0,
+                accuracy: 0.0,
+            });
+        }
+        let solution = sub.solve();
+        if !solution.status.is_point() {
+            return None;
+        }
+        let complementarity = complementarity(sub, &solution);
+        Some(Self {
+            complementarity,
+            accuracy: solution.kkt.map_or(0.0, |kkt| kkt.cost()),
+            z: solution.z,
+        })
+    }
+}
+
+/// `2 sum |multiplier| distance` at zero: multipliers are those of half the cost.
+fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
+    let bounds = sub.inequalities.right().iter().zip(&sub.upper);
+    let rows = bounds.zip(&solution.multipliers);
+    let distance = |((lower, upper), m): ((&f64, &f64), &f64)| match *m {
+        m if m > 0.0 => m * upper.max(0.0),
+        m if m < 0.0 => m * lower.min(0.0),
+        _ => 0.0,
+    };
+    2.0 * rows.map(distance).sum::<f64>()
+}
+
+/// `fit` with its first-order condition measured, and `converged` taken back where it does not hold.
+///
+/// A fit that ended by a limit on `J / J0` or `G^2 / G0^2` did what was asked of it, whether there is a minimum or not.
+/// The work is not counted: it is no part of the search.
+pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) -> Fit {
+    let status = fit.outcome.status;
+    let cost = fit.best.evaluation.cost;
+    let is_asked = |row: &Row| settings.stopping.ratios_met(row).is_some();
+    // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
+    let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
+    let is_measurable = cost > 0.0 && cost.is_finite();
+    // A fit that has done what it was asked for claims no minimum, and linearising takes time and memory.
+    let is_claimed = status == Status::Converged && !fit.history.last().is_some_and(is_asked);
+    if !is_search || !is_measurable || !is_claimed {
+        return fit;
+    }
+    let clock = Instant::now();
+    let tolerance = settings.stopping.tolerance.unwrap_or(0.0);
+    fit.optimality = Optimality::at(problem, &fit.best, tolerance.max(Optimality::LEAST));
+    fit.outcome = judged(fit.outcome, fit.optimality.as_ref());
+    let took = clock.elapsed();
+    fit.timings.linear_algebra += took;
+    fit.elapsed += took;
+    fit
+}
+
+/// A `converged` that asserts a minimum, or `stalled` where the first-order condition contradicts it.
+pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outcome {
+    let Outcome { reason, .. } = &outcome;
+    match optimality {
+        Some(optimality) if optimality.holds() => outcome,
+        Some(optimality) => Outcome::new(
+            Status::Stalled,
+            format!("{reason}; but this is no minimum: {}", optimality.failure()),
+        ),
+        None => Outcome::new(
+            Status::Stalled,
+            format!(
+                "{reason}; whether this is a minimum could not be measured: {}",
+                ConicStatus::Stalled.sentence()
+            ),
+        ),
+    }
+}

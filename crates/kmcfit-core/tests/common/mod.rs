@@ -1,0 +1,165 @@
+//! Problems with known answers, met by the tests of every layer.
+#![allow(dead_code)]
+
+pub mod closed_form;
+pub mod reference;
+pub mod sensed;
+pub mod synthetic;
+
+use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::objective::{Channel, Weighting};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+
+use std::path::{Path, PathBuf};
+
+pub const DURATION: f64 = 25.0;
+pub const INITIAL: State = State {
+    displacement: 3.3,
+    velocity: 1.0,
+};
+
+pub fn oscillator(nodes: usize, method: Method) -> Oscillator {
+    Oscillator {
+        grid: Grid::new(0.0, DURATION, nodes).unwrap(),
+        method,
+        terms: vec![Term::Damping, Term::Stiffness],
+    }
+}
+
+/// The device that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
+pub fn paper_device(nodes: usize) -> Device {
+    let mass = (0..nodes)
+        .map(|i| 1.0 - 0.5 * (i + 1) as f64 / nodes as f64)
+        .collect();
+    Device {
+        mass,
+        coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
+    }
+}
+
+/// The paper's problem: one value per node, starting from constant `(m, c, k)`.
+pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
+    let oscillator = oscillator(nodes, Method::Midpoint);
+    let step = oscillator.grid.step();
+    let observed = oscillator
+        .forward(&paper_device(nodes), INITIAL, None)
+        .unwrap()
+        .displacement;
+    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let list = quantities
+        .into_iter()
+        .zip(start)
+        .map(|(q, value)| CoefficientFunction::nodal(q, vec![value; nodes]))
+        .collect();
+    let weighting = Weighting::Integral { spacing: step };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    let functions = Functions::new(list, nodes, step).unwrap();
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// A file or folder of the repository.
+pub fn repository(path: &str) -> PathBuf {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = package
+        .ancestors()
+        .find(|folder| folder.join("models").is_dir());
+    root.expect("the repository").join(path)
+}
+
+/// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None`, loudly,
+/// where it is absent.
+pub fn shared(folder: &str) -> Option<PathBuf> {
+    let root =
+        std::env::var_os("KMCFIT_SHARED").map_or_else(|| repository("../shared"), PathBuf::from);
+    let path = root.join(folder);
+    if path.is_dir() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: no shared `{folder}`; set KMCFIT_SHARED to check against it");
+    None
+}
+
+/// The numbers of a CSV file without its header.
+pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = |line: &str| line.split(',').map(|x| x.parse().unwrap()).collect();
+    text.lines().skip(1).map(row).collect()
+}
+
+/// Simulated displacement of `device` with Gaussian noise.
+pub fn noisy(oscillator: &Oscillator, device: &Device, sigma: f64, seed: u64) -> Vec<f64> {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let motion = oscillator.forward(device, INITIAL, None).unwrap();
+    let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+    motion
+        .displacement
+        .iter()
+        .map(|y| y + sigma * noise())
+        .collect()
+}
+
+/// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
+pub fn problem_of(
+    oscillator: Oscillator,
+    list: Vec<CoefficientFunction>,
+    observed: Vec<f64>,
+    sigma: Option<f64>,
+) -> Problem {
+    let (nodes, step) = (oscillator.grid.nodes(), oscillator.grid.step());
+    let weighting = match sigma {
+        Some(sigma) => Weighting::Sigma(sigma),
+        None => Weighting::Integral { spacing: step },
+    };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    let functions = Functions::new(list, nodes, step).unwrap();
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// Adds the smoothness of the paper's recovery, weight on the curvature of m and the slopes of c
+/// and k, and `k(0) = 1`; with bounds `m >= 0.05, c >= 0, k >= 0` at every parameter of a nodal or
+/// piecewise linear basis if asked for.
+pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
+    use kmcfit_core::internals::constraints::RowGroup;
+    use kmcfit_core::internals::functions::Penalty;
+    let grid = problem.oscillator.grid;
+    let orders = [2, 1, 1];
+    let ranges = problem.functions.ranges().to_vec();
+    let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();
+    for (f, basis) in bases.iter().enumerate() {
+        let Some(basis) = basis else { continue };
+        let rows = basis.roughness(&grid, orders[f]);
+        problem
+            .penalties
+            .push(Penalty::new(f, orders[f], weight, rows));
+        if positive {
+            let low = if f == 0 { 0.05 } else { 0.0 };
+            let mut group = RowGroup::new(format!("function {f} >= {low}"));
+            for j in ranges[f].clone() {
+                group.push([(j, 1.0)], [low, f64::INFINITY], [0.0, DURATION]);
+            }
+            problem.constraints.groups.push(group);
+        }
+    }
+    let mut group = RowGroup::new("k(0) = 1");
+    group.push([(ranges[2].start, 1.0)], [1.0, 1.0], [0.0, 0.0]);
+    problem.constraints.groups.push(group);
+}
+
+/// Largest distance of each function from the truth over the nodes, mass first.
+pub fn errors(found: &Device, truth: &Device) -> Vec<f64> {
+    let largest = |(a, b): (&[f64], &[f64])| {
+        a.iter()
+            .zip(b)
+            .fold(0.0f64, |most, (a, b)| most.max((a - b).abs()))
+    };
+    found
+        .functions()
+        .zip(truth.functions())
+        .map(largest)
+        .collect()
+}

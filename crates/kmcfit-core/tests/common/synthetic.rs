@@ -1,0 +1,156 @@
+//! Records of known devices by the independent evaluation of [`super::sensed`], and how they are
+//! fitted.
+
+use super::sensed::{Record, Response};
+use kmcfit_core::internals::dynamics::{
+    ChannelKind, Device, Excitation, Oscillator, State, Stepwise, Surroundings, Term,
+};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use nalgebra::DMatrix;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// What moves, what drives it and where it starts.
+pub struct Truth<'a> {
+    pub oscillator: &'a Oscillator,
+    pub device: &'a Device,
+    pub excitation: Option<&'a Excitation>,
+    pub initial: State,
+}
+
+impl Truth<'_> {
+    /// Readings of a perfect sensor at `times`; force and base there are `around`, or else linear
+    /// over each step.
+    pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[Surroundings]) -> Vec<f64> {
+        let record = self.record();
+        let states = record.motion();
+        let grid = &self.oscillator.grid;
+        let reading = |(n, t): (usize, &f64)| {
+            let x = (t - grid.start()) / grid.step();
+            let nearest = x.round();
+            let x = if (x - nearest).abs() < 1e-9 {
+                nearest
+            } else {
+                x
+            };
+            let step = (x.floor() as usize).min(grid.nodes() - 2);
+            let share = x - step as f64;
+            let linear = |part: &[[f64; 3]]| part[step][0] * (1.0 - share) + part[step][2] * share;
+            let driven = match around.get(n) {
+                Some(around) => (around.force, around.base),
+                None => (linear(&record.force), linear(&record.base)),
+            };
+            record.seen(kind, &states, (step, share), driven)
+        };
+        times.iter().enumerate().map(reading).collect()
+    }
+
+    fn record(&self) -> Record<f64> {
+        let steps = self.oscillator.grid.nodes() - 1;
+        let part = |choose: &dyn Fn(&Excitation) -> Option<Stepwise>| {
+            let given = self.excitation.and_then(choose);
+            let mut values = given.map_or(Vec::new(), |p| p.values().to_vec());
+            values.resize(steps, [0.0; 3]);
+            values
+        };
+        let terms = self.oscillator.terms.iter().map(|term| response(*term));
+        Record {
+            method: self.oscillator.method,
+            dt: self.oscillator.grid.step(),
+            mass: self.device.mass.clone(),
+            terms: terms
+                .zip(self.device.coefficients.iter().cloned())
+                .collect(),
+            force: part(&|e| e.force.clone()),
+            base: part(&|e| e.base.clone()),
+            initial: (self.initial.displacement, self.initial.velocity),
+        }
+    }
+}
+
+fn response(term: Term) -> Response {
+    match term {
+        Term::Damping => Response::Damping,
+        Term::Stiffness => Response::Stiffness,
+        Term::CubicStiffness => Response::Cubic,
+        Term::QuadraticDamping => Response::Quadratic,
+        Term::CoulombFriction { width } => Response::Coulomb(width),
+        Term::Offset => Response::Offset,
+    }
+}
+
+/// Gauss-Newton from the start values of the functions.
+pub fn settings() -> FitSettings {
+    FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Discrete,
+        stopping: Stopping {
+            tolerance: Some(1e-12),
+            ..Stopping::exactly(100)
+        },
+        interrupt: None,
+    }
+}
+
+/// The fit of `problem`, which must converge.
+pub fn run(problem: &Problem) -> Fit {
+    let found = fit(problem, &problem.start(), &settings(), &mut |_| {}).unwrap();
+    assert_eq!(
+        found.outcome.status,
+        Status::Converged,
+        "{:#?}",
+        found.rungs
+    );
+    found
+}
+
+/// `values` plus `sigma` times standard normal numbers.
+pub fn with_noise(values: &[f64], sigma: f64, seed: u64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+    values.iter().map(|x| x + sigma * noise()).collect()
+}
+
+/// Root mean square.
+pub fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Covariance of the parameters by Cramer and Rao, `(J' W J)^-1` with the Jacobian of all predictions
+/// at `theta` and the weights of the readings.
+pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
+    let jacobian = weighted_jacobian(problem, theta);
+    let information = jacobian.transpose() * &jacobian;
+    // Parameters of very different sizes: scaled to a unit diagonal, so that rounding does not matter.
+    let scale = information.diagonal().map(|x| 1.0 / x.sqrt());
+    let scale = DMatrix::from_diagonal(&scale);
+    let scaled = &scale * information * &scale;
+    let inverse = scaled
+        .try_inverse()
+        .expect("parameters that can be told apart");
+    &scale * inverse * &scale
+}
+
+/// `dz / dtheta` of all predictions, each row by the root of its reading's weight.
+pub fn weighted_jacobian(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
+    let here = problem.evaluate(theta).unwrap();
+    let roots: Vec<f64> = (problem.channels())
+        .flat_map(|c| (0..c.len()).map(|i| c.weighting().weight(i, c.len()).sqrt()))
+        .collect();
+    let mut jacobian = DMatrix::zeros(roots.len(), theta.len());
+    let mut unit = vec![0.0; theta.len()];
+    for j in 0..theta.len() {
+        unit[j] = 1.0;
+        let changes = problem.predictions_tangent(&here, &unit);
+        unit[j] = 0.0;
+        let all = changes.iter().flatten().flatten().zip(&roots);
+        for (i, (change, root)) in all.enumerate() {
+            jacobian[(i, j)] = root * change;
+        }
+    }
+    jacobian
+}

@@ -1,0 +1,556 @@
+//! Constraints: every statement on every basis against a dense evaluation of the functions, and every
+//! message about constraints in model files.
+
+use kmcfit_core::internals::constraints::{
+    Constraints, Impossible, Limit, RowGroup, Shape, Statement,
+};
+use kmcfit_core::internals::dynamics::{Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::qp::{ConicStatus, project};
+use kmcfit_core::internals::solvers::Start;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+
+const MASS: Quantity = Quantity::Mass;
+const DAMPING: Quantity = Quantity::Damping;
+const STIFFNESS: Quantity = Quantity::Stiffness;
+const NODES: usize = 41;
+
+fn grid() -> Grid {
+    Grid::new(1.0, 10.0, NODES).unwrap()
+}
+
+/// Every basis, with knots on nodes and off them.
+fn bases() -> Vec<Basis> {
+    let listed = vec![1.0, 2.13, 4.0, 7.7, 11.0];
+    vec![
+        Basis::Nodal,
+        Basis::Constant,
+        Basis::PiecewiseConstant {
+            knots: listed.clone(),
+        },
+        Basis::PiecewiseLinear {
+            knots: listed.clone(),
+        },
+        Basis::PiecewiseLinear {
+            knots: uniform_knots(&grid(), 11),
+        },
+        Basis::Polynomial { degree: 1 },
+        Basis::Polynomial { degree: 4 },
+        Basis::BSpline { knots: listed },
+    ]
+}
+
+/// Whether the functions of a basis are linear between knots, so that constraints hold everywhere.
+fn is_piecewise(basis: &Basis) -> bool {
+    !matches!(
+        basis,
+        Basis::Polynomial { degree: 2.. } | Basis::BSpline { .. }
+    )
+}
+
+fn free(quantity: Quantity, basis: &Basis, value: f64) -> CoefficientFunction {
+    let start = basis.constant(&grid(), value);
+    CoefficientFunction::free(quantity, basis.clone(), &grid(), start)
+}
+
+fn collect(list: Vec<CoefficientFunction>) -> Functions {
+    Functions::new(list, NODES, grid().step()).unwrap()
+}
+
+/// Mass, damping and stiffness of these bases.
+fn functions(bases: [&Basis; 3]) -> Functions {
+    let list = [MASS, DAMPING, STIFFNESS].into_iter().zip(bases);
+    collect(list.map(|(q, basis)| free(q, basis, 1.0)).collect())
+}
+
+fn random(count: usize, seed: u64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    (0..count).map(|_| random.random_range(-2.0..3.0)).collect()
+}
+
+/// A derivative of function `j` at `times`, straight from the basis.
+fn dense(functions: &Functions, theta: &[f64], j: usize, q: usize, times: &[f64]) -> Vec<f64> {
+    let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
+    let part = &theta[functions.ranges()[j].clone()];
+    let rows = basis.rows(&grid(), times, q);
+    let row = |i: usize| {
+        let row = rows.row(i);
+        let terms = row.col_indices().iter().zip(row.values());
+        terms.map(|(&k, b)| b * part[k]).sum()
+    };
+    (0..times.len()).map(row).collect()
+}
+
+/// Times ten times finer than the nodes.
+fn fine() -> Vec<f64> {
+    let count = 10 * (NODES - 1) + 1;
+    grid().with_nodes(count).unwrap().times()
+}
+
+fn built(statement: &Statement, functions: &Functions) -> Constraints {
+    statement.build(&grid(), functions).unwrap()
+}
+
+/// The nearest point inside.
+fn inside(constraints: &Constraints, functions: &Functions, seed: u64) -> Vec<f64> {
+    let start = random(functions.parameters(), seed);
+    let metric = functions.relative_metric(&[1.0; 3], 10.0);
+    let projection = project(constraints, &start, &metric);
+    let solved = [ConicStatus::Solved, ConicStatus::Almost].contains(&projection.status);
+    assert!(solved, "{:?}", projection.status);
+    let worst = constraints.largest_violation(&projection.theta).unwrap();
+    assert!(worst.relative <= 1e-7, "{worst:?}");
+    projection.theta
+}
+
+fn bounds(of: Quantity, min: f64, max: f64) -> Statement {
+    Statement::Bounds {
+        of,
+        min: Some(Limit::Number(min)),
+        max: Some(Limit::Number(max)),
+    }
+}
+
+fn shape(of: Quantity, shape: Shape) -> Statement {
+    Statement::Shape { of, shape }
+}
+
+/// Whether a derivative of function `j` nowhere rises, or for smooth bases at no node.
+fn falls(functions: &Functions, theta: &[f64], j: usize, q: usize) -> bool {
+    let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
+    let slack = 1e-6;
+    if is_piecewise(&basis) {
+        let values = dense(functions, theta, j, q, &fine());
+        values.windows(2).all(|w| w[1] <= w[0] + slack)
+    } else {
+        let rates = dense(functions, theta, j, q + 1, &grid().times());
+        rates.iter().all(|rate| *rate <= slack)
+    }
+}
+
+/// Times of a basis at which a statement is tested from outside.
+fn tested(basis: &Basis) -> Vec<f64> {
+    match is_piecewise(basis) {
+        true => fine(),
+        false => grid().times(),
+    }
+}
+
+#[test]
+fn rows_say_what_the_functions_do() {
+    for basis in bases() {
+        let functions = functions([&basis, &Basis::Nodal, &Basis::Constant]);
+        let theta = random(functions.parameters(), 1);
+        let held = Statement::Value {
+            of: MASS,
+            at: 3.3,
+            value: 0.0,
+        };
+        let group = &built(&held, &functions).groups[0];
+        let value = dense(&functions, &theta, 0, 0, &[3.3])[0];
+        let found = group.rows.multiply(&theta)[0];
+        assert!((found - value).abs() < 1e-12, "{basis:?}: {found} {value}");
+
+        // By the midpoint rule on so many cells that its error is no more than 1e-6.
+        let count = 200_000;
+        let step = 10.0 / count as f64;
+        let middles: Vec<f64> = (0..count).map(|i| 1.0 + (i as f64 + 0.5) * step).collect();
+        let integral: f64 = dense(&functions, &theta, 0, 0, &middles)
+            .iter()
+            .map(|p| p * step)
+            .sum();
+        let (of, value) = (MASS, 1.0);
+        let group = &built(&Statement::Integral { of, value }, &functions).groups[0];
+        let found = group.rows.multiply(&theta)[0];
+        assert!(
+            (found - integral).abs() < 1e-3,
+            "{basis:?}: {found} {integral}"
+        );
+        let group = &built(&Statement::Mean { of, value }, &functions).groups[0];
+        let mean = group.rows.multiply(&theta)[0];
+        assert!((mean - found / 10.0).abs() < 1e-12, "{basis:?}");
+        assert_eq!(group.name, "mean of mass = 1");
+        assert_eq!(group.bounds(0), [1.0, 1.0]);
+
+        let slope = Statement::Slope {
+            of,
+            min: Some(-1.0),
+            max: None,
+        };
+        for group in &built(&slope, &functions).groups {
+            if matches!(basis, Basis::PiecewiseConstant { .. }) {
+                continue;
+            }
+            for (i, value) in group.rows.multiply(&theta).iter().enumerate() {
+                let [from, to] = group.times[i];
+                let slope = dense(&functions, &theta, 0, 1, &[0.5 * (from + to)])[0];
+                assert!(
+                    (value - slope).abs() < 1e-9 * (1.0 + slope.abs()),
+                    "{basis:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn one_row_for_every_value_that_can_differ() {
+    let rows = |basis: &Basis, statement: &Statement| {
+        let functions = functions([basis, &Basis::Constant, &Basis::Constant]);
+        let groups = built(statement, &functions).groups;
+        groups.iter().map(|g| g.rows.len()).collect::<Vec<_>>()
+    };
+    let positive = Statement::Bounds {
+        of: MASS,
+        min: Some(Limit::Number(0.0)),
+        max: None,
+    };
+    let falls = shape(MASS, Shape::NonIncreasing);
+    let convex = shape(MASS, Shape::Convex);
+    let counts: Vec<_> = (bases().iter())
+        .map(|b| [rows(b, &positive), rows(b, &falls), rows(b, &convex)].concat())
+        .collect();
+    let expected: Vec<Vec<usize>> = vec![
+        vec![NODES, NODES - 1, NODES - 2],
+        vec![1],
+        vec![4, 3, 2],
+        vec![5, 4, 3],
+        vec![11, 10, 9],
+        vec![2, 1],
+        vec![NODES, NODES, NODES],
+        vec![NODES, NODES, 5],
+    ];
+    assert_eq!(counts, expected);
+}
+
+#[test]
+fn what_is_projected_satisfies_the_statement_between_the_nodes() {
+    let limit = |t: f64| 0.2 + 0.3 * (t - 1.0) / 10.0 * ((t - 1.0) * 2.0).sin();
+    let moving = Statement::Bounds {
+        of: MASS,
+        min: Some(Limit::Nodal {
+            name: "a column".into(),
+            values: grid().times().iter().map(|t| limit(*t)).collect(),
+        }),
+        max: None,
+    };
+    for (seed, basis) in bases().iter().enumerate() {
+        let functions = functions([basis, &Basis::Nodal, &Basis::Nodal]);
+        let times = tested(basis);
+        let values = |statement: &Statement, q: usize| {
+            let theta = inside(&built(statement, &functions), &functions, seed as u64);
+            dense(&functions, &theta, 0, q, &times)
+        };
+        let slack = 1e-7;
+        for p in values(&bounds(MASS, 0.5, 1.5), 0) {
+            assert!((0.5 - slack..=1.5 + slack).contains(&p), "{basis:?} {p}");
+        }
+        for (p, t) in values(&moving, 0).iter().zip(&times) {
+            // Limits are linear between the nodes.
+            let x = (t - 1.0) / grid().step();
+            let cell = (x as usize).min(NODES - 2);
+            let share = x - cell as f64;
+            let [a, b] = [limit(grid().time(cell)), limit(grid().time(cell + 1))];
+            let least = a * (1.0 - share) + b * share;
+            assert!(*p >= least - slack, "{basis:?} {t}: {p} {least}");
+        }
+        if matches!(basis, Basis::Constant) {
+            continue;
+        }
+        let theta =
+            |statement: &Statement| inside(&built(statement, &functions), &functions, seed as u64);
+        let falling = theta(&shape(MASS, Shape::NonIncreasing));
+        assert!(falls(&functions, &falling, 0, 0), "{basis:?}");
+        if !matches!(basis, Basis::PiecewiseConstant { .. }) {
+            let slope = Statement::Slope {
+                of: MASS,
+                min: Some(-0.1),
+                max: Some(0.2),
+            };
+            for p in values(&slope, 1) {
+                assert!((-0.1 - slack..=0.2 + slack).contains(&p), "{basis:?} {p}");
+            }
+        }
+        if !matches!(
+            basis,
+            Basis::PiecewiseConstant { .. } | Basis::Polynomial { degree: 1 }
+        ) {
+            let bent = theta(&shape(MASS, Shape::Concave));
+            assert!(falls(&functions, &bent, 0, 1), "{basis:?}");
+        }
+    }
+}
+
+#[test]
+fn two_functions_at_once() {
+    for (i, mass) in bases().iter().enumerate() {
+        for (j, other) in bases().iter().enumerate() {
+            let functions = functions([mass, other, other]);
+            let seed = (10 * i + j) as u64;
+            let times = match is_piecewise(mass) && is_piecewise(other) {
+                true => fine(),
+                false => grid().times(),
+            };
+            let slack = 1e-6;
+            let band = Statement::Frequency {
+                min: Some(0.1),
+                max: Some(0.5),
+            };
+            let theta = inside(&built(&band, &functions), &functions, seed);
+            let m = dense(&functions, &theta, 0, 0, &times);
+            let k = dense(&functions, &theta, 2, 0, &times);
+            for (m, k) in m.iter().zip(&k) {
+                assert!(*k >= (TAU * 0.1).powi(2) * m - slack, "{mass:?} {other:?}");
+                assert!(*k <= (TAU * 0.5).powi(2) * m + slack, "{mass:?} {other:?}");
+            }
+
+            let theta = inside(&built(&Statement::Passive, &functions), &functions, seed);
+            let m = dense(&functions, &theta, 0, 1, &times);
+            let c = dense(&functions, &theta, 1, 0, &times);
+            for (c, slope) in c.iter().zip(&m) {
+                assert!(c - 0.5 * slope >= -slack, "{mass:?} {other:?} {c} {slope}");
+            }
+            assert!(falls(&functions, &theta, 2, 0), "{other:?}");
+        }
+    }
+}
+
+#[test]
+fn equal_functions() {
+    for a in bases() {
+        for b in bases() {
+            let functions = functions([&Basis::Constant, &a, &b]);
+            let statement = Statement::Equal {
+                first: DAMPING,
+                second: STIFFNESS,
+                ratio: 2.0,
+            };
+            let constraints = built(&statement, &functions);
+            assert!(constraints.groups[0].rows.len() <= functions.parameters());
+            let theta = inside(&constraints, &functions, 3);
+            let times = grid().times();
+            let c = dense(&functions, &theta, 1, 0, &times);
+            let k = dense(&functions, &theta, 2, 0, &times);
+            for (c, k) in c.iter().zip(&k) {
+                assert!((c - 2.0 * k).abs() < 1e-6, "{a:?} {b:?} {c} {k}");
+            }
+        }
+    }
+}
+
+/// The rows hold where functions known at the nodes satisfy them.
+fn holds(constraints: &Constraints, device: [&dyn Fn(f64) -> f64; 3]) -> bool {
+    let values = |f: &dyn Fn(f64) -> f64| grid().times().into_iter().map(f).collect::<Vec<_>>();
+    let theta = device.map(values).concat();
+    constraints.hold(&theta, 1e-9)
+}
+
+#[test]
+fn the_true_device_is_passive_and_a_stiffening_spring_is_not() {
+    let nodal = functions([&Basis::Nodal; 3]);
+    let passive = built(&Statement::Passive, &nodal);
+    let names: Vec<&str> = passive.groups.iter().map(|g| g.name.as_str()).collect();
+    assert_eq!(names, ["passive: c >= m'/2", "passive: k' <= 0"]);
+    let decay = |t: f64| 1.0 - 0.02 * t;
+    assert!(holds(&passive, [&decay, &|_| 0.0, &|_| 1.0]));
+    assert!(!holds(&passive, [&decay, &|_| 0.0, &|t| 1.0 + 0.01 * t]));
+    let growth = |t: f64| 1.0 + 0.02 * t;
+    assert!(!holds(&passive, [&growth, &|_| 0.0, &|_| 1.0]));
+    assert!(holds(&passive, [&growth, &|_| 0.01, &|_| 1.0]));
+
+    // A mass with jumps may only jump down, and damps nothing in between.
+    let knots = uniform_knots(&grid(), 3);
+    let jumps = functions([
+        &Basis::PiecewiseConstant { knots },
+        &Basis::Constant,
+        &Basis::Constant,
+    ]);
+    let passive = built(&Statement::Passive, &jumps);
+    assert!(passive.hold(&[1.0, 0.9, 0.0, 1.0], 0.0));
+    assert!(!passive.hold(&[1.0, 1.1, 5.0, 1.0], 1e-9));
+    assert!(!passive.hold(&[1.0, 0.9, -0.1, 1.0], 1e-9));
+}
+
+#[test]
+fn the_cone_is_the_cap_on_the_damping_ratio() {
+    let constants = |mass: f64, stiffness: f64| {
+        let list = [(MASS, mass), (DAMPING, 1.0), (STIFFNESS, stiffness)];
+        collect(list.map(|(q, p)| free(q, &Basis::Constant, p)).into())
+    };
+    let zeta: f64 = 0.2;
+    for [mass, stiffness] in [[1.0, 1.0], [1e-3, 5e4], [2e5, 3.0]] {
+        let functions = constants(mass, stiffness);
+        let cones = built(&Statement::DampingRatio { max: zeta }, &functions);
+        assert_eq!(cones.cones[0].cones.len(), 1);
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        for _ in 0..1000 {
+            let m: f64 = mass * random.random_range(0.0..2.0);
+            let k: f64 = stiffness * random.random_range(0.0..2.0);
+            let limit = 2.0 * zeta * (m * k).sqrt();
+            let c = limit * random.random_range(-2.0..2.0);
+            if (c.abs() - limit).abs() < 1e-6 * limit {
+                continue;
+            }
+            let capped = c * c <= 4.0 * zeta * zeta * m * k;
+            assert_eq!(cones.hold(&[m, c, k], 1e-12), capped, "{m} {c} {k}");
+        }
+        assert!(!cones.hold(&[-mass, 0.0, -stiffness], 1e-9));
+    }
+    // Between nodes it holds too, and fixed functions are constants of the cone.
+    let nodal = functions([&Basis::Nodal, &Basis::Nodal, &Basis::Nodal]);
+    let cap = built(&Statement::DampingRatio { max: zeta }, &nodal);
+    assert_eq!(cap.cones[0].cones.len(), NODES);
+    let theta = inside(&cap, &nodal, 5);
+    let [m, c, k] = [0, 1, 2].map(|j| dense(&nodal, &theta, j, 0, &fine()));
+    for ((m, c), k) in m.iter().zip(&c).zip(&k) {
+        assert!(c * c <= 4.0 * zeta * zeta * m * k + 1e-6, "{m} {c} {k}");
+    }
+    let known = CoefficientFunction::fixed(STIFFNESS, vec![4.0; NODES]);
+    let list = vec![
+        free(MASS, &Basis::Constant, 1.0),
+        free(DAMPING, &Basis::Constant, 1.0),
+        known,
+    ];
+    let cap = built(&Statement::DampingRatio { max: zeta }, &collect(list));
+    assert!(cap.hold(&[1.0, 0.8], 1e-12));
+    assert!(!cap.hold(&[1.0, 0.81], 1e-12));
+}
+
+#[test]
+fn fixed_functions_move_to_the_bounds() {
+    let known = |q: Quantity, f: &dyn Fn(f64) -> f64| {
+        CoefficientFunction::fixed(q, grid().times().into_iter().map(f).collect())
+    };
+    let with = |k: CoefficientFunction| {
+        let knots = uniform_knots(&grid(), 3);
+        let mass = free(MASS, &Basis::PiecewiseLinear { knots }, 1.0);
+        collect(vec![mass, free(DAMPING, &Basis::Constant, 1.0), k])
+    };
+    let flat = with(known(STIFFNESS, &|_| 2.0));
+    let band = Statement::Frequency {
+        min: None,
+        max: Some(0.5),
+    };
+    let groups = built(&band, &flat).groups;
+    // A bound on each knot of the mass alone.
+    assert_eq!(groups[0].rows.len(), 3);
+    for i in 0..3 {
+        assert!(groups[0].single(i).is_some());
+        assert_eq!(groups[0].bounds(i), [f64::NEG_INFINITY, -2.0]);
+    }
+    // Only what is about free functions is left of passivity.
+    let names = |f: &Functions| {
+        let groups = built(&Statement::Passive, f).groups;
+        groups.into_iter().map(|g| g.name).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&flat), ["passive: c >= m'/2"]);
+    let rising = with(known(STIFFNESS, &|t| 1.0 + t));
+    let broken = Statement::Passive.build(&grid(), &rising);
+    assert!(matches!(broken, Err(Impossible::Broken { name, .. }) if name == "passive: k' <= 0"));
+    assert_eq!(
+        bounds(STIFFNESS, 0.0, 1.0).build(&grid(), &flat),
+        Err(Impossible::Fixed(vec![STIFFNESS]))
+    );
+    // A line cannot be a parabola.
+    let bent = with(known(STIFFNESS, &|t| 1.0 + t * t));
+    let equal = Statement::Equal {
+        first: MASS,
+        second: STIFFNESS,
+        ratio: 1.0,
+    };
+    assert!(matches!(
+        equal.build(&grid(), &bent),
+        Err(Impossible::Broken { .. })
+    ));
+    let theta = inside(&built(&equal, &rising), &rising, 2);
+    let mass = dense(&rising, &theta, 0, 0, &fine());
+    for (m, t) in mass.iter().zip(fine()) {
+        assert!((m - 1.0 - t).abs() < 1e-6, "{m} {t}");
+    }
+}
+
+#[test]
+fn bounds_and_fixed_values_hold_exactly() {
+    for basis in bases() {
+        if !is_piecewise(&basis) || matches!(basis, Basis::Polynomial { .. }) {
+            continue;
+        }
+        let functions = functions([&basis; 3]);
+        let (low, high) = (0.1 + 0.2, 1.0 / 0.7);
+        let mut constraints = built(&bounds(MASS, low, high), &functions);
+        constraints.extend(built(&bounds(DAMPING, 0.3, 0.3), &functions));
+        constraints.extend(built(
+            &Statement::Value {
+                of: STIFFNESS,
+                at: 1.0,
+                value: 0.7,
+            },
+            &functions,
+        ));
+        assert!(constraints.are_simple(), "{basis:?}");
+        let mut theta = random(functions.parameters(), 9);
+        constraints.clip(&mut theta);
+        assert!(constraints.hold(&theta, 0.0));
+        let knots = basis.knot_times(&grid());
+        let m = dense(&functions, &theta, 0, 0, &knots);
+        assert!(m.iter().all(|m| (low..=high).contains(m)), "{basis:?}");
+        assert!(
+            dense(&functions, &theta, 1, 0, &knots)
+                .iter()
+                .all(|c| *c == 0.3)
+        );
+        assert_eq!(dense(&functions, &theta, 2, 0, &[1.0]), [0.7]);
+    }
+}
+
+fn problem(functions: Functions) -> Problem {
+    let oscillator = Oscillator {
+        grid: grid(),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let initial = State {
+        displacement: 1.0,
+        velocity: 0.0,
+    };
+    let experiment = Experiment::free("none", initial, oscillator.grid.nodes());
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+#[test]
+fn a_contradiction_names_exactly_the_two() {
+    let functions = functions([&Basis::Nodal; 3]);
+    let statements = [
+        bounds(DAMPING, 0.0, 5.0),
+        bounds(MASS, 1.0, 3.0),
+        shape(MASS, Shape::NonIncreasing),
+        Statement::Mean {
+            of: MASS,
+            value: 0.5,
+        },
+        Statement::Value {
+            of: STIFFNESS,
+            at: 1.0,
+            value: 1.0,
+        },
+    ];
+    let mut problem = problem(functions);
+    for statement in &statements {
+        let rows = built(statement, &problem.functions);
+        problem.constraints.extend(rows);
+    }
+    let start = problem.functions.start();
+    assert_eq!(
+        problem.feasible_start(&start),
+        Start::Contradiction(vec!["mass >= 1".into(), "mean of mass = 0.5".into()])
+    );
+    problem
+        .constraints
+        .groups
+        .retain(|g: &RowGroup| g.name != "mean of mass = 0.5");
+    assert_eq!(problem.feasible_start(&start), Start::Kept(start));
+}

@@ -1,0 +1,104 @@
+//! Cost and gradient in one go are those of an evaluation and its adjoint, whichever way they take.
+
+mod common;
+
+use common::paper_problem;
+use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::dynamics::Cause;
+use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
+use kmcfit_core::internals::problem::Problem;
+
+/// Rounding of the same sums in another order, relative to the largest entry.
+const ROUNDING: f64 = 1e-11;
+
+fn agree(problem: &Problem, theta: &[f64]) {
+    let mut gradient = vec![f64::NAN; theta.len()];
+    let cost = problem.cost_and_gradient(theta, &mut gradient).unwrap();
+    let evaluation = problem.evaluate(theta).unwrap();
+    let expected = problem.gradient(theta, &evaluation, GradientKind::Discrete);
+    assert!((cost - evaluation.cost).abs() <= ROUNDING * evaluation.cost);
+    let scale = expected
+        .euclidean
+        .iter()
+        .fold(0.0, |most: f64, g| most.max(g.abs()));
+    assert!(scale > 0.0);
+    for (i, (g, e)) in gradient.iter().zip(&expected.euclidean).enumerate() {
+        assert!((g - e).abs() <= ROUNDING * scale, "{i}: {g} {e}");
+    }
+}
+
+/// A start that is no constant.
+fn uneven(problem: &Problem) -> Vec<f64> {
+    let start = problem.start();
+    let wave = |(i, p): (usize, &f64)| p * (1.0 + 0.1 * (0.37 * i as f64).sin());
+    start.iter().enumerate().map(wave).collect()
+}
+
+#[test]
+fn of_one_value_a_node() {
+    // The last is long enough for several tiles and, where there are two cores, two threads.
+    for nodes in [65, 100, 2000, 4097, 120_000] {
+        let problem = paper_problem(nodes, [2.0, 1.0, 1.0]);
+        agree(&problem, &uneven(&problem));
+    }
+}
+
+#[test]
+fn with_a_sigma_and_with_penalties() {
+    let mut problem = paper_problem(300, [2.0, 1.0, 1.0]);
+    let readings = problem.experiments[0].channels[0].observed().to_vec();
+    let grid = problem.oscillator.grid;
+    let sigma = Weighting::Sigma(0.1);
+    let channel = Channel::displacement_at_nodes(readings.clone(), 1, sigma, &grid);
+    problem.experiments[0].channels = vec![channel];
+    agree(&problem, &uneven(&problem));
+
+    let parts = [2.0, 1.0, 1.0].map(|start| Part::nodal(start).smooth(1, 0.3));
+    let record = Record::new("free decay")
+        .from_state(3.3, 1.0)
+        .displacement(&grid.times(), &readings);
+    let method = problem.oscillator.method;
+    let smooth = Builder::new(parts)
+        .record(record)
+        .method(method)
+        .build()
+        .unwrap();
+    agree(&smooth, &uneven(&smooth));
+}
+
+/// Every second node is read, or other bases are sought: no short way.
+#[test]
+fn of_everything_else() {
+    let mut problem = paper_problem(301, [2.0, 1.0, 1.0]);
+    let grid = problem.oscillator.grid;
+    let readings: Vec<f64> = problem.experiments[0].channels[0].observed().to_vec();
+    let half: Vec<f64> = readings.iter().copied().step_by(2).collect();
+    let spacing = 2.0 * grid.step();
+    let channel = Channel::displacement_at_nodes(half, 2, Weighting::Integral { spacing }, &grid);
+    problem.experiments[0].channels = vec![channel];
+    agree(&problem, &uneven(&problem));
+
+    let parts = [
+        Part::piecewise_linear(5, 2.0),
+        Part::constant(1.0),
+        Part::b_spline(4, 1.0),
+    ];
+    let record = Record::new("free decay")
+        .from_state(3.3, 1.0)
+        .displacement(&grid.times(), &readings);
+    let knots = Builder::new(parts).record(record).build().unwrap();
+    agree(&knots, &uneven(&knots));
+}
+
+#[test]
+fn a_mass_that_is_not_positive_is_a_breakdown() {
+    let problem = paper_problem(200, [2.0, 1.0, 1.0]);
+    let mut theta = problem.start();
+    theta[77] = -0.5;
+    let broken = problem.cost_and_gradient(&theta, &mut vec![0.0; theta.len()]);
+    let broken = broken.unwrap_err();
+    assert_eq!(
+        (broken.cause, broken.node, broken.value),
+        (Cause::Mass, 77, -0.5)
+    );
+}

@@ -1,0 +1,227 @@
+//! The start from the equation of motion: what fixes the common scale of m, c and k, and what only
+//! looks as if it did.
+
+mod common;
+
+use common::synthetic::Truth;
+use kmcfit_core::internals::constraints::RowGroup;
+use kmcfit_core::internals::dynamics::{ChannelKind, Device, Excitation, Method, Term};
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
+use kmcfit_core::internals::objective::{Channel, Weighting};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::equation_error;
+
+const NODES: usize = 401;
+const START: f64 = 2.0;
+
+/// Free motion of m = 1, c = 0, k = 1.5, a force of zero if asked for; m and k are constants to be
+/// found from a mass of 2, c is fixed at `damping`, or sought if that is `None`.
+fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
+    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let damping = match damping {
+        Some(value) => CoefficientFunction::fixed(Quantity::Damping, vec![value; NODES]),
+        None => CoefficientFunction::constant(Quantity::Damping, 0.5, NODES),
+    };
+    let list = vec![
+        CoefficientFunction::constant(Quantity::Mass, START, NODES),
+        damping,
+        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+    ];
+    let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
+    if silent_force {
+        problem.experiments[0].excitation = Some(Excitation::force_at_nodes(&vec![0.0; NODES]));
+    }
+    problem
+}
+
+/// `value` as the only value of parameter `j`.
+fn fixed(j: usize, value: f64) -> RowGroup {
+    let mut group = RowGroup::new("fixed");
+    group.push([(j, 1.0)], [value, value], [0.0, 0.0]);
+    group
+}
+
+/// The differences are of order 4 and the smoothing is as rough as the noise that it estimates: the
+/// ratio of k to m is found to per mille.
+fn close(found: f64, expected: f64) {
+    assert!(
+        (found - expected).abs() < 5e-3 * expected.abs().max(1.0),
+        "{found} {expected}"
+    );
+}
+
+/// What says nothing about the scale leaves the mass at its start: without that the equation is
+/// solved best by a device of nothing.
+#[test]
+fn the_mass_keeps_its_mean_where_nothing_fixes_the_scale() {
+    let mut with_zero = problem(None, false);
+    with_zero.constraints.groups.push(fixed(1, 0.0));
+    let mut bounded = problem(None, false);
+    let mut group = RowGroup::new("mass > 0");
+    group.push([(0, 1.0)], [0.05, f64::INFINITY], [0.0, 0.0]);
+    bounded.constraints.groups.push(group);
+    let cases = [
+        ("nothing", problem(None, false)),
+        ("a function fixed at zero", problem(Some(0.0), false)),
+        ("a force that is zero", problem(None, true)),
+        ("an equality with zero", with_zero),
+        ("an inequality", bounded),
+    ];
+    for (name, problem) in cases {
+        let found = equation_error(&problem, &problem.functions.start()).unwrap();
+        println!("{name}: {found:?}");
+        close(found[0], START);
+        close(*found.last().unwrap(), 1.5 * START);
+    }
+}
+
+#[test]
+fn a_fixed_function_or_value_sets_the_scale() {
+    // c = 0.1 is known, so m is 1, not 2.
+    let known = problem(Some(0.1), false);
+    let found = equation_error(&known, &known.functions.start()).unwrap();
+    assert!((found[0] - 1.0).abs() < 0.1, "{found:?}");
+    // k = 3 is demanded, so m is 2 k/m apart from it; an equality far smaller than the start as well.
+    for value in [3.0, 3e-7] {
+        let mut demanded = problem(None, false);
+        demanded.constraints.groups.push(fixed(2, value));
+        let found = equation_error(&demanded, &demanded.functions.start()).unwrap();
+        assert!(
+            (found[0] / (value / 1.5) - 1.0).abs() < 5e-3,
+            "{value}: {found:?}"
+        );
+    }
+}
+
+/// A device need not have a damping, nor a stiffness in any place of its list.
+#[test]
+fn a_spring_alone_has_an_equation_too() {
+    let mut oscillator = common::oscillator(NODES, Method::Rk4);
+    oscillator.terms = vec![Term::Stiffness];
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![1.5; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+    ];
+    let problem = common::problem_of(oscillator, list, motion.displacement, None);
+    let found = equation_error(&problem, &problem.functions.start()).unwrap();
+    close(found[0], 1.5);
+}
+
+/// Velocities at irregular times, with next to no noise: integrated without losing the displacement,
+/// though their spectrum is not that of as many equally spaced values.
+#[test]
+fn irregular_velocities_are_integrated() {
+    let mut problem = problem(Some(0.1), false);
+    let grid = problem.oscillator.grid;
+    let late = |i: usize| 0.4 * (1.0 + (1.7 * i as f64).sin() * (0.3 * i as f64).cos());
+    let times: Vec<f64> = (0..100).map(|i| 0.25 * (i as f64 + late(i))).collect();
+    let truth = Device {
+        mass: vec![1.0; NODES],
+        coefficients: vec![vec![0.1; NODES], vec![1.5; NODES]],
+    };
+    let maker = Truth {
+        oscillator: &problem.oscillator,
+        device: &truth,
+        excitation: None,
+        initial: common::INITIAL,
+    };
+    let kind = ChannelKind::Velocity;
+    let values = maker.seen(kind, &times, &[]);
+    let weighting = Weighting::Sigma(1e-3);
+    let channel = Channel::new(kind, times, values, weighting, &grid, NODES).unwrap();
+    problem.experiments[0].channels = vec![channel];
+    let found = equation_error(&problem, &problem.functions.start()).unwrap();
+    // The damping is known, so the scale is: to the few per cent of a start.
+    let ratio = found[1] / found[0];
+    assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
+}
+
+/// Mass, stiffness and readings in other units, and the penalty with them: the readings count as they did,
+/// so the start is the same but for the unit.
+#[test]
+fn the_start_knows_no_unit_of_mass_or_length() {
+    let plain = problem(Some(0.0), false);
+    let observed = plain.experiments[0].channels[0].observed().to_vec();
+    let observed = common::synthetic::with_noise(&observed, 0.05, 4);
+    let start = |unit: f64, length: f64, weight: f64| -> Vec<f64> {
+        let basis = Basis::PiecewiseLinear {
+            knots: uniform_knots(&plain.oscillator.grid, 6),
+        };
+        let rows = basis.roughness(&plain.oscillator.grid, 1);
+        let stiffness = vec![unit; 6];
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![unit; NODES]),
+            CoefficientFunction::fixed(Quantity::Damping, vec![0.0; NODES]),
+            CoefficientFunction::free(
+                Quantity::Stiffness,
+                basis,
+                &plain.oscillator.grid,
+                stiffness,
+            ),
+        ];
+        let observed = observed.iter().map(|y| y * length).collect();
+        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        let weight = weight * (length / unit).powi(2);
+        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        let found = equation_error(&problem, &problem.functions.start()).unwrap();
+        found.iter().map(|k| k / unit).collect()
+    };
+    let most = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        pairs.fold(0.0, f64::max)
+    };
+    let smoothed = start(1.0, 1.0, 1e2);
+    // The penalty has its part in it.
+    let free = start(1.0, 1.0, 1e-6);
+    assert!(most(&smoothed, &free) > 1e-3, "{smoothed:?} {free:?}");
+    for (unit, length) in [(1e-3, 1.0), (1e3, 1.0), (1.0, 1e-3), (1.0, 1e3)] {
+        let other = start(unit, length, 1e2);
+        assert!(most(&other, &smoothed) < 1e-6, "{other:?} {smoothed:?}");
+    }
+}
+
+/// How much a penalty smooths is told by the spring's force and the mass's at the start, whatever a
+/// damping that is sought begins with.
+#[test]
+fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
+    let plain = problem(Some(0.0), false);
+    let observed = plain.experiments[0].channels[0].observed().to_vec();
+    let observed = common::synthetic::with_noise(&observed, 0.05, 4);
+    let start = |damping: f64, weight: f64| {
+        let grid = plain.oscillator.grid;
+        let basis = Basis::PiecewiseLinear {
+            knots: uniform_knots(&grid, 6),
+        };
+        let rows = basis.roughness(&grid, 1);
+        let list = vec![
+            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
+            CoefficientFunction::constant(Quantity::Damping, damping, NODES),
+            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, vec![1.0; 6]),
+        ];
+        let observed = observed.clone();
+        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        equation_error(&problem, &problem.functions.start()).unwrap()
+    };
+    let most = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        pairs.fold(0.0, f64::max)
+    };
+    let smoothed = start(0.01, 1e2);
+    let free = start(0.01, 1e-6);
+    assert!(most(&smoothed, &free) > 1e-3, "{smoothed:?} {free:?}");
+    let other = start(10.0, 1e2);
+    // The pull towards the start, which is 1e-9 of the equation.
+    assert!(most(&other, &smoothed) < 1e-5, "{other:?} {smoothed:?}");
+}

@@ -1,0 +1,217 @@
+//! Problems without a device, and quadratic programs without an answer: the fit ends with a word for
+//! it, and keeps its best point.
+
+mod common;
+
+use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
+use kmcfit_core::internals::dynamics::{Device, Method};
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::qp::project;
+use kmcfit_core::internals::solvers::{
+    Fit, FitSettings, Initial, Solver, Start, Status, Stopping, fit,
+};
+
+const NODES: usize = 101;
+const UNBOUNDED: f64 = f64::INFINITY;
+
+/// Readings of a mass that grows, `m = 0.8 + 0.01 t`; the mass is sought in `basis`.
+fn problem(basis: &Basis) -> Problem {
+    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let grid = oscillator.grid;
+    let truth = Device {
+        mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
+        coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let start = basis.constant(&grid, 1.0);
+    let list = vec![
+        CoefficientFunction::free(Quantity::Mass, basis.clone(), &grid, start),
+        CoefficientFunction::constant(Quantity::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; NODES]),
+    ];
+    common::problem_of(oscillator, list, motion.displacement, None)
+}
+
+fn knots() -> Basis {
+    let grid = common::oscillator(NODES, Method::Rk4).grid;
+    Basis::PiecewiseLinear {
+        knots: uniform_knots(&grid, 6),
+    }
+}
+
+/// `lower <= first - second <= upper` for the knots of the mass that follow each other, every row
+/// multiplied by `scale`.
+fn falling(bounds: [f64; 2], scale: f64) -> RowGroup {
+    let mut group = RowGroup::new("mass falls");
+    for j in 0..5 {
+        let row = [(j, scale), (j + 1, -scale)];
+        group.push(row, bounds.map(|b| scale * b), [j as f64, j as f64]);
+    }
+    group
+}
+
+fn run(problem: &Problem, solver: Solver, program_iterations: u32) -> Fit {
+    let settings = FitSettings {
+        solver,
+        initial: Initial::Functions,
+        gradient: GradientKind::Discrete,
+        stopping: Stopping {
+            tolerance: Some(1e-10),
+            program_iterations,
+            ..Stopping::exactly(100)
+        },
+        interrupt: None,
+    };
+    let start = problem.functions.start();
+    fit(problem, &start, &settings, &mut |_| {}).unwrap()
+}
+
+const SOLVERS: [Solver; 2] = [Solver::GaussNewton, Solver::ProjectedGradient];
+
+/// Nothing is lost: the point is finite, and no worse than the start.
+fn keeps_the_best_point(problem: &Problem, found: &Fit) {
+    let finite = found.best.parameters.iter().all(|p| p.is_finite());
+    let cost = found.best.evaluation.cost;
+    assert!(finite && cost.is_finite(), "{:?}", found.best.parameters);
+    let start = problem.evaluate(&problem.functions.start()).unwrap().cost;
+    assert!(cost <= start, "{cost} {start}");
+    let again = problem.evaluate(&found.best.parameters).unwrap().cost;
+    assert_eq!(cost, again);
+}
+
+#[test]
+fn a_stalled_program_ends_a_fit_with_its_best_point() {
+    for solver in SOLVERS {
+        let mut problem = problem(&knots());
+        // The data push against it from the first iteration on, and no clipping will do.
+        problem.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+        let solved = run(&problem, solver, Stopping::default().program_iterations);
+        assert_eq!(solved.outcome.status, Status::Converged, "{solver:?}");
+        // Without an iteration every program is refused.
+        let found = run(&problem, solver, 0);
+        assert_eq!(found.outcome.status, Status::Stalled, "{solver:?}");
+        assert!(found.outcome.reason.contains("solver stalled"));
+        assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
+        keeps_the_best_point(&problem, &found);
+        // A start within the constraints may be as low, but nothing is lower than the minimum.
+        let (cost, least) = (found.best.evaluation.cost, solved.best.evaluation.cost);
+        assert!(
+            cost >= (1.0 - 1e-6) * least,
+            "{solver:?}: {cost:e} {least:e}"
+        );
+    }
+}
+
+/// A program may also stall after some were solved: whatever the limit, what was reached is kept, and
+/// more iterations for each program never bring a worse end.
+#[test]
+fn a_program_that_stalls_on_the_way_costs_nothing_that_was_reached() {
+    let mut problem = problem(&knots());
+    problem.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+    let ends: Vec<Fit> = (4..=16)
+        .step_by(2)
+        .map(|limit| run(&problem, Solver::GaussNewton, limit))
+        .collect();
+    for found in &ends {
+        let status = found.outcome.status;
+        assert!(matches!(status, Status::Stalled | Status::Converged));
+        assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
+        keeps_the_best_point(&problem, found);
+    }
+    let last = ends.last().unwrap();
+    assert_eq!(last.outcome.status, Status::Converged);
+}
+
+/// Rows with factors from 1e-200 to 1e200 say the same as rows of size 1; rows whose own entries are
+/// that far apart are beyond any solver. Either way there is a word for the end and a point.
+#[test]
+fn badly_scaled_constraints_cost_no_point() {
+    let mut mixed = RowGroup::new("sizes apart");
+    mixed.push([(0, 1e-150), (1, 1e150)], [0.0, UNBOUNDED], [0.0, 0.0]);
+    mixed.push([(2, 1e-9), (3, -1e9), (4, 1.0)], [-1.0, 1e9], [0.0, 0.0]);
+    let groups = [
+        falling([0.0, UNBOUNDED], 1e-200),
+        falling([0.0, UNBOUNDED], 1e200),
+        falling([0.0, 1e-300], 1.0),
+        mixed,
+    ];
+    for (i, group) in groups.into_iter().enumerate() {
+        for solver in SOLVERS {
+            let mut problem = problem(&knots());
+            problem.constraints.groups = vec![group.clone()];
+            let start = match problem.feasible_start(&problem.functions.start()) {
+                Start::Kept(start) => start,
+                Start::Moved { parameters, .. } => parameters,
+                // A program that stalls here is said before there is a fit.
+                Start::Unsolved(_) => continue,
+                other => panic!("{i} {solver:?}: {other:?}"),
+            };
+            problem.functions = problem.functions.clone().with_start(&start);
+            let found = run(&problem, solver, 100);
+            println!("{i} {solver:?}: {:?}", found.outcome);
+            keeps_the_best_point(&problem, &found);
+            assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
+        }
+    }
+}
+
+/// From a start outside of constraints that contradict each other no step leads anywhere.
+#[test]
+fn contradictory_constraints_are_infeasible_where_nobody_looked_before() {
+    for solver in SOLVERS {
+        let mut problem = problem(&knots());
+        problem.constraints.groups = vec![
+            falling([0.1, UNBOUNDED], 1.0),
+            falling([-UNBOUNDED, -0.1], 1.0),
+        ];
+        let found = run(&problem, solver, 100);
+        assert_eq!(found.outcome.status, Status::Infeasible, "{solver:?}");
+        assert_eq!(found.best.parameters, problem.functions.start());
+        keeps_the_best_point(&problem, &found);
+    }
+}
+
+/// The nearest function that goes through three points dips below zero between two of them; the
+/// nearest that is positive does not.
+#[test]
+fn a_start_is_moved_to_where_there_is_a_mass() {
+    let basis = Basis::Polynomial { degree: 4 };
+    let mut problem = problem(&basis);
+    let grid = problem.oscillator.grid;
+    let times = [0.0, 12.5, 18.75];
+    let mut group = RowGroup::new("three masses");
+    for (row, value) in basis
+        .rows(&grid, &times, 0)
+        .row_iter()
+        .zip([3.0, 1e-3, 1e-3])
+    {
+        let entries = row
+            .col_indices()
+            .iter()
+            .copied()
+            .zip(row.values().iter().copied());
+        group.push(entries, [value, value], [0.0, 0.0]);
+    }
+    problem.constraints = Constraints {
+        groups: vec![group],
+        cones: Vec::new(),
+    };
+    let start = problem.functions.start();
+    let least = |theta: &[f64]| {
+        let mass = problem.functions.device(theta).mass;
+        mass.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let metric = problem.functions.gram_diagonal();
+    let nearest = project(&problem.constraints, &start, &metric).theta;
+    assert!(least(&nearest) < 0.0, "{}", least(&nearest));
+    match problem.feasible_start(&start) {
+        Start::Moved { parameters, .. } => {
+            assert!(least(&parameters) > 0.0);
+            assert!(problem.constraints.hold(&parameters, TOLERANCE));
+        }
+        other => panic!("{other:?}"),
+    }
+}

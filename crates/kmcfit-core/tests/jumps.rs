@@ -1,0 +1,140 @@
+//! A stiffness that jumps: total variation finds it, squared smoothness does not.
+
+mod common;
+
+use kmcfit_core::internals::dynamics::{Device, Method};
+use kmcfit_core::internals::functions::basis::uniform_knots;
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, Design, Penalty, Quantity, Variation,
+};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping, fit};
+use nalgebra_sparse::{CooMatrix, CsrMatrix};
+
+const SIGMA: f64 = 0.02;
+const JUMP: f64 = 12.0;
+const KNOTS: usize = 51;
+
+fn problem() -> (Problem, Vec<f64>) {
+    let oscillator = common::oscillator(2000, Method::Rk4);
+    let grid = oscillator.grid;
+    let nodes = grid.nodes();
+    let level = |t: f64| if t < JUMP { 2.0 } else { 1.6 };
+    let stiffness: Vec<f64> = grid.times().iter().map(|t| level(*t)).collect();
+    let truth = Device {
+        mass: vec![1.0; nodes],
+        coefficients: vec![vec![0.05; nodes], stiffness],
+    };
+    let observed = common::noisy(&oscillator, &truth, SIGMA, 1);
+    let knots = uniform_knots(&grid, KNOTS);
+    let cells = knots
+        .windows(2)
+        .map(|w| level(0.5 * (w[0] + w[1])))
+        .collect();
+    let basis = Basis::PiecewiseConstant { knots };
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
+        CoefficientFunction::constant(Quantity::Damping, 0.1, nodes),
+        CoefficientFunction::free(
+            Quantity::Stiffness,
+            basis.clone(),
+            &grid,
+            vec![1.8; KNOTS - 1],
+        ),
+    ];
+    (
+        common::problem_of(oscillator, list, observed, Some(SIGMA)),
+        cells,
+    )
+}
+
+fn differences() -> CsrMatrix<f64> {
+    let mut rows = CooMatrix::new(KNOTS - 2, KNOTS - 1);
+    for i in 0..KNOTS - 2 {
+        rows.push(i, i, -1.0);
+        rows.push(i, i + 1, 1.0);
+    }
+    CsrMatrix::from(&rows)
+}
+
+fn stiffness(problem: &Problem) -> Vec<f64> {
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Discrete,
+        stopping: Stopping {
+            tolerance: Some(1e-8),
+            ..Stopping::exactly(60)
+        },
+        interrupt: None,
+    };
+    let found = fit(problem, &problem.functions.start(), &settings, &mut |_| {}).unwrap();
+    println!(
+        "{:?} {:?} its {}",
+        found.outcome,
+        found.counts,
+        found.history.len()
+    );
+    found.best.parameters[problem.functions.ranges()[2].clone()].to_vec()
+}
+
+/// Cells between which the stiffness changes by more than a quarter of the true jump.
+fn jumps(k: &[f64]) -> Vec<usize> {
+    let changes = k.windows(2).map(|w| (w[1] - w[0]).abs());
+    changes
+        .enumerate()
+        .filter(|(_, c)| *c > 0.1)
+        .map(|(i, _)| i + 1)
+        .collect()
+}
+
+#[test]
+fn total_variation_finds_the_jump_and_both_levels() {
+    let (mut problem, cells) = problem();
+    let rows = Design::Sparse(differences());
+    problem.variations = vec![Variation {
+        function: 2,
+        weight: 300.0,
+        rows,
+    }];
+    let k = stiffness(&problem);
+    let jump = cells.windows(2).position(|w| w[0] != w[1]).unwrap() + 1;
+    assert_eq!(jumps(&k), [jump]);
+    // The jump is found to one knot: the cell beside it may carry a part of it.
+    let beside = |i: usize| i.abs_diff(jump) <= 1;
+    for (i, (k, truth)) in k
+        .iter()
+        .zip(&cells)
+        .enumerate()
+        .filter(|(i, _)| !beside(*i))
+    {
+        assert!(
+            (k / truth - 1.0).abs() < 0.01,
+            "cell {i}: {k} is not {truth}"
+        );
+    }
+}
+
+#[test]
+fn squared_smoothness_smears_the_jump() {
+    let (mut problem, cells) = problem();
+    let Some(basis) = problem
+        .functions
+        .iter()
+        .nth(2)
+        .and_then(|f| f.basis.clone())
+    else {
+        panic!("the stiffness has a basis");
+    };
+    let rows = basis.roughness(&problem.oscillator.grid, 1);
+    for weight in [1e2, 1e3, 1e4] {
+        problem.penalties = vec![Penalty::new(2, 1, weight, rows.clone())];
+        let k = stiffness(&problem);
+        let worst = k
+            .iter()
+            .zip(&cells)
+            .fold(0.0f64, |m, (k, t)| m.max((k / t - 1.0).abs()));
+        assert!(worst > 0.03, "weight {weight}: {worst}");
+    }
+}

@@ -1,0 +1,232 @@
+//! The last rung of the start ladder: a horizon that grows.
+
+mod common;
+
+use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::solvers::{
+    FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
+};
+
+/// Nodes from one reading to the next.
+const STRIDE: usize = 20;
+const READINGS: usize = 121;
+const STIFFNESS: f64 = 101.0;
+
+/// 40 periods with three readings each, and only the stiffness to be found. Differences of so few
+/// readings take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
+/// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
+fn problem() -> Problem {
+    let nodes = STRIDE * (READINGS - 1) + 1;
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let truth = Device {
+        mass: vec![1.0; nodes],
+        coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
+    };
+    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let observed: Vec<f64> = motion.displacement.into_iter().step_by(STRIDE).collect();
+    let step = oscillator.grid.step();
+    // Known to be free of noise: so few readings look like noise to a rule that does not know.
+    let weighting = Weighting::Sigma(1e-8);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
+        CoefficientFunction::fixed(Quantity::Damping, vec![0.05; nodes]),
+        CoefficientFunction::constant(Quantity::Stiffness, 130.0, nodes),
+    ];
+    let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &oscillator.grid);
+    let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
+    let functions = Functions::new(list, nodes, step).unwrap();
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+#[test]
+fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
+    let problem = problem();
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Discrete,
+        stopping: Stopping {
+            tolerance: Some(1e-12),
+            ..Stopping::exactly(100)
+        },
+        interrupt: None,
+    };
+    let start = problem.functions.start();
+    let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
+    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    println!("{:#?}", found.rungs);
+    assert_eq!(names, ["start values", "equation error", "growing horizon"]);
+    let silence = problem.misfit_of_silence();
+    let costs: Vec<f64> = found.rungs.iter().map(|rung| rung.cost).collect();
+    // The first two end in minima that leave per cents of the record, the last at the answer.
+    assert!(
+        costs[0] > 0.05 * silence && costs[1] > 0.05 * silence,
+        "{costs:?} {silence}"
+    );
+    assert!(costs[2] < 1e-12 * silence, "{costs:?} {silence}");
+    assert_eq!(found.best.evaluation.cost, costs[2]);
+    assert_eq!(found.outcome.status, Status::Converged);
+    // Rounding of the motion, 2400 steps, over its sensitivity.
+    let error = (found.best.parameters[0] / STIFFNESS - 1.0).abs();
+    assert!(error < 1e-8, "{error}");
+    // Every search takes a gradient at its start and one after each iteration; those of the three parts
+    // of the record count as well as those of the three rungs.
+    let iterations: u64 = found.rungs.iter().map(|rung| rung.iterations).sum();
+    assert!(
+        found.counts.adjoint >= iterations + 3 + 3,
+        "{:?}",
+        found.counts
+    );
+    let timings = &found.timings;
+    for spent in [
+        timings.forward,
+        timings.adjoint,
+        timings.tangent,
+        timings.start,
+    ] {
+        assert!(!spent.is_zero(), "{timings:?}");
+    }
+    assert!(
+        timings.sum() <= found.elapsed,
+        "{timings:?} {:?}",
+        found.elapsed
+    );
+}
+
+/// A hardening spring under two sines that set in at node `first`, in a record twenty times as long as the beginning
+/// that is looked at, seen every fourth step.
+fn long_record(first: usize) -> (Problem, [f64; 4]) {
+    let nodes = 40_001;
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, 40.0, nodes).unwrap(),
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+    };
+    let truth = [1.0, 1.2, 20.0, 15.0];
+    let device = Device {
+        mass: vec![truth[0]; nodes],
+        coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
+    };
+    let drive = |(i, t): (usize, f64)| match i < first {
+        true => 0.0,
+        false => 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin(),
+    };
+    let force: Vec<f64> = (oscillator.grid.times().into_iter().enumerate())
+        .map(drive)
+        .collect();
+    let excitation = Excitation::force_at_nodes(&force);
+    let rest = State {
+        displacement: 0.0,
+        velocity: 0.0,
+    };
+    let motion = oscillator
+        .forward(&device, rest, Some(&excitation))
+        .unwrap();
+    let observed = motion.displacement.into_iter().step_by(4).collect();
+    let weighting = Weighting::Sigma(1e-4);
+    let channel = Channel::displacement_at_nodes(observed, 4, weighting, &oscillator.grid);
+    let experiment = Experiment::free("two sines", rest, nodes)
+        .with_excitation(excitation)
+        .with_channel(channel);
+    let quantities = [
+        Quantity::Mass,
+        Quantity::Damping,
+        Quantity::Stiffness,
+        Quantity::CubicStiffness,
+    ];
+    let list = quantities.into_iter().zip([1.2, 1.0, 18.0, 12.0]);
+    let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
+    let step = oscillator.grid.step();
+    let functions = Functions::new(list.collect(), nodes, step).unwrap();
+    (Problem::new(oscillator, functions, vec![experiment]), truth)
+}
+
+#[test]
+fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
+    let (problem, truth) = long_record(0);
+    let settings = FitSettings::default();
+    let start = problem.start();
+    let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
+    let alone = fit_from(&problem, &start, &settings).unwrap();
+    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    assert_eq!(names, ["beginning of the record"]);
+    // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
+    assert!(
+        found.history.len() * 2 < alone.history.len(),
+        "{} {}",
+        found.history.len(),
+        alone.history.len()
+    );
+    // Both are compared to the start values.
+    assert_eq!(found.initial_cost, alone.initial_cost);
+    // One by an adjoint, the other from tangents: sums of 40,000 parts in another order.
+    let relative = found.initial_norm_squared / alone.initial_norm_squared - 1.0;
+    assert!(relative.abs() <= 1e-12, "{relative}");
+    for ((p, q), truth) in (found.best.parameters.iter())
+        .zip(&alone.best.parameters)
+        .zip(truth)
+    {
+        // Rounding of 40,000 steps.
+        assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
+        assert!((q - truth).abs() <= 1e-9 * truth, "{q} {truth}");
+    }
+}
+
+/// Nothing moves while the beginning lasts: it says nothing, and the start values are what there is.
+#[test]
+fn a_silent_beginning_says_nothing() {
+    let (problem, truth) = long_record(5000);
+    let start = problem.start();
+    let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
+    assert_eq!(found.rungs[0].name, "start values");
+    for (p, truth) in found.best.parameters.iter().zip(truth) {
+        assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
+    }
+}
+
+/// Parts of a record have no reading at every node of the grid, which the continuous gradient needs: the fits of parts have
+/// the discrete one.
+#[test]
+fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
+    let nodes = 401;
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, 20.0, nodes).unwrap(),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    // What no oscillator does.
+    let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();
+    let weighting = Weighting::Integral {
+        spacing: oscillator.grid.step(),
+    };
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let list = vec![
+        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
+        CoefficientFunction::constant(Quantity::Damping, 0.1, nodes),
+        CoefficientFunction::constant(Quantity::Stiffness, 2.0, nodes),
+    ];
+    let functions = Functions::new(list, nodes, oscillator.grid.step()).unwrap();
+    let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
+    let problem = Problem::new(oscillator, functions, vec![experiment]);
+    assert!(problem.supports_continuous() && !problem.first_part(0.5).supports_continuous());
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        initial: Initial::Functions,
+        gradient: GradientKind::Continuous,
+        stopping: Stopping {
+            tolerance: Some(1e-10),
+            ..Stopping::exactly(20)
+        },
+        interrupt: None,
+    };
+    let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+    let names: Vec<&str> = found.rungs.iter().map(|r| r.name).collect();
+    assert!(names.contains(&"growing horizon"), "{names:?}");
+}

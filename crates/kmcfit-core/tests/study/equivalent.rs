@@ -1,0 +1,153 @@
+use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::qp::ConicStatus;
+use kmcfit_core::internals::study::equivalent::{Motion, Wish, anchors, equivalent, imbalance};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const INITIAL: State = State {
+    displacement: 3.3,
+    velocity: 1.0,
+};
+
+fn oscillator(nodes: usize, method: Method) -> Oscillator {
+    Oscillator {
+        grid: Grid::new(0.0, 12.0, nodes).unwrap(),
+        method,
+        terms: vec![Term::Damping, Term::Stiffness],
+    }
+}
+
+fn truth(grid: &Grid) -> Device {
+    let each = |f: &dyn Fn(f64) -> f64| grid.times().iter().map(|t| f(*t)).collect();
+    Device {
+        mass: each(&|t| 1.0 - 0.03 * t),
+        coefficients: vec![each(&|_| 0.1), each(&|t| 1.0 + 0.1 * (0.5 * t).sin())],
+    }
+}
+
+fn force(grid: &Grid) -> Excitation {
+    let values: Vec<f64> = grid.times().iter().map(|t| 0.5 * (0.7 * t).cos()).collect();
+    Excitation::force_at_nodes(&values)
+}
+
+/// The true motion at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
+fn motion(nodes: usize) -> Motion {
+    let fine = oscillator(32 * (nodes - 1) + 1, Method::Rk4);
+    let device = truth(&fine.grid);
+    let excitation = force(&fine.grid);
+    let forces = excitation.force.as_ref().unwrap().at_nodes();
+    let moved = fine.forward(&device, INITIAL, Some(&excitation)).unwrap();
+    let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
+    let (y, v) = (&moved.displacement, &moved.velocity);
+    let acceleration: Vec<f64> = (0..y.len())
+        .map(|i| {
+            let [c, k] = [0, 1].map(|j| device.coefficients[j][i]);
+            (forces[i] - c * v[i] - k * y[i]) / device.mass[i]
+        })
+        .collect();
+    Motion {
+        grid: oscillator(nodes, Method::Rk4).grid,
+        displacement: pick(y),
+        velocity: pick(v),
+        acceleration: pick(&acceleration),
+        force: pick(&forces),
+    }
+}
+
+/// `1 + sum of four random harmonics`, between 0.6 and 1.4.
+fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let waves: Vec<[f64; 2]> = (0..4)
+        .map(|_| {
+            [
+                random.random_range(-0.1..0.1),
+                random.random_range(0.0..std::f64::consts::TAU),
+            ]
+        })
+        .collect();
+    let at = |t: f64| -> f64 {
+        let each = waves.iter().enumerate();
+        1.0 + each
+            .map(|(n, [a, p])| a * (0.3 * (n + 1) as f64 * t + p).sin())
+            .sum::<f64>()
+    };
+    grid.times().iter().map(|t| at(*t)).collect()
+}
+
+/// Largest error of the equivalent device's motion by the midpoint rule.
+fn error(nodes: usize, seed: u64) -> (f64, Device, Motion) {
+    let motion = motion(nodes);
+    let mass = random_mass(seed, &motion.grid);
+    let wish = Wish::near(vec![0.1; nodes], 0.05);
+    let device = equivalent(&mass, &motion, &wish).unwrap();
+    let excitation = Excitation::force_at_nodes(&motion.force);
+    let oscillator = oscillator(nodes, Method::Midpoint);
+    let moved = oscillator
+        .forward(&device, INITIAL, Some(&excitation))
+        .unwrap();
+    let pairs = moved.displacement.iter().zip(&motion.displacement);
+    let error = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+    (error, device, motion)
+}
+
+/// The midpoint rule is of order two: half the step, a quarter of the error, from 3 to 5.5 for the
+/// higher orders that are left at these steps.
+#[test]
+fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
+    for seed in 0..4 {
+        let (coarse, ..) = error(401, seed);
+        let (fine, device, motion) = error(801, seed);
+        let rate = coarse / fine;
+        let k = &device.coefficients[1];
+        let least = k.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = k.iter().copied().fold(0.0, f64::max);
+        println!(
+            "mass {seed}: {coarse:.2e} {fine:.2e}, rate {rate:.2}, k from {least:.3} to {most:.3}"
+        );
+        assert!((3.0..5.5).contains(&rate), "{rate}");
+        assert!(fine < 1e-2, "{fine}");
+        assert!(least >= 0.05 - 1e-7 && most < 50.0, "{least} {most}");
+        // The equation holds at the nodes: forces are of the size of some newtons.
+        let off = imbalance(&device, &motion)
+            .iter()
+            .fold(0.0f64, |m, r| m.max(r.abs()));
+        assert!(off < 1e-6, "{off}");
+        // Where y crosses zero the damping is what the anchor says, to the square of the step.
+        for (t, c) in anchors(&device.mass, &motion) {
+            let i = (t / motion.grid.step()).round() as usize;
+            let found = device.coefficients[0][i];
+            assert!((found - c).abs() < 0.05, "at {t}: {found} {c}");
+        }
+        // It is another device.
+        let truth = truth(&motion.grid);
+        assert!(crate::common::errors(&device, &truth)[0] > 0.1);
+    }
+}
+
+/// With the true mass the wish for the true damping is granted, and the true stiffness comes back.
+#[test]
+fn the_true_mass_and_damping_bring_the_true_stiffness() {
+    let motion = motion(401);
+    let truth = truth(&motion.grid);
+    let mut wish = Wish::near(truth.coefficients[0].clone(), 0.05);
+    wish.least_damping = Some(0.0);
+    let device = equivalent(&truth.mass, &motion, &wish).unwrap();
+    let errors = crate::common::errors(&device, &truth);
+    println!("{errors:?}");
+    // The smoothness of k, 1e-9 of T^4 k''^2, bends it by thousandths.
+    assert!(errors[1] < 5e-3 && errors[2] < 2e-2, "{errors:?}");
+}
+
+/// A mass that grows fast asks for negative damping at the crossings: with c >= 0 there is none.
+#[test]
+fn what_no_device_can_do_is_said() {
+    let motion = motion(401);
+    let mass: Vec<f64> = motion.grid.times().iter().map(|t| 0.5 + 0.5 * t).collect();
+    let mut wish = Wish::near(vec![0.1; 401], 0.05);
+    wish.least_damping = Some(0.0);
+    let negative = anchors(&mass, &motion).iter().any(|(_, c)| *c < -1e-3);
+    let found = equivalent(&mass, &motion, &wish);
+    println!("{negative} {:?}", found.as_ref().err());
+    assert!(negative);
+    assert_eq!(found, Err(ConicStatus::Infeasible));
+}

@@ -1,0 +1,158 @@
+use crate::common;
+use crate::problems::regular;
+use kmcfit_core::internals::dynamics::{Excitation, State};
+use kmcfit_core::internals::functions::{Basis, Penalty};
+use kmcfit_core::internals::solvers::fit_from;
+use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
+use kmcfit_core::internals::study::prediction::{Run, predict};
+use kmcfit_core::internals::study::profile::QUANTILE_95;
+use kmcfit_core::internals::study::pull_apart::{Level, ratios_at, tube};
+use kmcfit_core::internals::study::{Linear, Target};
+
+/// The band is as wide as the spread of the motions of refitted devices; the worst case over the
+/// extreme devices, which are at the ends of the same ellipse, is a little narrower than the band
+/// where the motion depends on both numbers, and never wider.
+#[test]
+fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
+    let problem = regular(3);
+    let settings = crate::common::synthetic::settings();
+    let best = fit_from(&problem, &problem.start(), &settings)
+        .unwrap()
+        .best;
+    let covariance = problem.covariance(&best.evaluation).unwrap();
+    let force: Vec<f64> = problem
+        .oscillator
+        .grid
+        .times()
+        .iter()
+        .map(|t| (1.1 * t).sin())
+        .collect();
+    let run = Run {
+        excitation: Some(Excitation::force_at_nodes(&force)),
+        ..Run::free(
+            "unseen",
+            State {
+                displacement: -0.5,
+                velocity: 2.0,
+            },
+        )
+    };
+    let level = Level::of(best.evaluation.misfit + QUANTILE_95);
+    let targets = [0, 1].map(|j| Target::Linear(Linear::parameter(j)));
+    let bands = tube(
+        &problem,
+        std::slice::from_ref(&best.parameters),
+        &targets,
+        &level,
+        2,
+    )
+    .unwrap();
+    let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
+    let found = predict(
+        &problem,
+        &best.parameters,
+        &run,
+        Some(&covariance),
+        &extremes,
+    )
+    .unwrap();
+    let band = found.band.as_ref().unwrap();
+    let worst = found.worst.as_ref().unwrap();
+    assert!(found.without_motion.is_empty());
+    assert_eq!(band[0], [-0.5, -0.5], "the state at the start is known");
+
+    let refits = bootstrap(&problem, &best.parameters, Noise::Parametric, 1000, 3, 2).unwrap();
+    let motions: Vec<Vec<f64>> = refits
+        .found()
+        .map(|theta| {
+            predict(&problem, theta, &run, None, &[])
+                .unwrap()
+                .motion
+                .displacement
+        })
+        .collect();
+    for i in (10..101).step_by(10) {
+        let y = found.motion.displacement[i];
+        let count = motions.len() as f64;
+        let mean = motions.iter().map(|m| m[i]).sum::<f64>() / count;
+        let spread = (motions.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let half = 0.5 * (band[i][1] - band[i][0]);
+        let ratio = half / (1.96 * spread);
+        println!(
+            "{i}: {y:.3} +- {half:.4}, refits {ratio:.3}, worst {:?}",
+            worst[i]
+        );
+        // 1000 replicates know a spread to 2.2 %.
+        assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+        assert!(worst[i][0] <= y && y <= worst[i][1]);
+        assert!(
+            worst[i][1] - worst[i][0] <= 2.2 * half,
+            "{:?} {half}",
+            worst[i]
+        );
+    }
+    let (name, distance) = found.furthest.unwrap();
+    assert!(name.contains("parameter") && distance > 0.0);
+}
+
+/// On the paper's data the extreme devices at its misfit move alike from nearly the same state, and
+/// apart from another one.
+#[test]
+fn devices_that_fit_alike_predict_apart() {
+    let nodes = 200;
+    let mut problem = common::paper_problem(nodes, [2.0, 1.0, 1.0]);
+    let grid = problem.oscillator.grid;
+    for f in [0, 2] {
+        for j in problem.functions.ranges()[f].clone() {
+            crate::problems::bound(&mut problem, "positive", j, [0.05, f64::INFINITY]);
+        }
+    }
+    let device = common::paper_device(nodes);
+    let [c, k] = [0, 1].map(|j| &device.coefficients[j][..]);
+    let truth = [&device.mass[..], c, k].concat();
+    let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
+    let level = Level {
+        budgets: (0..3).map(|f| (rows(f), 1e-3)).collect(),
+        reach: 3.0,
+        programs: 15,
+        ..Level::of(0.0114)
+    };
+    // What free motion shows: c/m and k/m, pushed apart.
+    let targets: Vec<Target> = [1, 2]
+        .iter()
+        .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))
+        .collect();
+    let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
+    for band in &bands {
+        println!(
+            "{}: {:.3} .. {:.3}, {} + {} programs",
+            band.low.function,
+            band.low.value,
+            band.high.value,
+            band.low.programs,
+            band.high.programs
+        );
+    }
+    let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
+    let distance = |displacement: f64, velocity: f64| {
+        let run = Run::free(
+            "other",
+            State {
+                displacement,
+                velocity,
+            },
+        );
+        let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
+        let worst = found.worst.unwrap();
+        let motion = &found.motion.displacement;
+        let inside = worst
+            .iter()
+            .zip(motion)
+            .all(|(w, y)| w[0] <= *y && *y <= w[1]);
+        assert!(inside && found.band.is_none());
+        found.furthest.unwrap().1
+    };
+    let (near, far) = (distance(3.301, 1.001), distance(-3.3, 1.0));
+    println!("from nearly the same state {near:.3} m, from another {far:.3} m");
+    assert!(far > 3.0 * near, "{near} {far}");
+}

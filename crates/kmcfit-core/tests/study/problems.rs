@@ -1,0 +1,181 @@
+//! Small problems with few parameters.
+
+use kmcfit_core::internals::constraints::RowGroup;
+use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value,
+};
+use kmcfit_core::internals::objective::{Channel, Sensor, Weighting};
+use kmcfit_core::internals::problem::{Experiment, Problem};
+
+pub const SIGMA: f64 = 0.05;
+pub const REST: State = State {
+    displacement: 1.0,
+    velocity: 0.0,
+};
+
+pub fn oscillator(duration: f64, nodes: usize) -> Oscillator {
+    Oscillator {
+        grid: Grid::new(0.0, duration, nodes).unwrap(),
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness],
+    }
+}
+
+/// One value for each function.
+pub fn device(nodes: usize, [m, c, k]: [f64; 3]) -> Device {
+    Device {
+        mass: vec![m; nodes],
+        coefficients: vec![vec![c; nodes], vec![k; nodes]],
+    }
+}
+
+/// Constants: sought from the value where it is `Some`, else known to be the number beside it.
+pub fn constants(
+    nodes: usize,
+    sought: [Option<f64>; 3],
+    known: [f64; 3],
+) -> Vec<CoefficientFunction> {
+    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let each = quantities.into_iter().zip(sought).zip(known);
+    each.map(|((quantity, sought), known)| match sought {
+        Some(start) => CoefficientFunction::constant(quantity, start, nodes),
+        None => CoefficientFunction::fixed(quantity, vec![known; nodes]),
+    })
+    .collect()
+}
+
+/// Readings of `truth` at every `stride`-th node with noise of the seed.
+pub fn readings(
+    oscillator: &Oscillator,
+    truth: &Device,
+    excitation: Option<&Excitation>,
+    stride: usize,
+    sigma: f64,
+    seed: u64,
+) -> Vec<f64> {
+    let motion = oscillator.forward(truth, REST, excitation).unwrap();
+    let every: Vec<f64> = motion
+        .displacement
+        .iter()
+        .step_by(stride)
+        .copied()
+        .collect();
+    crate::common::synthetic::with_noise(&every, sigma, seed)
+}
+
+/// Readings from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
+pub fn problem(
+    oscillator: Oscillator,
+    list: Vec<CoefficientFunction>,
+    scalars: Vec<Scalar>,
+    record: Record,
+) -> Problem {
+    let grid = oscillator.grid;
+    let functions = Functions::new(list, grid.nodes(), grid.step()).unwrap();
+    let channel =
+        Channel::displacement_at_nodes(record.readings, record.stride, record.weighting, &grid)
+            .with_sensor(record.sensor);
+    let mut experiment = Experiment::free("record", REST, grid.nodes()).with_channel(channel);
+    experiment.excitation = record.excitation;
+    experiment.sought = record.sought;
+    Problem::new(
+        oscillator,
+        functions.with_scalars(scalars),
+        vec![experiment],
+    )
+}
+
+pub struct Record {
+    pub readings: Vec<f64>,
+    pub stride: usize,
+    pub weighting: Weighting,
+    pub sensor: Sensor,
+    pub excitation: Option<Excitation>,
+    pub sought: [Option<usize>; 2],
+}
+
+impl Record {
+    pub fn of(readings: Vec<f64>, stride: usize) -> Self {
+        Self {
+            readings,
+            stride,
+            weighting: Weighting::Sigma(SIGMA),
+            sensor: Sensor::default(),
+            excitation: None,
+            sought: [None; 2],
+        }
+    }
+}
+
+pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> Scalar {
+    Scalar {
+        name: name.into(),
+        unit: "m".into(),
+        start,
+        size: 1.0,
+        prior,
+    }
+}
+
+/// Initial displacement and velocity and the offset of the sensor are sought, the device is known:
+/// the predictions are linear in all three.
+pub fn linear(seed: u64) -> Problem {
+    let oscillator = oscillator(10.0, 201);
+    let truth = [1.0, 0.1, 2.0];
+    let values = readings(&oscillator, &device(201, truth), None, 4, SIGMA, seed);
+    let sensor = Sensor {
+        offset: Value::Sought(2),
+        ..Sensor::default()
+    };
+    let record = Record {
+        sensor,
+        sought: [Some(0), Some(1)],
+        ..Record::of(values, 4)
+    };
+    let names = ["displacement", "velocity", "offset"];
+    let scalars = names.map(|name| scalar(name, 0.5, None)).to_vec();
+    problem(
+        oscillator,
+        constants(201, [None; 3], truth),
+        scalars,
+        record,
+    )
+}
+
+/// Damping and stiffness of a known mass.
+pub fn regular(seed: u64) -> Problem {
+    let oscillator = oscillator(10.0, 101);
+    let truth = device(101, [1.0, 0.2, 2.0]);
+    let values = readings(&oscillator, &truth, None, 2, SIGMA, seed);
+    let list = constants(101, [None, Some(0.1), Some(1.9)], [1.0, 0.0, 0.0]);
+    problem(oscillator, list, Vec::new(), Record::of(values, 2))
+}
+
+/// `low <= parameter j <= high`.
+pub fn bound(problem: &mut Problem, name: &str, j: usize, bounds: [f64; 2]) {
+    let mut group = RowGroup::new(name);
+    group.push([(j, 1.0)], bounds, [0.0, 0.0]);
+    problem.constraints.groups.push(group);
+}
+
+/// Stiffness linear between knots, damping constant, mass known.
+pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) -> Problem {
+    let oscillator = oscillator(10.0, 201);
+    let grid = oscillator.grid;
+    let mut moving = device(201, [1.0, 0.1, 2.0]);
+    moving.coefficients[1] = grid.times().iter().map(|t| truth(*t)).collect();
+    let values = readings(&oscillator, &moving, None, 2, sigma, seed);
+    let times = (0..knots).map(|i| 10.0 * i as f64 / (knots - 1) as f64);
+    let basis = Basis::PiecewiseLinear {
+        knots: times.collect(),
+    };
+    let start = basis.constant(&grid, 2.0);
+    let mut list = constants(201, [None, Some(0.1), None], [1.0, 0.0, 2.0]);
+    list[2] = CoefficientFunction::free(Quantity::Stiffness, basis, &grid, start);
+    let record = Record {
+        weighting: Weighting::Sigma(sigma),
+        ..Record::of(values, 2)
+    };
+    problem(oscillator, list, Vec::new(), record)
+}
