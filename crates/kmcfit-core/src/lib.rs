@@ -93,6 +93,8 @@ mod solvers;
 mod study;
 mod threads;
 
+pub use solvers::fit;
+
 /// Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API; outside semantic
 /// versioning.
 #[doc(hidden)]
