@@ -129,11 +129,6 @@ impl<'a, 's, 'p> Work<'a, 's, 'p> {
             .expect("the executor holds the problem")
     }
 
-    /// What gradients are computed.
-    pub fn kind(&self) -> GradientKind {
-        self.kind
-    }
-
     /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
     /// the `fingerprint`. `None` if there is no such point.
     pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Point> {

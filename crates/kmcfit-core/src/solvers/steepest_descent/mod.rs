@@ -1,12 +1,12 @@
 //! Steepest descent exactly as in the paper.
 
-mod side_by_side;
+mod batched_trials;
 
 use super::point::Work;
 use super::{Descend, Point, Step};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use side_by_side::SideBySide;
+use batched_trials::BatchedTrials;
 
 /// Number of trial steps.
 const TRIALS: u32 = 50;
@@ -16,11 +16,11 @@ const LONGEST: f64 = 5.0;
 /// Tries the steps `5 sqrt(G^2) / i^4`, `i = 1..50`, along the L2 gradient and takes the trial with
 /// the lowest cost, if it is strictly lower.
 ///
-/// On the paper's own problem all trials are computed side by side; the bits are the same.
+/// On the paper's own problem all trials are computed in batches; the bits are the same.
 #[derive(Default)]
 pub struct SteepestDescent {
     spare: Vec<Evaluation>,
-    side_by_side: SideBySide,
+    batched: BatchedTrials,
 }
 
 /// A trial that lowers the cost.
@@ -33,8 +33,8 @@ struct Best {
 impl Descend for SteepestDescent {
     fn step(&mut self, work: &mut Work, point: &Point) -> Step {
         let lengths = lengths(point);
-        let best = match side_by_side::ray(work.problem(), point, &lengths) {
-            Some(ray) => (self.side_by_side).lowest(work, point, ray, &lengths, &mut self.spare),
+        let best = match batched_trials::ray(work.problem(), point, &lengths) {
+            Some(ray) => (self.batched).lowest(work, point, ray, &lengths, &mut self.spare),
             None => self.one_by_one(work, point, &lengths),
         };
         match best {
@@ -75,18 +75,16 @@ impl SteepestDescent {
 
 impl Best {
     /// Takes the place of `best` if its cost is strictly lower than that, and than that of the point; whose storage is not
-    /// needed any more goes to `spare`. Whether it did.
-    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) -> bool {
+    /// needed any more goes to `spare`.
+    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) {
         let lowest = best
             .as_ref()
             .map_or(point.evaluation.cost, |b| b.evaluation.cost);
-        let is_lower = self.evaluation.cost < lowest;
-        let left = match is_lower {
+        let left = match self.evaluation.cost < lowest {
             true => best.replace(self),
             false => Some(self),
         };
         spare.extend(left.map(|left| left.evaluation));
-        is_lower
     }
 }
 
