@@ -432,7 +432,7 @@ fn optimality_summary(measured: &Optimality) -> OptimalitySummary {
 fn rung_summary(rung: &Rung) -> RungSummary {
     let known = |x: f64| x.is_finite().then_some(x);
     RungSummary {
-        start: rung.name.into(),
+        start: rung.start.name().into(),
         initial_cost: known(rung.initial_cost),
         cost: known(rung.cost),
         iterations: rung.iterations,

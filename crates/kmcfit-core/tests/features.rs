@@ -359,7 +359,7 @@ impl Case {
             found
                 .rungs
                 .iter()
-                .map(|r| (r.name, r.iterations, r.initial_cost, r.cost))
+                .map(|r| (r.start, r.iterations, r.initial_cost, r.cost))
                 .collect::<Vec<_>>()
         );
         assert!(

@@ -184,7 +184,7 @@ fn check(basis: &Basis, reading: Reading, limit: f64) -> Vec<&'static str> {
         assert!(relative < limit, "{relative} {:#?}", found.rungs);
         // The largest of some ten independent values: beyond 4 by chance once in a thousand times.
         assert!(standard < 4.0, "{standard} {:#?}", found.rungs);
-        last.push(found.rungs.last().unwrap().name);
+        last.push(found.rungs.last().unwrap().start.name());
     }
     last
 }

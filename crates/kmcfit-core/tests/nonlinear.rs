@@ -87,7 +87,7 @@ impl Case {
                 found
                     .rungs
                     .iter()
-                    .map(|r| (r.name, r.iterations))
+                    .map(|r| (r.start, r.iterations))
                     .collect::<Vec<_>>()
             );
         }

@@ -1,58 +1,21 @@
 //! The loop around every solver, run by argmin's executor.
 
-use super::ahead::Ahead;
-use super::gauss_newton::GaussNewton;
-use super::keep::{Bits, Memory, Standing, Watch};
-use super::lbfgs::Lbfgs;
-use super::optimality::measured;
-use super::outcome::{Outcome, Status};
-use super::point::{Counts, Point, Work};
-use super::projected_gradient::ProjectedGradient;
-use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
-use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Optimality, Rung, Solver, Step, Timings, equation_error};
+use super::checkpoint::{Bits, Memory, Standing, Watch};
+use super::counts::Counts;
+use super::evaluator::Work;
+use super::fit::{Fit, measured};
+use super::history::{Recorder, Reference, Row};
+use super::iterate::Point;
+use super::methods::{Step, StepRule, equation_error, step_rule};
+use super::settings::{FitSettings, Solver};
+use super::termination::{Outcome, Status};
+use super::timings::Timings;
 use crate::dynamics::{Breakdown, Cause};
 use crate::objective::{Channel, Evaluation, GradientKind};
 use crate::problem::Problem;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-
-/// A finished fit: the best point, how it was reached and how it ended.
-#[derive(Debug, Clone)]
-pub struct Fit {
-    /// The point with the lowest cost.
-    pub best: Point,
-    /// Cost at the start values of the functions, whatever start the search took.
-    pub initial_cost: f64,
-    /// Cost at the point from which the search set out.
-    pub started_from: f64,
-    /// `G^2` at the start values.
-    pub initial_norm_squared: f64,
-    /// One row per iteration.
-    pub history: Vec<Row>,
-    /// Motions on the way.
-    pub snapshots: Vec<Snapshot>,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Work done.
-    pub counts: Counts,
-    /// What that work took; the rest of `elapsed` is bookkeeping.
-    pub timings: Timings,
-    /// Wall-clock time.
-    pub elapsed: Duration,
-    /// The starts that were tried, in order.
-    pub rungs: Vec<Rung>,
-    /// The first-order condition at the best point, once it is measured.
-    pub optimality: Option<Optimality>,
-}
-
-impl Fit {
-    /// `J / J0`.
-    pub fn cost_ratio(&self) -> f64 {
-        ratio(self.best.evaluation.cost, self.initial_cost)
-    }
-}
 
 /// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
 /// search goes on from there. `reference` is what the
@@ -110,34 +73,31 @@ pub(super) fn search_prepared(
     }
     let settings = &settings;
     let kept = watch.begin_search();
-    let mut method = method(settings.solver);
+    let mut method = step_rule(settings.solver);
     if let Some(spare) = prepared.spare {
         method.recycle(spare);
     }
-    std::thread::scope(|scope| {
-        let run = Run {
-            method,
-            settings,
-            reference,
-            at_start: prepared.evaluation,
-            clock: Instant::now(),
-            timings: Timings::default(),
-            progress: Err(NOT_STARTED),
-            outcome: None,
-            kept,
-            before: Before::default(),
-            watch,
-            ahead: Ahead::new(scope, problem, settings),
-        };
-        let result = Executor::new(problem, run)
-            .configure(|state: SearchState| state.param(prepared.parameters))
-            .ctrlc(false)
-            .timer(false)
-            .run()
-            .expect("Run reports by outcome and never returns an error to the executor");
-        let counts = Counts::of(&result.problem);
-        result.solver.finish(counts)
-    })
+    let run = Run {
+        method,
+        settings,
+        reference,
+        at_start: prepared.evaluation,
+        clock: Instant::now(),
+        timings: Timings::default(),
+        progress: Err(NOT_STARTED),
+        outcome: None,
+        kept,
+        before: Before::default(),
+        watch,
+    };
+    let result = Executor::new(problem, run)
+        .configure(|state: SearchState| state.param(prepared.parameters))
+        .ctrlc(false)
+        .timer(false)
+        .run()
+        .expect("Run reports by outcome and never returns an error to the executor");
+    let counts = Counts::of(&result.problem);
+    result.solver.finish(counts)
 }
 
 /// One search from `start` alone, without the ladder of [`fit`](super::fit): for fits whose start is
@@ -154,19 +114,9 @@ pub fn fit_from(
     Ok(measured(problem, fit, settings))
 }
 
-fn method(solver: Solver) -> Box<dyn Descend> {
-    match solver {
-        Solver::SteepestDescent => Box::<SteepestDescent>::default(),
-        Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
-        Solver::ProjectedGradient => Box::<ProjectedGradient>::default(),
-        Solver::GaussNewton => Box::<GaussNewton>::default(),
-        Solver::EquationError => unreachable!("it takes no steps"),
-    }
-}
-
 /// One method at work, seen by argmin as a solver.
-struct Run<'a, 'w, 's, 'p> {
-    method: Box<dyn Descend>,
+struct Run<'a, 'w> {
+    method: Box<dyn StepRule>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
     /// The evaluation at the start, if there is one already.
@@ -179,8 +129,6 @@ struct Run<'a, 'w, 's, 'p> {
     kept: Option<(Vec<Row>, Standing)>,
     before: Before,
     watch: &'a mut Watch<'w>,
-    /// Held by the work while there is some.
-    ahead: Option<Ahead<'s, 'p>>,
 }
 
 /// What a search did before it was ended from outside.
@@ -207,7 +155,7 @@ const NOT_STARTED: Breakdown = Breakdown {
 /// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl<'p> Run<'_, '_, '_, 'p> {
+impl Run<'_, '_> {
     fn start(&mut self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
@@ -244,10 +192,15 @@ impl<'p> Run<'_, '_, '_, 'p> {
             true => work.motions_again(parameters).ok(),
             false => None,
         };
-        let recorder = Recorder::recalled(rows, &standing, motions)?;
-        let point = work.again(standing.parameters.0, standing.fingerprint)?;
+        if rows.len() as u64 != standing.iterations {
+            return None;
+        }
+        let snapshots = standing.snapshots.into_iter();
+        let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
+        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
+        let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
-            && !(self.method).recall(standing.memory, work.problem(), &point)
+            && !(self.method).recall(standing.memory, work.problem(), &mut point)
         {
             return None;
         }
@@ -287,15 +240,13 @@ impl<'p> Run<'_, '_, '_, 'p> {
             parameters: Bits(point.parameters.clone()),
             fingerprint: point.fingerprint(),
             memory: match outcome {
-                None => self.method.memory(),
+                None => self.method.memory(point),
                 Some(_) => Memory::Nothing,
             },
-            references: Bits(vec![
-                recorder.initial_cost,
-                recorder.started_from,
-                recorder.initial_norm_squared,
-            ]),
-            snapshots: recorder.snapshot_points(),
+            references: Bits(recorder.references()),
+            snapshots: (recorder.snapshot_points())
+                .map(|(iteration, at)| (iteration, Bits(at.to_vec())))
+                .collect(),
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
             elapsed: self.before.elapsed + self.clock.elapsed(),
@@ -324,7 +275,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
             Step::Moved {
                 point,
                 length,
-                hindered,
+                limited,
             } => {
                 progress
                     .recorder
@@ -339,7 +290,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
                         Some(worst.relative.max(0.0))
                     });
                     let stopping = &self.settings.stopping;
-                    self.outcome = stopping.after(row, previous_cost, hindered);
+                    self.outcome = stopping.after(row, previous_cost, limited);
                 }
             }
         }
@@ -423,7 +374,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -434,17 +385,15 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> 
         mut state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
-        let mut work = Work::new(problem, self.ahead.take(), self.settings);
+        let mut work = Work::new(problem, self.settings);
         match self.recalled(&work) {
             Some(progress) => {
                 self.at_start = None;
                 self.progress = Ok(progress);
-                self.ahead = work.ahead;
             }
             None => {
                 self.progress = self.start(&mut work, parameters);
                 self.timings += work.timings;
-                self.ahead = work.ahead;
                 self.outcome = self.nothing_to_do(problem.problem);
             }
         }
@@ -456,10 +405,9 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> 
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        let mut work = Work::new(problem, self.ahead.take(), self.settings);
+        let mut work = Work::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
-        self.ahead = work.ahead;
         self.keep(Counts::of(problem));
         Ok((self.view(state), None))
     }
