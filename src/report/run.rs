@@ -91,7 +91,7 @@ impl FittedModel<'_> {
             model: self.model_summary(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status.name().into(),
-                reason: fit.outcome.reason.clone(),
+                reason: fit.outcome.reason.to_string(),
             },
             cost: CostSummary {
                 initial: fit.initial_cost,

@@ -93,7 +93,7 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
         // Without an iteration every program is refused.
         let found = run(&problem, solver, 0);
         assert_eq!(found.outcome.status, Status::Stalled, "{solver:?}");
-        assert!(found.outcome.reason.contains("solver stalled"));
+        assert!(found.outcome.reason.to_string().contains("solver stalled"));
         assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
         keeps_the_best_point(&problem, &found);
         // A start within the constraints may be as low, but nothing is lower than the minimum.

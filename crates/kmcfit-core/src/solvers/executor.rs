@@ -7,6 +7,7 @@ use super::fit::{Fit, measured};
 use super::history::{Recorder, Reference, Row};
 use super::iterate::Point;
 use super::methods::{Step, StepRule, equation_error, step_rule};
+use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
@@ -302,23 +303,20 @@ impl Run<'_, '_> {
     /// The outcome of a search that is over before its first iteration.
     fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
         let cost = self.progress.as_ref().ok()?.point.evaluation.cost;
-        let converged = |reason: &str| Some(Outcome::new(Status::Converged, reason));
+        let converged = |reason| Some(Outcome::new(Status::Converged, reason));
         if problem.is_some_and(|p| p.parameters() == 0) {
-            return converged("there is nothing to fit: every function is fixed");
+            return converged(Reason::NoParameters);
         }
         if cost == 0.0 {
             // Beside an infinite sigma, which is what squares beyond 1e308 come to, every residual is zero.
             let infinite = |c: &Channel| c.weighting().sigma(0).is_some_and(|s| !s.is_finite());
             if problem.is_some_and(|p| p.channels().any(infinite)) {
-                let reason = "the squares of the readings leave the range of numbers: give them in a larger unit";
-                return Some(Outcome::new(Status::Failed, reason));
+                return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
             // Squares of readings below 1e-154 are zero.
             return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {
-                true => converged(
-                    "there is nothing to explain: the readings, or their squares, are zero",
-                ),
-                false => converged("the start fits exactly"),
+                true => converged(Reason::ZeroReadings),
+                false => converged(Reason::ExactStart),
             };
         }
         self.settings.stopping.out_of_iterations(0)
@@ -327,14 +325,11 @@ impl Run<'_, '_> {
     fn ended_from_outside(&self) -> Option<Outcome> {
         let flag = self.settings.interrupt.as_ref();
         if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            let reason = "asked to stop; the best point so far is kept";
-            return Some(Outcome::new(Status::Interrupted, reason));
+            return Some(Outcome::new(Status::Interrupted, Reason::Interrupted));
         }
         let limit = self.settings.stopping.limit?;
-        (self.elapsed() >= limit).then(|| {
-            let reason = format!("the limit of {} s is reached", limit.as_secs_f64());
-            Outcome::new(Status::TimeLimit, reason)
-        })
+        let is_over = self.elapsed() >= limit;
+        is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
     fn finish(mut self, counts: Counts) -> Result<Fit, Breakdown> {
@@ -353,9 +348,7 @@ impl Run<'_, '_> {
             initial_norm_squared: recorder.initial_norm_squared,
             history: recorder.rows,
             snapshots: recorder.snapshots,
-            outcome: self
-                .outcome
-                .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
+            outcome: self.outcome.expect("a search ends with an outcome"),
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
             elapsed,
@@ -414,9 +407,9 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
 
     fn terminate(&mut self, _state: &SearchState) -> TerminationStatus {
         match (&self.outcome, &self.progress) {
-            (Some(outcome), _) => {
-                TerminationStatus::Terminated(TerminationReason::SolverExit(outcome.reason.clone()))
-            }
+            (Some(outcome), _) => TerminationStatus::Terminated(TerminationReason::SolverExit(
+                outcome.reason.to_string(),
+            )),
             (None, Err(breakdown)) => {
                 TerminationStatus::Terminated(TerminationReason::SolverExit(breakdown.to_string()))
             }

@@ -4,6 +4,7 @@ use super::counts::Counts;
 use super::history::{Row, Snapshot, ratio};
 use super::iterate::Point;
 use super::optimality::{Optimality, judged};
+use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
@@ -75,13 +76,13 @@ impl Rung {
     }
 
     /// An attempt without a response at its start.
-    pub(super) fn failed(start: StartStrategy, breakdown: &Breakdown) -> Self {
+    pub(super) fn failed(start: StartStrategy, breakdown: Breakdown) -> Self {
         Self {
             start,
             initial_cost: f64::NAN,
             cost: f64::NAN,
             iterations: 0,
-            outcome: Outcome::new(Status::Failed, breakdown.to_string()),
+            outcome: Outcome::new(Status::Failed, Reason::NoResponse(breakdown)),
         }
     }
 }

@@ -6,6 +6,7 @@
 use super::checkpoint::Watch;
 use super::executor::search;
 use super::fit::Fit;
+use super::reason::Reason;
 use super::settings::FitSettings;
 use super::termination::{Outcome, Status};
 use crate::constraints::TOLERANCE;
@@ -40,12 +41,8 @@ pub fn without_motion(
         &mut Watch::new(&mut |_| {}),
     )
     .map_err(|_| breakdown)?;
-    let reason = format!(
-        "no start within the constraints has a motion ({breakdown}); what is kept is the start as \
-         given, which breaks them"
-    );
     Ok(Fit {
-        outcome: Outcome::new(Status::Infeasible, reason),
+        outcome: Outcome::new(Status::Infeasible, Reason::NoFeasibleResponse(breakdown)),
         ..fit
     })
 }

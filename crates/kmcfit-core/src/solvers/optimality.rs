@@ -6,12 +6,13 @@
 
 use super::iterate::Point;
 use super::linearization::{Linearization, linearise};
+use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::constraints::TOLERANCE;
 use crate::host;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Solution, Subproblem};
+use crate::qp::{Solution, Subproblem};
 
 /// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
 /// measurements.
@@ -64,24 +65,15 @@ impl Optimality {
             && self.feasibility <= TOLERANCE
     }
 
-    /// Which part of the condition does not hold.
-    fn failure(&self) -> String {
-        let Self {
-            stationarity,
-            feasibility,
-            complementarity,
-            tolerance,
-            ..
-        } = self;
-        if *feasibility > TOLERANCE {
-            return format!("a constraint is violated by {feasibility:.1e} of its scale");
+    /// The part of the condition that does not hold.
+    fn failure(&self) -> ConditionFailure {
+        if self.feasibility > TOLERANCE {
+            return ConditionFailure::Violation(self.feasibility);
         }
-        if *complementarity > *tolerance {
-            return format!(
-                "moving to its bounds promises to lower J by a fraction of {complementarity:.1e}"
-            );
+        if self.complementarity > self.tolerance {
+            return ConditionFailure::Complementarity(self.complementarity);
         }
-        format!("the linearised cost can be lowered by a fraction of {stationarity:.1e}")
+        ConditionFailure::Stationarity(self.stationarity)
     }
 
     /// The cost of which shares are taken: J, or 1e-12 of the misfit of zero response where J is less. A fit whose residuals
@@ -198,19 +190,12 @@ fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
 
 /// A `converged` that asserts a minimum, or `stalled` where the first-order condition contradicts it.
 pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outcome {
-    let Outcome { reason, .. } = &outcome;
-    match optimality {
-        Some(optimality) if optimality.holds() => outcome,
-        Some(optimality) => Outcome::new(
-            Status::Stalled,
-            format!("{reason}; but this is no minimum: {}", optimality.failure()),
-        ),
-        None => Outcome::new(
-            Status::Stalled,
-            format!(
-                "{reason}; whether this is a minimum could not be measured: {}",
-                ConicStatus::Stalled.sentence()
-            ),
-        ),
+    if optimality.is_some_and(Optimality::holds) {
+        return outcome;
     }
+    let reason = Reason::NoMinimum {
+        met: Box::new(outcome.reason),
+        failure: optimality.map(Optimality::failure),
+    };
+    Outcome::new(Status::Stalled, reason)
 }

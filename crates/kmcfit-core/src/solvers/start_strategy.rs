@@ -197,7 +197,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 self.take(strategy, fit)
             }
             Err(breakdown) => {
-                self.rungs.push(Rung::failed(strategy, &breakdown));
+                self.rungs.push(Rung::failed(strategy, breakdown));
                 self.trouble.get_or_insert(breakdown);
                 !self.has_several
             }

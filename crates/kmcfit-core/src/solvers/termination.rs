@@ -1,6 +1,7 @@
 //! Termination of a fit: stopping tests, and how a fit ended.
 
 use super::history::Row;
+use super::reason::{Reason, Within};
 use crate::qp::Subproblem;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -42,21 +43,18 @@ impl Status {
     }
 }
 
-/// How a fit ended, and why in words.
+/// How a fit ended, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// In one word.
     pub status: Status,
-    /// In one sentence.
-    pub reason: String,
+    /// The reason, which is one sentence as text.
+    pub reason: Reason,
 }
 
 impl Outcome {
-    pub(crate) fn new(status: Status, reason: impl Into<String>) -> Self {
-        Self {
-            status,
-            reason: reason.into(),
-        }
+    pub(crate) fn new(status: Status, reason: Reason) -> Self {
+        Self { status, reason }
     }
 }
 
@@ -132,57 +130,31 @@ impl Stopping {
     pub(crate) fn out_of_iterations(&self, iteration: u64) -> Option<Outcome> {
         let exhausted = iteration >= self.iterations;
         exhausted.then(|| match self.has_test() {
-            true => Outcome::new(
-                Status::MaxIterations,
-                format!("no stopping test was met in {iteration} iterations"),
-            ),
-            false => Outcome::new(
-                Status::Completed,
-                format!("ran the {iteration} iterations asked for"),
-            ),
+            true => Outcome::new(Status::MaxIterations, Reason::IterationLimit(iteration)),
+            false => Outcome::new(Status::Completed, Reason::AllIterations(iteration)),
         })
     }
 
-    /// The limits on the ratios of cost and gradient that `row` is within, if it is within all that are given: what was asked
+    /// The ratios of cost and gradient of `row`, if they are within all limits that are given: what was asked
     /// for, but no sign of a minimum.
-    pub(super) fn ratios_met(&self, row: &Row) -> Option<String> {
-        let test = |name: &str, value: f64, limit: Option<f64>| {
-            limit.map(|limit| (value <= limit, format!("{name} {value:.3e} <= {limit:.3e}")))
-        };
-        let tests: Vec<(bool, String)> = [
-            test("J/J0", row.cost_ratio, self.cost_ratio),
-            test(
-                "G^2/G0^2",
-                row.gradient_norm_squared_ratio,
-                self.gradient_ratio,
-            ),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        let met = !tests.is_empty() && tests.iter().all(|(met, _)| *met);
-        met.then(|| {
-            let words: Vec<String> = tests.into_iter().map(|(_, words)| words).collect();
-            words.join(" and ")
-        })
+    pub(super) fn ratios_met(&self, row: &Row) -> Option<Reason> {
+        let test = |value: f64, limit: Option<f64>| limit.map(|limit| Within { value, limit });
+        let cost = test(row.cost_ratio, self.cost_ratio);
+        let gradient = test(row.gradient_norm_squared_ratio, self.gradient_ratio);
+        let is_met = |test: &Within| test.value <= test.limit;
+        let mut given = cost.iter().chain(&gradient).peekable();
+        (given.peek().is_some() && given.all(is_met)).then_some(Reason::Ratios { cost, gradient })
     }
 
-    fn small_step(&self, row: &Row, previous_cost: f64) -> Option<String> {
+    fn small_step(&self, row: &Row, previous_cost: f64) -> Option<Reason> {
         let change = row.relative_change;
         let decrease = (previous_cost - row.cost) / previous_cost.max(f64::MIN_POSITIVE);
         let within = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value <= limit);
         if within(self.step, change) || within(self.tolerance, change) {
-            return Some(format!(
-                "the last iteration changed no function by more than {change:.1e} of its size"
-            ));
+            return Some(Reason::SmallChange(change));
         }
-        let flat =
+        let is_flat =
             within(self.tolerance, decrease) && within(self.tolerance.map(f64::sqrt), change);
-        flat.then(|| {
-            format!(
-                "the last iteration lowered J by a fraction of {decrease:.1e} and changed no \
-                 function by more than {change:.1e} of its size"
-            )
-        })
+        is_flat.then_some(Reason::SmallDecrease { decrease, change })
     }
 }

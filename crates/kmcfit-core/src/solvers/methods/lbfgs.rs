@@ -21,6 +21,7 @@ use crate::problem::Problem;
 use crate::solvers::checkpoint::{Bits, Memory};
 use crate::solvers::evaluator::Work;
 use crate::solvers::iterate::Point;
+use crate::solvers::reason::Reason;
 use std::collections::VecDeque;
 
 /// Pairs with `<s, z>` below this fraction of `|s| |z|` carry rounding, not curvature.
@@ -196,7 +197,7 @@ impl StepRule for Lbfgs {
                 return step;
             }
         }
-        Step::Stuck("no step along the gradient lowers the cost enough".into())
+        Step::Stuck(Reason::NoLowerLineStep)
     }
 
     fn memory(&self, _: &Point) -> Memory {

@@ -13,6 +13,7 @@ pub(super) use gauss_newton::GaussNewton;
 use super::checkpoint::Memory;
 use super::evaluator::Work;
 use super::iterate::Point;
+use super::reason::Reason;
 use super::settings::Solver;
 use crate::constraints::TOLERANCE;
 use crate::objective::Evaluation;
@@ -33,11 +34,11 @@ pub(crate) enum Step {
         limited: bool,
     },
     /// Nowhere: no step lowers the cost, for this reason.
-    Stuck(String),
+    Stuck(Reason),
     /// Nowhere: the point breaks the constraints, and no step leads into them, for this reason.
-    Infeasible(String),
+    Infeasible(Reason),
     /// Nowhere: the model predicts no decrease worth the name; the point is a minimum.
-    Minimum(String),
+    Minimum(Reason),
 }
 
 /// A direction and a step rule.
@@ -79,7 +80,7 @@ pub(super) fn step_rule(solver: Solver) -> Box<dyn StepRule> {
 
 /// The step from `point` when the quadratic programs that would make one ended with `status`.
 pub(super) fn no_step(problem: &Problem, point: &Point, status: ConicStatus) -> Step {
-    let reason = status.sentence().to_string();
+    let reason = Reason::Program(status);
     // From a point that satisfies them there is always the step of length zero.
     let inside = problem.constraints.hold(&point.parameters, TOLERANCE);
     match status == ConicStatus::Infeasible && !inside {

@@ -13,6 +13,7 @@ use crate::qp::{ConicStatus, project_within};
 use crate::solvers::checkpoint::{Bits, Memory};
 use crate::solvers::evaluator::Work;
 use crate::solvers::iterate::Point;
+use crate::solvers::reason::Reason;
 
 /// Sufficient decrease along the feasible direction.
 const DECREASE: f64 = 1e-4;
@@ -41,11 +42,11 @@ impl StepRule for ProjectedGradient {
         let direction = difference(&target, &point.parameters);
         let slope = dot(&point.gradient.euclidean, &direction);
         if slope.abs() <= f64::EPSILON * point.evaluation.cost {
-            return Step::Minimum("the projected gradient vanishes to rounding".into());
+            return Step::Minimum(Reason::ZeroProjectedGradient);
         }
         // Also of no number: towards a projection the cost falls, and where it does not the projection is wrong.
         if slope.is_nan() || slope > 0.0 {
-            return Step::Stuck("the cost does not fall towards the projected gradient".into());
+            return Step::Stuck(Reason::NoDescentToProjection);
         }
         let mut evaluation = work.problem().workspace();
         let mut share = 1.0;
@@ -67,7 +68,7 @@ impl StepRule for ProjectedGradient {
             }
             share *= 0.5;
         }
-        Step::Stuck("no step towards the projected gradient lowers the cost".into())
+        Step::Stuck(Reason::NoLowerStepToProjection)
     }
 
     fn memory(&self, _: &Point) -> Memory {

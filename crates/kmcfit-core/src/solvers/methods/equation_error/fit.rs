@@ -1,6 +1,6 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
-use super::measured::{Measured, Measurements, Unsuited};
+use super::measured::{Measured, Measurements};
 use super::{Minimum, Purpose, add_rows, device, minimise};
 use crate::dynamics::Device;
 use crate::objective::{Evaluation, Gradient};
@@ -12,6 +12,7 @@ use crate::solvers::history::{Row, ratio};
 use crate::solvers::iterate::Point;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::optimality::{Optimality, judged};
+use crate::solvers::reason::{Reason, Unsuited};
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use std::time::Instant;
@@ -40,7 +41,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
     });
     let measurements = match measurements {
         Ok(measurements) => measurements,
-        Err(reason) => return failed(problem, start, &reason),
+        Err(reason) => return failed(problem, start, reason),
     };
     let cost = Cost {
         problem,
@@ -76,7 +77,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
                 ConicStatus::Infeasible => Status::Infeasible,
                 _ => Status::Stalled,
             };
-            (Outcome::new(word, status.sentence()), None)
+            (Outcome::new(word, Reason::Program(status)), None)
         }
     };
     let history: Vec<Row> = (found.iter())
@@ -99,22 +100,14 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
     }
 }
 
-fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> String {
+fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
     if problem.functions.iter().all(|f| f.parameters() == 0) {
-        return "there is nothing to fit: every function is fixed".into();
+        return Reason::NoParameters;
     }
-    let how = match minimum.program {
-        None => "one sparse factorisation",
-        Some(ConicStatus::Almost) => "a quadratic program, but to reduced accuracy only",
-        Some(_) => "a quadratic program",
-    };
-    let but = match has_mass {
-        true => "",
-        false => {
-            "; its mass is not positive at all times, so no device moves so: give the mass a `min`"
-        }
-    };
-    format!("the equation error is convex, and its minimum was found by {how}{but}")
+    Reason::EquationError {
+        program: minimum.program,
+        has_mass,
+    }
 }
 
 /// The only row of the history.
@@ -133,7 +126,7 @@ fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
 }
 
 /// The end of a fit whose readings tell no motion: the start, without a cost.
-fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
+fn failed(problem: &Problem, start: &[f64], reason: Unsuited) -> Fit {
     let mut evaluation = problem.workspace();
     evaluation.device = problem.functions.device(start);
     for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
@@ -156,7 +149,7 @@ fn failed(problem: &Problem, start: &[f64], reason: &Unsuited) -> Fit {
         initial_norm_squared: f64::NAN,
         history: Vec::new(),
         snapshots: Vec::new(),
-        outcome: Outcome::new(Status::Failed, reason.to_string()),
+        outcome: Outcome::new(Status::Failed, Reason::Unsuited(reason)),
         counts: Counts::default(),
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,

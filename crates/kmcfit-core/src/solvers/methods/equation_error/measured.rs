@@ -5,8 +5,8 @@ use crate::functions::Functions;
 use crate::objective::{Channel, Loss, View};
 use crate::problem::{Experiment, Problem};
 use crate::signal::zero_phase;
+use crate::solvers::reason::{MissingMeasurement, Unsuited};
 use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
-use std::fmt;
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
 /// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
@@ -43,38 +43,38 @@ impl Measured {
     ///
     /// # Errors
     /// What is missing.
-    fn of(problem: &Problem, experiment: &Experiment, scalars: &[f64]) -> Result<Self, String> {
+    fn of(
+        problem: &Problem,
+        experiment: &Experiment,
+        scalars: &[f64],
+    ) -> Result<Self, MissingMeasurement> {
         if experiment
             .channels
             .iter()
             .any(|c| c.loss() != Loss::Squares)
         {
-            return Err("the equation error knows no robust loss".into());
+            return Err(MissingMeasurement::QuadraticLoss);
         }
         let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
         if experiment.channels.iter().any(sought) {
-            return Err("the equation error takes the sensors as known".into());
+            return Err(MissingMeasurement::KnownSensors);
         }
         if let [channel] = experiment.channels.as_slice()
             && channel.kind() == ChannelKind::Acceleration
             && let Some(spacing) = equal_spacing(channel.times())
         {
             return Self::in_band(experiment, channel, spacing, scalars)
-                .ok_or_else(|| "the acceleration is too short or does not oscillate".into());
+                .ok_or(MissingMeasurement::Oscillation);
         }
         let anchored = |c: &Channel| c.kind() == ChannelKind::Displacement && c.filter().is_empty();
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
-            return Err(
-                "its force or base cannot be filtered as its motion is, which is integrated from other \
-                 channels than one of equally spaced accelerations"
-                    .into(),
-            );
+            return Err(MissingMeasurement::FilteredDrive);
         }
         let motion = Kinematics::of(problem, experiment, scalars);
-        let motion = motion.ok_or("there are too few readings")?;
+        let motion = motion.ok_or(MissingMeasurement::Readings)?;
         let measured = Self::at_nodes(problem, experiment, &motion);
         let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
-        moves.then_some(measured).ok_or("nothing moves".into())
+        moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
 
     /// From accelerations alone: motion, force and base through the same filter.
@@ -255,25 +255,6 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     };
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
-
-/// Why an experiment has no equation error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Unsuited {
-    /// Index of the experiment.
-    pub experiment: usize,
-    /// Its name.
-    pub name: String,
-    /// What is missing, in words.
-    pub reason: String,
-}
-
-impl fmt::Display for Unsuited {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.name, self.reason)
-    }
-}
-
-impl std::error::Error for Unsuited {}
 
 /// The motions of all experiments as their readings tell them.
 ///

@@ -10,7 +10,7 @@ mod fit;
 mod measured;
 
 pub(in crate::solvers) use fit::fit;
-pub use measured::{Measurements, Unsuited};
+pub use measured::Measurements;
 
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::dynamics::quadrature::trapezoid_weights;

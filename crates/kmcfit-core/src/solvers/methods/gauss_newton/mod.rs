@@ -17,6 +17,7 @@ use crate::solvers::evaluator::Work;
 use crate::solvers::iterate::Point;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
 use crate::solvers::optimality::Optimality;
+use crate::solvers::reason::Reason;
 use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
 
 /// First weight of the proximal term, relative to J.
@@ -63,7 +64,7 @@ impl StepRule for GaussNewton {
         let problem = work.problem();
         let first_cost = *self.first_cost.get_or_insert(point.evaluation.cost);
         if point.evaluation.cost <= NO_DECREASE * first_cost {
-            return Step::Minimum("the cost is zero to rounding".into());
+            return Step::Minimum(Reason::ZeroCost);
         }
         let mut linearization = work.linearization(point);
         work.count_linearisation(linearisation_tangents(problem));
@@ -81,9 +82,7 @@ impl StepRule for GaussNewton {
             let proposal = match propose(work, &sub, point) {
                 Answer::Step(proposal) => proposal,
                 Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
-                    return Step::Minimum(
-                        "the residuals are below 1e-10 of the measurements".into(),
-                    );
+                    return Step::Minimum(Reason::NegligibleResiduals);
                 }
                 Answer::Unsolved(status) => {
                     trouble = Some(status);
@@ -141,7 +140,7 @@ impl StepRule for GaussNewton {
         self.damping = FIRST_DAMPING;
         match trouble {
             Some(status) => no_step(problem, point, status),
-            None => Step::Stuck("no Gauss-Newton step lowers the cost".into()),
+            None => Step::Stuck(Reason::NoLowerGaussNewtonStep),
         }
     }
 

@@ -8,6 +8,7 @@ use crate::solvers::evaluator::Work;
 use crate::solvers::iterate::Point;
 use crate::solvers::linearization::robust_surplus;
 use crate::solvers::optimality::response_rounding;
+use crate::solvers::reason::Reason;
 use crate::solvers::timings::timed;
 
 /// A clipped step is used if it keeps this share of the plain step's predicted decrease.
@@ -41,17 +42,16 @@ fn least_decrease(problem: &Problem, cost: f64) -> f64 {
 
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
 /// less than the rounding of the cost, or moves less than rounding moves the motion.
-pub(super) fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<String> {
+pub(super) fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<Reason> {
     // A prediction below zero by more, or of no number, is that of a wrong solution.
     if proposal.predicted.abs() + proposal.uncertainty
         <= least_decrease(problem, point.evaluation.cost)
     {
-        return Some("the linearised cost cannot be lowered any further".into());
+        return Some(Reason::NoPredictedDecrease);
     }
     let change = change(problem, point, proposal);
     let is_known = proposal.predicted > 0.0 && proposal.uncertainty == 0.0;
-    (is_known && change <= SMALLEST_CHANGE)
-        .then(|| format!("no function is to change by more than {change:.1e} of its size"))
+    (is_known && change <= SMALLEST_CHANGE).then_some(Reason::NoPredictedChange(change))
 }
 
 /// The largest change of a function that a proposal asks for, relative to the function's size.

@@ -7,6 +7,7 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::evaluator::Work;
 use crate::solvers::iterate::Point;
+use crate::solvers::reason::Reason;
 use batched_trials::BatchedTrials;
 
 /// Number of trial steps.
@@ -44,7 +45,7 @@ impl StepRule for SteepestDescent {
                 length: best.length,
                 limited: false,
             },
-            None => Step::Stuck(format!("none of the {TRIALS} trial steps lowers the cost")),
+            None => Step::Stuck(Reason::NoLowerTrial(TRIALS)),
         }
     }
 
