@@ -3,7 +3,7 @@
 use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::solvers::iterate::Point;
+use crate::solvers::iterate::Iterate;
 
 /// A row is active if it is this near to its bound, relative to its scale: nearer than a quadratic
 /// program brings a row that it does not mean to touch.
@@ -69,7 +69,7 @@ fn span(&[from, to]: &[f64; 2]) -> String {
 ///
 /// The multipliers solve the optimality conditions `dJ + G^T lambda = 0` in the least-squares sense
 /// of a projection: they are those of the step of steepest descent that the constraints stop.
-pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> {
+pub fn active_constraints(problem: &Problem, point: &Iterate) -> Vec<ActiveGroup> {
     let constraints = &problem.constraints;
     let near: Vec<Vec<usize>> = (constraints.groups.iter())
         .map(|group| near_rows(group, point))
@@ -115,19 +115,19 @@ pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> 
 }
 
 /// The size of a cone's bound at the point.
-fn bound(cone: &Cone, point: &Point) -> f64 {
+fn bound(cone: &Cone, point: &Iterate) -> f64 {
     let values = cone.rows.multiply(&point.parameters);
     values
         .first()
         .map_or(0.0, |v| (v - cone.rows.right()[0]).abs())
 }
 
-fn near_cones(group: &ConeGroup, point: &Point) -> Vec<usize> {
+fn near_cones(group: &ConeGroup, point: &Iterate) -> Vec<usize> {
     let is_near = |i: &usize| group.cones[*i].violation(&point.parameters) >= -NEAR;
     (0..group.cones.len()).filter(is_near).collect()
 }
 
-fn near_rows(group: &RowGroup, point: &Point) -> Vec<usize> {
+fn near_rows(group: &RowGroup, point: &Iterate) -> Vec<usize> {
     let is_near = |&i: &usize| group.relative_violation(i, &point.parameters) >= -NEAR;
     (0..group.rows.len()).filter(is_near).collect()
 }
@@ -156,7 +156,7 @@ struct Multipliers {
 }
 
 /// The multipliers at `point`; `None` if the quadratic program fails.
-fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
+fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
     if problem.constraints.are_simple() {
         return Some(simple_multipliers(problem, point));
     }
@@ -191,7 +191,7 @@ fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
 
 /// [`multipliers`] where every row bounds one parameter: then J falls into each parameter's bounds by
 /// itself, and the nearest bound that it falls into, if it is near, takes all of the derivative.
-fn simple_multipliers(problem: &Problem, point: &Point) -> Multipliers {
+fn simple_multipliers(problem: &Problem, point: &Iterate) -> Multipliers {
     let groups = &problem.constraints.groups;
     let gradient = &point.gradient.euclidean;
     // How far each parameter's nearest bound lies in the direction in which J falls, and its row.

@@ -8,7 +8,7 @@
 //! computed from its beginning. So what is kept decides how long a fit takes and never how it ends.
 
 use super::counts::Counts;
-use super::history::Row;
+use super::history::IterationRecord;
 use super::settings::StartStrategy;
 use super::termination::Outcome;
 use super::timings::Timings;
@@ -22,23 +22,23 @@ const PIECE: usize = 64;
 /// Numbers that are kept with all their bits, also where they are not finite: as a text of 16
 /// hexadecimal digits each.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Bits(pub Vec<f64>);
+pub struct ExactF64s(pub Vec<f64>);
 
 /// Where a search stands: all that decides how it goes on, but for its history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Standing {
+pub struct SolverState {
     /// Iterations so far; the history has one row for each.
     pub iterations: u64,
     /// The best point.
-    pub parameters: Bits,
-    /// Of the cost and the gradient there ([`Point::fingerprint`](super::Point::fingerprint)).
+    pub parameters: ExactF64s,
+    /// Of the cost and the gradient there ([`Iterate::fingerprint`](super::Iterate::fingerprint)).
     pub fingerprint: u64,
     /// What the solver remembers.
-    pub memory: Memory,
+    pub memory: MethodState,
     /// `J0`, the cost from which the search set out, and `G0^2`.
-    pub references: Bits,
+    pub references: ExactF64s,
     /// The points whose motions are kept for figures, by iteration.
-    pub snapshots: Vec<(u64, Bits)>,
+    pub snapshots: Vec<(u64, ExactF64s)>,
     /// Work done.
     pub counts: Counts,
     /// What that work took.
@@ -51,40 +51,40 @@ pub struct Standing {
 
 /// What a solver remembers of the iterations before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Memory {
+pub enum MethodState {
     /// Nothing.
     Nothing,
     /// Of L-BFGS.
     Lbfgs {
         /// The coordinates of the point, as the last step left them.
-        x: Bits,
+        x: ExactF64s,
         /// Which of them are logarithms.
         logarithmic: Vec<bool>,
         /// Step, change of the gradient, its dual, and the curvature alone in the last; the oldest first.
-        pairs: Vec<[Bits; 4]>,
+        pairs: Vec<[ExactF64s; 4]>,
     },
     /// Of the projected gradient: metric; first and last length.
     ProjectedGradient {
         /// The diagonal metric of the search.
-        metric: Bits,
+        metric: ExactF64s,
         /// First and last step.
-        lengths: Bits,
+        lengths: ExactF64s,
     },
     /// Of Gauss-Newton.
     GaussNewton {
         /// Weight of the proximal term, and the cost at the first point, if there was one.
-        numbers: Bits,
+        numbers: ExactF64s,
         /// Parameters of the point whose Jacobian is used, if it is not the one where the search stands.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        made_at: Option<Bits>,
+        made_at: Option<ExactF64s>,
     },
 }
 
 /// What was kept of a unit.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kept {
+pub enum CheckpointUnit {
     /// A search: its history and where it stood.
-    Search(Vec<Row>, Box<Standing>),
+    Search(Vec<IterationRecord>, Box<SolverState>),
     /// Numbers that were computed between searches.
     Piece(Vec<f64>),
     /// The unit ended at once, without a result.
@@ -93,50 +93,50 @@ pub enum Kept {
 
 /// A place where a fit keeps what it needs to go on. Trouble with the place is the keeper's to report:
 /// it must not end a fit.
-pub trait Keeper {
+pub trait CheckpointStore {
     /// Begins the next unit; what was kept of it by whoever was here before. What is told of a unit that
     /// had ended is not kept twice.
-    fn begin(&mut self) -> Option<Kept>;
+    fn begin(&mut self) -> Option<CheckpointUnit>;
     /// What was recalled of the unit does not belong here: it is dropped, with all later units.
     fn refuse(&mut self);
     /// Keeps an iteration of the search.
-    fn row(&mut self, row: &Row);
+    fn row(&mut self, row: &IterationRecord);
     /// Whether it is time to keep where a search for so many parameters stands.
     fn is_due(&self, parameters: usize) -> bool;
     /// Keeps where the search stands, in the place of where it stood before, or how it ended.
-    fn stand(&mut self, standing: Standing);
+    fn stand(&mut self, standing: SolverState);
     /// Ends the unit with numbers that were computed, or with nothing.
     fn end(&mut self, piece: Option<&[f64]>);
 }
 
 /// An iteration, and where in a fit it stands.
 #[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
+pub struct IterationEvent<'a> {
     /// The iteration.
-    pub row: &'a Row,
+    pub row: &'a IterationRecord,
     /// Where its search started: the strategy of its starting point, if it has one.
-    pub rung: Option<StartStrategy>,
+    pub start: Option<StartStrategy>,
     /// The largest violation of a constraint after it, relative to its row's scale; `None` without
     /// constraints.
     pub violation: Option<f64>,
 }
 
 /// Who looks on while a fit runs.
-pub struct Watch<'a> {
-    observe: &'a mut dyn FnMut(&Row),
-    look: Option<&'a mut dyn FnMut(&Moment)>,
-    rung: Option<StartStrategy>,
+pub struct Observer<'a> {
+    observe: &'a mut dyn FnMut(&IterationRecord),
+    look: Option<&'a mut dyn FnMut(&IterationEvent)>,
+    start: Option<StartStrategy>,
     is_shown: bool,
-    keeper: Option<&'a mut dyn Keeper>,
+    keeper: Option<&'a mut dyn CheckpointStore>,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> Observer<'a> {
     /// Somebody who is shown every iteration and keeps nothing.
-    pub fn new(observe: &'a mut dyn FnMut(&Row)) -> Self {
+    pub fn new(observe: &'a mut dyn FnMut(&IterationRecord)) -> Self {
         Self {
             observe,
             look: None,
-            rung: None,
+            start: None,
             is_shown: true,
             keeper: None,
         }
@@ -144,14 +144,14 @@ impl<'a> Watch<'a> {
 
     /// And somebody who is also told where in the fit an iteration stands.
     #[must_use]
-    pub fn looking(mut self, look: &'a mut dyn FnMut(&Moment)) -> Self {
+    pub fn looking(mut self, look: &'a mut dyn FnMut(&IterationEvent)) -> Self {
         self.look = Some(look);
         self
     }
 
     /// And a place where the fit keeps what it needs to go on.
     #[must_use]
-    pub fn keeping(mut self, keeper: &'a mut dyn Keeper) -> Self {
+    pub fn keeping(mut self, keeper: &'a mut dyn CheckpointStore) -> Self {
         self.keeper = Some(keeper);
         self
     }
@@ -169,16 +169,16 @@ impl<'a> Watch<'a> {
         self.keeper = None;
     }
 
-    pub(super) fn observe(&mut self) -> &mut dyn FnMut(&Row) {
+    pub(super) fn observe(&mut self) -> &mut dyn FnMut(&IterationRecord) {
         self.observe
     }
 
     /// Begins a search; its history and standing, if they were kept.
-    pub(super) fn begin_search(&mut self) -> Option<(Vec<Row>, Standing)> {
+    pub(super) fn begin_search(&mut self) -> Option<(Vec<IterationRecord>, SolverState)> {
         match self.keeper.as_mut()?.begin()? {
-            Kept::Search(rows, standing) => Some((rows, *standing)),
-            Kept::Nothing => None,
-            Kept::Piece(_) => {
+            CheckpointUnit::Search(rows, standing) => Some((rows, *standing)),
+            CheckpointUnit::Nothing => None,
+            CheckpointUnit::Piece(_) => {
                 self.refuse();
                 None
             }
@@ -192,17 +192,21 @@ impl<'a> Watch<'a> {
     }
 
     /// The searches from here on start by this strategy.
-    pub(super) fn climb(&mut self, rung: StartStrategy) {
-        self.rung = Some(rung);
+    pub(super) fn begin_attempt(&mut self, start: StartStrategy) {
+        self.start = Some(start);
     }
 
-    pub(super) fn iteration(&mut self, row: &Row, violation: impl FnOnce() -> Option<f64>) {
+    pub(super) fn iteration(
+        &mut self,
+        row: &IterationRecord,
+        violation: impl FnOnce() -> Option<f64>,
+    ) {
         if self.is_shown {
             (self.observe)(row);
             if let Some(look) = &mut self.look {
-                look(&Moment {
+                look(&IterationEvent {
                     row,
-                    rung: self.rung,
+                    start: self.start,
                     violation: violation(),
                 });
             }
@@ -218,7 +222,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Keeps a standing, which is made only where there is a keeper.
-    pub(super) fn stand(&mut self, standing: impl FnOnce() -> Standing) {
+    pub(super) fn stand(&mut self, standing: impl FnOnce() -> SolverState) {
         if let Some(keeper) = &mut self.keeper {
             keeper.stand(standing());
         }
@@ -243,7 +247,7 @@ impl<'a> Watch<'a> {
             return compute();
         };
         match keeper.begin() {
-            Some(Kept::Piece(piece)) if piece.len() == len => return piece,
+            Some(CheckpointUnit::Piece(piece)) if piece.len() == len => return piece,
             Some(_) => keeper.refuse(),
             None => {}
         }
@@ -256,7 +260,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-impl Serialize for Bits {
+impl Serialize for ExactF64s {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(&Digits(&self.0))
     }
@@ -281,7 +285,7 @@ impl fmt::Display for Digits<'_> {
     }
 }
 
-impl<'de> Deserialize<'de> for Bits {
+impl<'de> Deserialize<'de> for ExactF64s {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;
         let number = |digits: &[u8]| {
@@ -302,10 +306,10 @@ mod tests {
 
     #[test]
     fn bits_come_back_and_damaged_ones_do_not() {
-        let numbers = Bits(vec![-0.0, f64::INFINITY, 0.1 + 0.2, 5e-324]);
+        let numbers = ExactF64s(vec![-0.0, f64::INFINITY, 0.1 + 0.2, 5e-324]);
         let text = serde_json::to_string(&numbers).expect("text");
-        let read: Bits = serde_json::from_str(&text).expect("bits");
-        let bits = |b: &Bits| b.0.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let read: ExactF64s = serde_json::from_str(&text).expect("bits");
+        let bits = |b: &ExactF64s| b.0.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&read), bits(&numbers));
         for damaged in [
             &text[..text.len() - 2],
@@ -313,7 +317,10 @@ mod tests {
             "\"000000000000000g\"",
             "1",
         ] {
-            assert!(serde_json::from_str::<Bits>(damaged).is_err(), "{damaged}");
+            assert!(
+                serde_json::from_str::<ExactF64s>(damaged).is_err(),
+                "{damaged}"
+            );
         }
     }
 }

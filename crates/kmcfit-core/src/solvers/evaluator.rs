@@ -1,7 +1,7 @@
 //! Counted and timed evaluations: all solves of a search.
 
 use super::counts::{ADJOINT, FORWARD, QP, TANGENT};
-use super::iterate::Point;
+use super::iterate::Iterate;
 use super::linearization::{Linearization, halfway, in_halves};
 use super::settings::{FitSettings, Solver};
 use super::timings::{Timings, timed};
@@ -11,7 +11,7 @@ use crate::problem::Problem;
 use std::sync::OnceLock;
 
 /// The problem behind argmin's counters: the one door through which solvers evaluate.
-pub(crate) struct Work<'a, 'p> {
+pub(crate) struct CountedEvaluator<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
     /// Whether every operation has its place: the paper's run depends on every bit.
@@ -24,7 +24,7 @@ pub(crate) struct Work<'a, 'p> {
     pub timings: Timings,
 }
 
-impl<'a, 'p> Work<'a, 'p> {
+impl<'a, 'p> CountedEvaluator<'a, 'p> {
     pub fn new(
         problem: &'a mut argmin::core::Problem<&'p Problem>,
         settings: &FitSettings,
@@ -55,7 +55,7 @@ impl<'a, 'p> Work<'a, 'p> {
 
     /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
     /// the `fingerprint`. `None` if there is no such point.
-    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Point> {
+    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
         let evaluated = match self.in_order {
@@ -68,13 +68,13 @@ impl<'a, 'p> Work<'a, 'p> {
             return Some(point).filter(|point| point.fingerprint() == fingerprint);
         }
         // After a short step the gradient was computed by an adjoint solve.
-        let Point {
+        let Iterate {
             parameters,
             evaluation,
             ..
         } = point;
         let gradient = problem.gradient(&parameters, &evaluation, self.kind);
-        let point = Point::new(parameters, evaluation, gradient);
+        let point = Iterate::new(parameters, evaluation, gradient);
         (point.fingerprint() == fingerprint).then_some(point)
     }
 
@@ -142,7 +142,7 @@ impl<'a, 'p> Work<'a, 'p> {
     }
 
     /// The linearisation that a step from `point` uses.
-    pub fn linearization(&mut self, point: &Point) -> Linearization {
+    pub fn linearization(&mut self, point: &Iterate) -> Linearization {
         match point.linearization() {
             Linearization::Fresh if self.halfway.is_some() => self.linearise_again(point),
             known => known.clone(),
@@ -150,19 +150,19 @@ impl<'a, 'p> Work<'a, 'p> {
     }
 
     /// The linearisation at `point` itself, without counting.
-    pub fn linearise_again(&mut self, point: &Point) -> Linearization {
+    pub fn linearise_again(&mut self, point: &Iterate) -> Linearization {
         Linearization::at(self.problem(), &point.evaluation, &mut self.timings)
     }
 
-    /// [`Work::complete`] after a short step from `before`: its `linearization` is taken for that of the new point where
+    /// [`CountedEvaluator::complete`] after a short step from `before`: its `linearization` is taken for that of the new point where
     /// that can be done.
     pub fn complete_nearby(
         &mut self,
-        before: &Point,
+        before: &Iterate,
         linearization: &Linearization,
         parameters: Vec<f64>,
         evaluation: Evaluation,
-    ) -> Point {
+    ) -> Iterate {
         let problem = self.problem();
         let is_squares = |c: &Channel| c.loss() == Loss::Squares;
         if linearization.reduced().is_none()
@@ -174,14 +174,14 @@ impl<'a, 'p> Work<'a, 'p> {
         let gradient = self.gradient(&parameters, &evaluation);
         match linearization.nearby(&before.parameters, &evaluation, &gradient) {
             Some(reused) => {
-                Point::new(parameters, evaluation, gradient).with_cached(OnceLock::new(), reused)
+                Iterate::new(parameters, evaluation, gradient).with_cached(OnceLock::new(), reused)
             }
             None => self.complete(parameters, evaluation),
         }
     }
 
     /// The point that an evaluation belongs to, completed by its gradient.
-    pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
+    pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Iterate {
         let mut timings = Timings::default();
         let point = self.completed(parameters, evaluation, &mut timings);
         self.timings += timings;
@@ -194,13 +194,13 @@ impl<'a, 'p> Work<'a, 'p> {
         point
     }
 
-    /// [`Work::complete`] without counting: by the linearised halves of a long record, otherwise by an adjoint solve.
+    /// [`CountedEvaluator::complete`] without counting: by the linearised halves of a long record, otherwise by an adjoint solve.
     fn completed(
         &self,
         parameters: Vec<f64>,
         evaluation: Evaluation,
         timings: &mut Timings,
-    ) -> Point {
+    ) -> Iterate {
         let problem = self.problem();
         if let Some(halfway) = self.halfway {
             let (reduced, sizes) = timed(&mut timings.tangent, || {
@@ -210,14 +210,14 @@ impl<'a, 'p> Work<'a, 'p> {
             if let Some(misfit) = reduced.misfit_gradient() {
                 let gradient = problem.gradient_of_misfit(&parameters, misfit);
                 let halves = Linearization::Halves(reduced);
-                let point = Point::new(parameters, evaluation, gradient);
+                let point = Iterate::new(parameters, evaluation, gradient);
                 return point.with_cached(sizes.into(), halves);
             }
         }
         let gradient = timed(&mut timings.adjoint, || {
             problem.gradient(&parameters, &evaluation, self.kind)
         });
-        Point::new(parameters, evaluation, gradient)
+        Iterate::new(parameters, evaluation, gradient)
     }
 
     fn count(&mut self, key: &'static str, solves: u64) {

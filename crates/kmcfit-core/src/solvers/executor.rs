@@ -1,11 +1,11 @@
 //! The loop around every solver, run by argmin's executor.
 
-use super::checkpoint::{Bits, Memory, Standing, Watch};
+use super::checkpoint::{ExactF64s, MethodState, Observer, SolverState};
 use super::counts::Counts;
-use super::evaluator::Work;
+use super::evaluator::CountedEvaluator;
 use super::fit::{Fit, measured};
-use super::history::{Recorder, Reference, Row};
-use super::iterate::Point;
+use super::history::{IterationRecord, Recorder, Reference};
+use super::iterate::Iterate;
 use super::methods::{Step, StepRule, equation_error, step_rule};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
@@ -32,7 +32,7 @@ pub(super) fn search(
     start: &[f64],
     settings: &FitSettings,
     reference: Option<Reference>,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<Fit, Breakdown> {
     let prepared = Prepared {
         parameters: start.to_vec(),
@@ -58,7 +58,7 @@ pub(super) fn search_prepared(
     prepared: Prepared,
     settings: &FitSettings,
     reference: Option<Reference>,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
         return Ok(equation_error::fit(
@@ -111,7 +111,13 @@ pub fn fit_from(
     start: &[f64],
     settings: &FitSettings,
 ) -> Result<Fit, Breakdown> {
-    let fit = search(problem, start, settings, None, &mut Watch::new(&mut |_| {}))?;
+    let fit = search(
+        problem,
+        start,
+        settings,
+        None,
+        &mut Observer::new(&mut |_| {}),
+    )?;
     Ok(measured(problem, fit, settings))
 }
 
@@ -127,9 +133,9 @@ struct Run<'a, 'w> {
     progress: Result<Progress, Breakdown>,
     outcome: Option<Outcome>,
     /// What was kept of this search when it ran before.
-    kept: Option<(Vec<Row>, Standing)>,
+    kept: Option<(Vec<IterationRecord>, SolverState)>,
     before: Before,
-    watch: &'a mut Watch<'w>,
+    watch: &'a mut Observer<'w>,
 }
 
 /// What a search did before it was ended from outside.
@@ -141,7 +147,7 @@ struct Before {
 }
 
 struct Progress {
-    point: Point,
+    point: Iterate,
     recorder: Recorder,
 }
 
@@ -157,7 +163,11 @@ const NOT_STARTED: Breakdown = Breakdown {
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 impl Run<'_, '_> {
-    fn start(&mut self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
+    fn start(
+        &mut self,
+        work: &mut CountedEvaluator,
+        parameters: Vec<f64>,
+    ) -> Result<Progress, Breakdown> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
             None => {
@@ -175,7 +185,7 @@ impl Run<'_, '_> {
 
     /// The search where it stood when it was ended from outside, if that was kept and comes out with
     /// the same bits.
-    fn recalled(&mut self, work: &Work) -> Option<Progress> {
+    fn restored(&mut self, work: &CountedEvaluator) -> Option<Progress> {
         let (rows, standing) = self.kept.take()?;
         let progress = self.stand_again(work, rows, standing);
         if progress.is_none() {
@@ -184,7 +194,12 @@ impl Run<'_, '_> {
         progress
     }
 
-    fn stand_again(&mut self, work: &Work, rows: Vec<Row>, standing: Standing) -> Option<Progress> {
+    fn stand_again(
+        &mut self,
+        work: &CountedEvaluator,
+        rows: Vec<IterationRecord>,
+        standing: SolverState,
+    ) -> Option<Progress> {
         let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
         if !fits(&standing.parameters.0) {
             return None;
@@ -201,7 +216,7 @@ impl Run<'_, '_> {
         let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
         let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
-            && !(self.method).recall(standing.memory, work.problem(), &mut point)
+            && !(self.method).restore(standing.memory, work.problem(), &mut point)
         {
             return None;
         }
@@ -236,17 +251,17 @@ impl Run<'_, '_> {
         let Ok(Progress { point, recorder }) = &self.progress else {
             return;
         };
-        let standing = || Standing {
+        let standing = || SolverState {
             iterations: recorder.rows.len() as u64,
-            parameters: Bits(point.parameters.clone()),
+            parameters: ExactF64s(point.parameters.clone()),
             fingerprint: point.fingerprint(),
             memory: match outcome {
-                None => self.method.memory(point),
-                Some(_) => Memory::Nothing,
+                None => self.method.state(point),
+                Some(_) => MethodState::Nothing,
             },
-            references: Bits(recorder.references()),
+            references: ExactF64s(recorder.references()),
             snapshots: (recorder.snapshot_points())
-                .map(|(iteration, at)| (iteration, Bits(at.to_vec())))
+                .map(|(iteration, at)| (iteration, ExactF64s(at.to_vec())))
                 .collect(),
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
@@ -262,7 +277,7 @@ impl Run<'_, '_> {
         self.before.elapsed + self.clock.elapsed()
     }
 
-    fn advance(&mut self, work: &mut Work) {
+    fn advance(&mut self, work: &mut CountedEvaluator) {
         let Ok(progress) = &mut self.progress else {
             return;
         };
@@ -352,7 +367,7 @@ impl Run<'_, '_> {
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
             elapsed,
-            rungs: Vec::new(),
+            attempts: Vec::new(),
             optimality: None,
         })
     }
@@ -378,8 +393,8 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         mut state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
-        let mut work = Work::new(problem, self.settings);
-        match self.recalled(&work) {
+        let mut work = CountedEvaluator::new(problem, self.settings);
+        match self.restored(&work) {
             Some(progress) => {
                 self.at_start = None;
                 self.progress = Ok(progress);
@@ -398,7 +413,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        let mut work = Work::new(problem, self.settings);
+        let mut work = CountedEvaluator::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
         self.keep(Counts::of(problem));

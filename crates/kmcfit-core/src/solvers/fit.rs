@@ -1,8 +1,8 @@
 //! A finished fit.
 
 use super::counts::Counts;
-use super::history::{Row, Snapshot, ratio};
-use super::iterate::Point;
+use super::history::{IterationRecord, Snapshot, ratio};
+use super::iterate::Iterate;
 use super::optimality::{Optimality, judged};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The point with the lowest cost.
-    pub best: Point,
+    pub best: Iterate,
     /// Cost at the start values of the functions, whatever start the search took.
     pub initial_cost: f64,
     /// Cost at the point from which the search set out.
@@ -24,7 +24,7 @@ pub struct Fit {
     /// `G^2` at the start values.
     pub initial_norm_squared: f64,
     /// One row per iteration.
-    pub history: Vec<Row>,
+    pub history: Vec<IterationRecord>,
     /// Motions on the way.
     pub snapshots: Vec<Snapshot>,
     /// How it ended.
@@ -36,7 +36,7 @@ pub struct Fit {
     /// Wall-clock time.
     pub elapsed: Duration,
     /// The starts that were tried, in order.
-    pub rungs: Vec<Rung>,
+    pub attempts: Vec<Attempt>,
     /// The first-order condition at the best point, once it is measured.
     pub optimality: Option<Optimality>,
 }
@@ -50,7 +50,7 @@ impl Fit {
 
 /// One of several attempts: a search from one starting point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rung {
+pub struct Attempt {
     /// Where it started.
     pub start: StartStrategy,
     /// J at its start; NaN if the start had no motion.
@@ -63,7 +63,7 @@ pub struct Rung {
     pub outcome: Outcome,
 }
 
-impl Rung {
+impl Attempt {
     /// The attempt that ended with `fit`.
     pub(super) fn of(start: StartStrategy, fit: &Fit) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl Rung {
 pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) -> Fit {
     let status = fit.outcome.status;
     let cost = fit.best.evaluation.cost;
-    let is_asked = |row: &Row| settings.stopping.ratios_met(row).is_some();
+    let is_asked = |row: &IterationRecord| settings.stopping.ratios_met(row).is_some();
     // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
     let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
     let is_measurable = cost > 0.0 && cost.is_finite();

@@ -1,13 +1,13 @@
 //! What happened, iteration by iteration.
 
-use super::iterate::Point;
+use super::iterate::Iterate;
 use crate::dynamics::Trajectory;
 use crate::problem::Problem;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// One iteration: the cost after it, the gradient before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct IterationRecord {
     /// Iteration, from 1.
     pub iteration: u64,
     /// `J` after the iteration.
@@ -49,7 +49,7 @@ pub(super) struct Reference {
 /// History and snapshots of one run.
 #[derive(Debug)]
 pub(super) struct Recorder {
-    pub rows: Vec<Row>,
+    pub rows: Vec<IterationRecord>,
     pub snapshots: Vec<Snapshot>,
     pub initial_cost: f64,
     pub started_from: f64,
@@ -60,7 +60,7 @@ pub(super) struct Recorder {
 
 impl Recorder {
     /// A record that begins at `start`, with ratios to `reference`, by default the start itself.
-    pub fn new(start: &Point, reference: Option<Reference>) -> Self {
+    pub fn new(start: &Iterate, reference: Option<Reference>) -> Self {
         let reference = reference.unwrap_or(Reference {
             cost: start.evaluation.cost,
             norm_squared: start.gradient.norm_squared,
@@ -80,7 +80,7 @@ impl Recorder {
     /// The record of a search that stood here: `references` are [`Recorder::references`], `snapshots` those of
     /// [`Recorder::snapshot_points`], with the responses that `at` computes. `None` where it is incomplete.
     pub fn restored(
-        rows: Vec<Row>,
+        rows: Vec<IterationRecord>,
         references: &[f64],
         snapshots: Vec<(u64, Vec<f64>)>,
         at: impl Fn(&[f64]) -> Option<Vec<Trajectory>>,
@@ -126,9 +126,9 @@ impl Recorder {
     }
 
     /// Records the iteration that led from `before` to `after`.
-    pub fn record(&mut self, problem: &Problem, before: &Point, after: &Point, step: f64) {
+    pub fn record(&mut self, problem: &Problem, before: &Iterate, after: &Iterate, step: f64) {
         let iteration = self.rows.len() as u64 + 1;
-        self.rows.push(Row {
+        self.rows.push(IterationRecord {
             iteration,
             cost: after.evaluation.cost,
             cost_ratio: ratio(after.evaluation.cost, self.initial_cost),
@@ -142,7 +142,7 @@ impl Recorder {
         self.keep_snapshot(iteration, after);
     }
 
-    fn keep_snapshot(&mut self, iteration: u64, point: &Point) {
+    fn keep_snapshot(&mut self, iteration: u64, point: &Iterate) {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
             self.snapshots.push(Snapshot {
                 iteration,

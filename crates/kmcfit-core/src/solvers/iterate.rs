@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 /// Parameters with everything known about them.
 #[derive(Debug, Clone)]
-pub struct Point {
+pub struct Iterate {
     /// Parameters of all functions.
     pub parameters: Vec<f64>,
     /// Cost, device and motions.
@@ -17,7 +17,7 @@ pub struct Point {
     cached: Cached,
 }
 
-impl Point {
+impl Iterate {
     pub(crate) fn new(parameters: Vec<f64>, evaluation: Evaluation, gradient: Gradient) -> Self {
         Self {
             parameters,

@@ -28,22 +28,24 @@ mod validation;
 mod weight_path;
 
 pub use active_set::{ActiveGroup, active_constraints};
-pub use checkpoint::{Bits, Keeper, Kept, Memory, Moment, Standing, Watch};
+pub use checkpoint::{
+    CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, MethodState, Observer, SolverState,
+};
 pub use counts::Counts;
 pub use executor::fit_from;
-pub use fit::{Fit, Rung};
-pub use history::{Row, SNAPSHOT_ITERATIONS, Snapshot};
-pub use iterate::Point;
+pub use fit::{Attempt, Fit};
+pub use history::{IterationRecord, SNAPSHOT_ITERATIONS, Snapshot};
+pub use iterate::Iterate;
 pub use linearization::FEW_PARAMETERS;
 pub(crate) use linearization::{add_priors, linear_readings, weighted_jacobian};
 pub use methods::equation_error::{Measurements, equation_error};
 pub use no_response::without_motion;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
-pub use reason::{ConditionFailure, MissingMeasurement, Reason, Unsuited, Within};
+pub use reason::{ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord, Within};
 pub use settings::{FitSettings, Initial, Solver, StartStrategy};
 pub use start_strategy::{fit, fit_watched};
-pub use starts::Start;
+pub use starts::StartProjection;
 pub use state_estimation::states_from_readings;
 pub use termination::{Outcome, Status, Stopping};
 pub use timings::{Timings, timed};

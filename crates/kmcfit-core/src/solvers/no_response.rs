@@ -3,7 +3,7 @@
 //! The constraint set is convex, and whether it is empty is decided by a projection. Which of its
 //! points have a motion is not: only that the mass must be positive is a constraint of its own.
 
-use super::checkpoint::Watch;
+use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::Fit;
 use super::reason::Reason;
@@ -38,7 +38,7 @@ pub fn without_motion(
         given,
         &settings,
         None,
-        &mut Watch::new(&mut |_| {}),
+        &mut Observer::new(&mut |_| {}),
     )
     .map_err(|_| breakdown)?;
     Ok(Fit {

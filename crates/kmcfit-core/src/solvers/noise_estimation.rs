@@ -1,11 +1,11 @@
 //! Sigmas that are estimated from the residuals.
 
-use super::checkpoint::Watch;
+use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::{Fit, measured};
-use super::history::Row;
+use super::history::IterationRecord;
 use super::settings::FitSettings;
-use super::start_strategy::climb;
+use super::start_strategy::search_from_starts;
 use super::termination::Status;
 use crate::dynamics::Breakdown;
 use crate::objective::{Channel, Loss, Weighting};
@@ -32,12 +32,12 @@ pub fn fit_with_noise(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    observe: &mut dyn FnMut(&Row),
+    observe: &mut dyn FnMut(&IterationRecord),
 ) -> Result<(Problem, Fit), Breakdown> {
-    fit_with_noise_watched(problem, start, settings, &mut Watch::new(observe))
+    fit_with_noise_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
-/// [`fit_with_noise`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what
+/// [`fit_with_noise`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what
 /// was kept.
 ///
 /// # Errors
@@ -46,10 +46,10 @@ pub fn fit_with_noise_watched(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<(Problem, Fit), Breakdown> {
     let mut problem = problem.clone();
-    let mut found = climb(&problem, start, settings, watch)?;
+    let mut found = search_from_starts(&problem, start, settings, watch)?;
     let estimates = problem
         .channels()
         .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
@@ -84,7 +84,7 @@ fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
         counts: found.counts + next.counts,
         timings: found.timings + next.timings,
         elapsed: found.elapsed + next.elapsed,
-        rungs: found.rungs,
+        attempts: found.attempts,
         history: match next.history.is_empty() {
             true => found.history,
             false => next.history,

@@ -4,7 +4,7 @@
 //! linearised once more at the point that is returned, and solved under its constraints; how much of J that solution promises is
 //! what the point is short of a minimum.
 
-use super::iterate::Point;
+use super::iterate::Iterate;
 use super::linearization::{Linearization, linearise};
 use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
@@ -89,7 +89,7 @@ impl Optimality {
     }
 
     /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
-    pub fn at(problem: &Problem, point: &Point, tolerance: f64) -> Option<Self> {
+    pub fn at(problem: &Problem, point: &Iterate, tolerance: f64) -> Option<Self> {
         let cost = point.evaluation.cost;
         let worst = problem.constraints.largest_violation(&point.parameters);
         let feasibility = worst.map_or(0.0, |v| v.relative);

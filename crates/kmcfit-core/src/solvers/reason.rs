@@ -87,7 +87,7 @@ pub enum Reason {
     NoFeasibleResponse(Breakdown),
     /// A record has no equation error.
     #[serde(skip)]
-    Unsuited(Unsuited),
+    UnsupportedRecord(UnsupportedRecord),
     /// A stopping test was met where the first-order condition does not hold.
     #[serde(skip)]
     NoMinimum {
@@ -111,7 +111,7 @@ pub enum ConditionFailure {
 
 /// A record without an equation error.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unsuited {
+pub struct UnsupportedRecord {
     /// Index of the experiment.
     pub experiment: usize,
     /// Its name.
@@ -176,7 +176,7 @@ impl fmt::Display for Reason {
                 "no start within the constraints has a motion ({breakdown}); what is kept is the \
                  start as given, which breaks them"
             ),
-            Self::Unsuited(unsuited) => write!(f, "{unsuited}"),
+            Self::UnsupportedRecord(unsuited) => write!(f, "{unsuited}"),
             Self::NoMinimum { met, failure } => match failure {
                 Some(failure) => write!(f, "{met}; but this is no minimum: {failure}"),
                 None => write!(
@@ -274,13 +274,13 @@ impl fmt::Display for ConditionFailure {
     }
 }
 
-impl fmt::Display for Unsuited {
+impl fmt::Display for UnsupportedRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.name, self.reason)
     }
 }
 
-impl std::error::Error for Unsuited {}
+impl std::error::Error for UnsupportedRecord {}
 
 impl fmt::Display for MissingMeasurement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

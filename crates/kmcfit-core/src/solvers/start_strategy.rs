@@ -6,11 +6,11 @@
 //! first steps; the start as given; the equation error; a horizon that grows from an eighth of the record to all of it; states
 //! and parameters together, from a response near the measurements.
 
-use super::checkpoint::Watch;
+use super::checkpoint::Observer;
 use super::counts::Counts;
 use super::executor::{Prepared, search, search_prepared};
-use super::fit::{Fit, Rung, measured};
-use super::history::{Reference, Row};
+use super::fit::{Attempt, Fit, measured};
+use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
 use super::starts::{
     Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
@@ -40,12 +40,12 @@ pub fn fit(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    observe: &mut dyn FnMut(&Row),
+    observe: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Fit, Breakdown> {
-    fit_watched(problem, start, settings, &mut Watch::new(observe))
+    fit_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
-/// [`fit`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what was kept.
+/// [`fit`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what was kept.
 ///
 /// # Errors
 /// As [`fit`].
@@ -53,18 +53,18 @@ pub fn fit_watched(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<Fit, Breakdown> {
-    let fit = climb(problem, start, settings, watch)?;
+    let fit = search_from_starts(problem, start, settings, watch)?;
     Ok(measured(problem, fit, settings))
 }
 
 /// [`fit_watched`] without a measurement of its end.
-pub(super) fn climb(
+pub(super) fn search_from_starts(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<Fit, Breakdown> {
     if settings.solver == Solver::EquationError {
         return search(problem, start, settings, None, watch);
@@ -90,7 +90,7 @@ struct Attempts<'a, 'w> {
     settings: &'a FitSettings,
     /// The settings of one attempt: a search stuck in a false valley creeps, so the others are tried before it goes on.
     probing: FitSettings,
-    watch: &'a mut Watch<'w>,
+    watch: &'a mut Observer<'w>,
     /// Whether more than one starting point is tried.
     has_several: bool,
     truncated: Option<(StartStrategy, Prepared)>,
@@ -100,7 +100,7 @@ struct Attempts<'a, 'w> {
     counts: Counts,
     timings: Timings,
     best: Option<Fit>,
-    rungs: Vec<Rung>,
+    attempts: Vec<Attempt>,
     trouble: Option<Breakdown>,
 }
 
@@ -109,7 +109,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         problem: &'a Problem,
         start: &'a [f64],
         settings: &'a FitSettings,
-        watch: &'a mut Watch<'w>,
+        watch: &'a mut Observer<'w>,
     ) -> Self {
         let has_several = settings.solver == Solver::GaussNewton;
         let mut probing = settings.clone();
@@ -128,7 +128,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             counts: Counts::default(),
             timings: Timings::default(),
             best: None,
-            rungs: Vec::new(),
+            attempts: Vec::new(),
             trouble: None,
         }
     }
@@ -181,7 +181,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
     /// Searches from one starting point; whether it was the last attempt.
     fn attempt(&mut self, strategy: StartStrategy) -> bool {
         let clock = Instant::now();
-        self.watch.climb(strategy);
+        self.watch.begin_attempt(strategy);
         let prepared = self.starting_point(strategy);
         let found = search_prepared(
             self.problem,
@@ -197,7 +197,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 self.take(strategy, fit)
             }
             Err(breakdown) => {
-                self.rungs.push(Rung::failed(strategy, breakdown));
+                self.attempts.push(Attempt::failed(strategy, breakdown));
                 self.trouble.get_or_insert(breakdown);
                 !self.has_several
             }
@@ -206,7 +206,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
 
     /// Takes the end of an attempt; whether it was the last one.
     fn take(&mut self, strategy: StartStrategy, fit: Fit) -> bool {
-        self.rungs.push(Rung::of(strategy, &fit));
+        self.attempts.push(Attempt::of(strategy, &fit));
         self.reference.get_or_insert(Reference {
             cost: fit.initial_cost,
             norm_squared: fit.initial_norm_squared,
@@ -276,12 +276,12 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 fit,
                 settings,
                 reference,
-                &mut self.rungs,
+                &mut self.attempts,
                 self.watch,
             )?;
         }
         Ok(Fit {
-            rungs: self.rungs,
+            attempts: self.attempts,
             counts: self.counts + fit.counts,
             timings: self.timings + fit.timings,
             ..fit
@@ -289,14 +289,14 @@ impl<'a, 'w> Attempts<'a, 'w> {
     }
 }
 
-/// The fit that came furthest, given the iterations that it was not given as one rung of several.
+/// The fit that came furthest, given the iterations that it was not given as one of several attempts.
 fn continued(
     problem: &Problem,
     fit: Fit,
     settings: &FitSettings,
     reference: Option<Reference>,
-    rungs: &mut Vec<Rung>,
-    watch: &mut Watch,
+    attempts: &mut Vec<Attempt>,
+    watch: &mut Observer,
 ) -> Result<Fit, Breakdown> {
     let mut settings = settings.clone();
     let taken = fit.history.len() as u64;
@@ -305,11 +305,11 @@ fn continued(
         return Ok(fit);
     }
     let start = &fit.best.parameters;
-    watch.climb(StartStrategy::Continued);
+    watch.begin_attempt(StartStrategy::Continued);
     let more = search(problem, start, &settings, reference, watch)?;
-    rungs.push(Rung::of(StartStrategy::Continued, &more));
+    attempts.push(Attempt::of(StartStrategy::Continued, &more));
     let mut history = fit.history;
-    history.extend(more.history.into_iter().map(|row| Row {
+    history.extend(more.history.into_iter().map(|row| IterationRecord {
         iteration: row.iteration + taken,
         ..row
     }));
@@ -410,18 +410,26 @@ mod tests {
         let (before, cost) = (first.counts, first.best.evaluation.cost);
         let snapshots = first.snapshots.clone();
         assert!(!snapshots.is_empty());
-        let mut rungs = Vec::new();
-        let mut observe = |_: &Row| {};
-        let mut watch = Watch::new(&mut observe);
-        let whole = continued(&problem, first, &settings(5), None, &mut rungs, &mut watch).unwrap();
+        let mut attempts = Vec::new();
+        let mut observe = |_: &IterationRecord| {};
+        let mut watch = Observer::new(&mut observe);
+        let whole = continued(
+            &problem,
+            first,
+            &settings(5),
+            None,
+            &mut attempts,
+            &mut watch,
+        )
+        .unwrap();
         let numbers: Vec<u64> = whole.history.iter().map(|row| row.iteration).collect();
         assert_eq!(numbers, [1, 2, 3, 4, 5]);
         assert!(whole.best.evaluation.cost < cost);
         assert_eq!(whole.snapshots, snapshots);
-        let [rung] = rungs.as_slice() else {
-            panic!("{rungs:?}");
+        let [attempt] = attempts.as_slice() else {
+            panic!("{attempts:?}");
         };
-        assert_eq!((rung.iterations, rung.initial_cost), (3, cost));
+        assert_eq!((attempt.iterations, attempt.initial_cost), (3, cost));
         // Every iteration of steepest descent has one gradient at least.
         assert!(whole.counts.adjoint >= before.adjoint + 3);
         assert!(whole.timings.start >= hours && whole.timings.adjoint > Duration::ZERO);

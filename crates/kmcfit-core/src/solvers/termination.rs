@@ -1,6 +1,6 @@
 //! Termination of a fit: stopping tests, and how a fit ended.
 
-use super::history::Row;
+use super::history::IterationRecord;
 use super::reason::{Reason, Within};
 use crate::qp::Subproblem;
 use serde::{Deserialize, Serialize};
@@ -119,7 +119,12 @@ impl Stopping {
 
     /// The outcome that the latest iteration brings, if any. `previous_cost` is J before it; a small
     /// step that was `limited` is no sign of convergence.
-    pub(crate) fn after(&self, row: &Row, previous_cost: f64, limited: bool) -> Option<Outcome> {
+    pub(crate) fn after(
+        &self,
+        row: &IterationRecord,
+        previous_cost: f64,
+        limited: bool,
+    ) -> Option<Outcome> {
         let small_step = || (!limited).then(|| self.small_step(row, previous_cost));
         self.ratios_met(row)
             .or_else(|| small_step().flatten())
@@ -137,7 +142,7 @@ impl Stopping {
 
     /// The ratios of cost and gradient of `row`, if they are within all limits that are given: what was asked
     /// for, but no sign of a minimum.
-    pub(super) fn ratios_met(&self, row: &Row) -> Option<Reason> {
+    pub(super) fn ratios_met(&self, row: &IterationRecord) -> Option<Reason> {
         let test = |value: f64, limit: Option<f64>| limit.map(|limit| Within { value, limit });
         let cost = test(row.cost_ratio, self.cost_ratio);
         let gradient = test(row.gradient_norm_squared_ratio, self.gradient_ratio);
@@ -146,7 +151,7 @@ impl Stopping {
         (given.peek().is_some() && given.all(is_met)).then_some(Reason::Ratios { cost, gradient })
     }
 
-    fn small_step(&self, row: &Row, previous_cost: f64) -> Option<Reason> {
+    fn small_step(&self, row: &IterationRecord, previous_cost: f64) -> Option<Reason> {
         let change = row.relative_change;
         let decrease = (previous_cost - row.cost) / previous_cost.max(f64::MIN_POSITIVE);
         let within = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value <= limit);

@@ -1,6 +1,6 @@
 //! Experiments that took no part in the fit.
 
-use super::checkpoint::Watch;
+use super::checkpoint::Observer;
 use super::executor::search;
 use super::settings::{FitSettings, Solver};
 use super::state_estimation::states_from_readings;
@@ -56,7 +56,7 @@ pub fn predict_held_out(
         &start,
         &settings,
         None,
-        &mut Watch::new(&mut |_| {}),
+        &mut Observer::new(&mut |_| {}),
     )?;
     Ok((alone, found.best.evaluation))
 }

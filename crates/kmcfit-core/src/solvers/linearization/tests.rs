@@ -4,9 +4,9 @@ use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, 
 use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
 use crate::objective::{Channel, GradientKind, Weighting};
 use crate::problem::Experiment;
-use crate::solvers::checkpoint::{Bits, Memory};
+use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::counts::Counts;
-use crate::solvers::evaluator::Work;
+use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
 use crate::solvers::{Fit, fit, fit_from};
@@ -158,15 +158,15 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
     let start = problem.start();
     let stepped = |elsewhere: Option<&[f64]>| {
         let mut counted = argmin::core::Problem::new(&problem);
-        let mut work = Work::new(&mut counted, &settings);
+        let mut work = CountedEvaluator::new(&mut counted, &settings);
         let evaluation = problem.evaluate(&start).expect("a motion");
         let mut point = work.complete(start.clone(), evaluation);
         let mut method = GaussNewton::default();
-        let memory = Memory::GaussNewton {
-            numbers: Bits(vec![1e-10]),
-            made_at: elsewhere.map(|at| Bits(at.to_vec())),
+        let memory = MethodState::GaussNewton {
+            numbers: ExactF64s(vec![1e-10]),
+            made_at: elsewhere.map(|at| ExactF64s(at.to_vec())),
         };
-        assert!(method.recall(memory, &problem, &mut point));
+        assert!(method.restore(memory, &problem, &mut point));
         let Step::Moved { point, .. } = method.step(&mut work, &point) else {
             panic!("no step");
         };

@@ -18,9 +18,9 @@ use crate::lanes::sum::largest;
 use crate::lanes::{self, Elementwise};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::checkpoint::{Bits, Memory};
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::checkpoint::{ExactF64s, MethodState};
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
 use std::collections::VecDeque;
 
@@ -84,7 +84,12 @@ impl Lbfgs {
         }
     }
 
-    fn attempt(&mut self, work: &mut Work, at: &Coordinates, point: &Point) -> Option<Step> {
+    fn attempt(
+        &mut self,
+        work: &mut CountedEvaluator,
+        at: &Coordinates,
+        point: &Iterate,
+    ) -> Option<Step> {
         let Here { x, gradient, .. } = self.here(at, point);
         let direction = work.algebra(|| self.direction(&gradient.primal));
         let slope = gradient.inner(&direction);
@@ -139,7 +144,7 @@ impl Lbfgs {
     }
 
     /// The point in coordinates, as the last step left it if it is still the same.
-    fn here(&mut self, at: &Coordinates, point: &Point) -> Here {
+    fn here(&mut self, at: &Coordinates, point: &Iterate) -> Here {
         let same =
             |here: &Here| here.parameters == point.parameters && here.logarithmic == at.logarithmic;
         match self.here.take().filter(same) {
@@ -186,7 +191,7 @@ impl Lbfgs {
 }
 
 impl StepRule for Lbfgs {
-    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+    fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let at = Coordinates::new(work.problem(), &point.parameters);
         if let Some(step) = self.attempt(work, &at, point) {
             return step;
@@ -200,21 +205,26 @@ impl StepRule for Lbfgs {
         Step::Stuck(Reason::NoLowerLineStep)
     }
 
-    fn memory(&self, _: &Point) -> Memory {
+    fn state(&self, _: &Iterate) -> MethodState {
         let here = self.here.as_ref();
         let pair = |p: &Pair| {
-            let [s, z] = [&p.s, &p.z].map(|v| Bits(v.primal.clone()));
-            [s, z, Bits(p.z.dual.clone()), Bits(vec![p.curvature])]
+            let [s, z] = [&p.s, &p.z].map(|v| ExactF64s(v.primal.clone()));
+            [
+                s,
+                z,
+                ExactF64s(p.z.dual.clone()),
+                ExactF64s(vec![p.curvature]),
+            ]
         };
-        Memory::Lbfgs {
-            x: Bits(here.map_or(Vec::new(), |here| here.x.clone())),
+        MethodState::Lbfgs {
+            x: ExactF64s(here.map_or(Vec::new(), |here| here.x.clone())),
             logarithmic: here.map_or(Vec::new(), |here| here.logarithmic.clone()),
             pairs: self.pairs.iter().map(pair).collect(),
         }
     }
 
-    fn recall(&mut self, memory: Memory, problem: &Problem, point: &mut Point) -> bool {
-        let Memory::Lbfgs {
+    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
+        let MethodState::Lbfgs {
             x,
             logarithmic,
             pairs,
@@ -223,7 +233,7 @@ impl StepRule for Lbfgs {
             return false;
         };
         let len = point.parameters.len();
-        let pair = |[s, z, dual, curvature]: [Bits; 4]| {
+        let pair = |[s, z, dual, curvature]: [ExactF64s; 4]| {
             let whole = [&s, &z, &dual].iter().all(|v| v.0.len() == len);
             let [curvature] = *curvature.0.as_slice() else {
                 return None;
@@ -331,7 +341,7 @@ impl<'p> Coordinates<'p> {
     }
 
     /// The gradient in these coordinates: L2, and Euclidean as its dual.
-    fn gradient(&self, point: &Point) -> Vector {
+    fn gradient(&self, point: &Iterate) -> Vector {
         let dual: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
             .zip(self.kinds())
             .map(|((g, p), (log, unit))| if log { g * p } else { g * unit })
@@ -353,7 +363,7 @@ impl<'p> Coordinates<'p> {
 
 /// Trial points along one direction.
 struct Trials<'a, 'w, 'q, 'p> {
-    work: &'a mut Work<'w, 'q>,
+    work: &'a mut CountedEvaluator<'w, 'q>,
     at: &'a Coordinates<'p>,
     x: Vec<f64>,
     direction: &'a [f64],
@@ -375,7 +385,7 @@ struct Candidate {
 struct Accepted {
     length: f64,
     x: Vec<f64>,
-    point: Point,
+    point: Iterate,
     gradient: Vector,
 }
 

@@ -10,9 +10,9 @@ mod steepest_descent;
 #[cfg(test)]
 pub(super) use gauss_newton::GaussNewton;
 
-use super::checkpoint::Memory;
-use super::evaluator::Work;
-use super::iterate::Point;
+use super::checkpoint::MethodState;
+use super::evaluator::CountedEvaluator;
+use super::iterate::Iterate;
 use super::reason::Reason;
 use super::settings::Solver;
 use crate::constraints::TOLERANCE;
@@ -29,7 +29,7 @@ pub(crate) enum Step {
     /// To a point with lower cost; `length` is the step along the direction. A `limited` step is
     /// short because longer ones could not be computed: that it is short says nothing of a minimum.
     Moved {
-        point: Box<Point>,
+        point: Box<Iterate>,
         length: f64,
         limited: bool,
     },
@@ -44,7 +44,7 @@ pub(crate) enum Step {
 /// A direction and a step rule.
 pub(crate) trait StepRule {
     /// One iteration from `point`.
-    fn step(&mut self, work: &mut Work, point: &Point) -> Step;
+    fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step;
 
     /// Storage for the next step, from a point that has been left.
     fn recycle(&mut self, evaluation: Evaluation) {
@@ -52,15 +52,15 @@ pub(crate) trait StepRule {
     }
 
     /// What decides its next steps from `point` beside that.
-    fn memory(&self, point: &Point) -> Memory {
+    fn state(&self, point: &Iterate) -> MethodState {
         let _ = point;
-        Memory::Nothing
+        MethodState::Nothing
     }
 
     /// Takes up a memory at `point`; whether it is one of this method and this problem.
-    fn recall(&mut self, memory: Memory, problem: &Problem, point: &mut Point) -> bool {
+    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
         let _ = (problem, point);
-        memory == Memory::Nothing
+        memory == MethodState::Nothing
     }
 }
 
@@ -79,7 +79,7 @@ pub(super) fn step_rule(solver: Solver) -> Box<dyn StepRule> {
 }
 
 /// The step from `point` when the quadratic programs that would make one ended with `status`.
-pub(super) fn no_step(problem: &Problem, point: &Point, status: ConicStatus) -> Step {
+pub(super) fn no_step(problem: &Problem, point: &Iterate, status: ConicStatus) -> Step {
     let reason = Reason::Program(status);
     // From a point that satisfies them there is always the step of length zero.
     let inside = problem.constraints.hold(&point.parameters, TOLERANCE);

@@ -10,9 +10,9 @@ use super::{Step, StepRule, no_step};
 use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project_within};
-use crate::solvers::checkpoint::{Bits, Memory};
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::checkpoint::{ExactF64s, MethodState};
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
 
 /// Sufficient decrease along the feasible direction.
@@ -31,7 +31,7 @@ pub struct ProjectedGradient {
 }
 
 impl StepRule for ProjectedGradient {
-    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+    fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         if self.metric.is_empty() {
             self.prepare(work, point);
         }
@@ -71,15 +71,15 @@ impl StepRule for ProjectedGradient {
         Step::Stuck(Reason::NoLowerStepToProjection)
     }
 
-    fn memory(&self, _: &Point) -> Memory {
-        Memory::ProjectedGradient {
-            metric: Bits(self.metric.clone()),
-            lengths: Bits(vec![self.first_length, self.length]),
+    fn state(&self, _: &Iterate) -> MethodState {
+        MethodState::ProjectedGradient {
+            metric: ExactF64s(self.metric.clone()),
+            lengths: ExactF64s(vec![self.first_length, self.length]),
         }
     }
 
-    fn recall(&mut self, memory: Memory, _: &Problem, point: &mut Point) -> bool {
-        let Memory::ProjectedGradient { metric, lengths } = memory else {
+    fn restore(&mut self, memory: MethodState, _: &Problem, point: &mut Iterate) -> bool {
+        let MethodState::ProjectedGradient { metric, lengths } = memory else {
             return false;
         };
         let [first_length, length] = *lengths.0.as_slice() else {
@@ -95,7 +95,7 @@ impl StepRule for ProjectedGradient {
 }
 
 impl ProjectedGradient {
-    fn prepare(&mut self, work: &Work, point: &Point) {
+    fn prepare(&mut self, work: &CountedEvaluator, point: &Iterate) {
         let problem = work.problem();
         self.metric = point.relative_metric(problem);
         // The step at which the linear model of J reaches zero.
@@ -110,7 +110,11 @@ impl ProjectedGradient {
     }
 
     /// The projection of the gradient step.
-    fn target(&self, work: &mut Work, point: &Point) -> Result<Vec<f64>, ConicStatus> {
+    fn target(
+        &self,
+        work: &mut CountedEvaluator,
+        point: &Iterate,
+    ) -> Result<Vec<f64>, ConicStatus> {
         let constraints = &work.problem().constraints;
         let steps = point.gradient.euclidean.iter().zip(&self.metric);
         let mut target: Vec<f64> = (point.parameters.iter().zip(steps))
@@ -139,7 +143,7 @@ impl ProjectedGradient {
     }
 
     /// The spectral step `|s|^2 / <s, z>` in the metric.
-    fn learn(&mut self, before: &Point, after: &Point) {
+    fn learn(&mut self, before: &Iterate, after: &Iterate) {
         let s = difference(&after.parameters, &before.parameters);
         let z = difference(&after.gradient.euclidean, &before.gradient.euclidean);
         let squared: f64 = s.iter().zip(&self.metric).map(|(s, m)| m * s * s).sum();

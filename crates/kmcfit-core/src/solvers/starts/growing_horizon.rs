@@ -1,7 +1,7 @@
 //! A start fitted to growing parts of the record.
 
 use crate::problem::Problem;
-use crate::solvers::checkpoint::Watch;
+use crate::solvers::checkpoint::Observer;
 use crate::solvers::counts::Counts;
 use crate::solvers::executor::search;
 use crate::solvers::settings::FitSettings;
@@ -17,7 +17,7 @@ pub(in crate::solvers) fn growing_horizon_start(
     problem: &Problem,
     from: Vec<f64>,
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> (Vec<f64>, Counts, Timings) {
     let (mut counts, mut timings) = (Counts::default(), Timings::default());
     let mut parameters = from;

@@ -10,7 +10,7 @@ mod truncated;
 pub(super) use collocation::collocation_start;
 pub(super) use data::data_start;
 pub(super) use growing_horizon::growing_horizon_start;
-pub use projection::Start;
+pub use projection::StartProjection;
 pub(super) use truncated::{truncated_start, truncated_steps};
 
 use super::history::Reference;

@@ -11,7 +11,7 @@ const POSITIVE: f64 = 1e-6;
 
 /// What became of a start.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Start {
+pub enum StartProjection {
     /// It satisfies the constraints as it is.
     Kept(Vec<f64>),
     /// It was moved to the nearest point that does.
@@ -33,10 +33,10 @@ pub enum Start {
 
 impl Problem {
     /// Moves `start` into the constraint set, in the L2 metric relative to the functions' sizes.
-    pub fn feasible_start(&self, start: &[f64]) -> Start {
+    pub fn feasible_start(&self, start: &[f64]) -> StartProjection {
         let worst = match self.constraints.largest_violation(start) {
             Some(violation) if violation.relative > 0.0 => violation,
-            _ => return Start::Kept(start.to_vec()),
+            _ => return StartProjection::Kept(start.to_vec()),
         };
         let device = self.functions.device(start);
         let sizes: Vec<f64> = (device.functions())
@@ -54,7 +54,7 @@ impl Problem {
             }
         }
         match self.constraints.hold(&moved, TOLERANCE) {
-            true => Start::Moved {
+            true => StartProjection::Moved {
                 parameters: self.with_mass(start, &metric, moved),
                 constraint: worst.name,
             },
@@ -101,12 +101,12 @@ impl Problem {
 
     /// What is known about constraints into which `start` could not be moved: its projection ended
     /// with `status`.
-    fn contradiction(&self, start: &[f64], metric: &[f64], status: ConicStatus) -> Start {
+    fn contradiction(&self, start: &[f64], metric: &[f64], status: ConicStatus) -> StartProjection {
         let judge = |candidate: &Constraints| feasibility(candidate, start, metric);
         match conflict(&self.constraints, &judge) {
-            Some(found) if found.minimal => Start::Contradiction(found.names),
-            Some(found) => Start::ContradictionAmong(found.names),
-            None => Start::Unsolved(status),
+            Some(found) if found.minimal => StartProjection::Contradiction(found.names),
+            Some(found) => StartProjection::ContradictionAmong(found.names),
+            None => StartProjection::Unsolved(status),
         }
     }
 

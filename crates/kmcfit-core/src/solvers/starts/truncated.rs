@@ -8,7 +8,7 @@ use super::{Referred, reference};
 use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
 use crate::problem::{Drive, Experiment, LONG, Problem};
-use crate::solvers::checkpoint::Watch;
+use crate::solvers::checkpoint::Observer;
 use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
@@ -139,7 +139,7 @@ pub(in crate::solvers) fn truncated_start(
     steps: usize,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> TruncatedStart {
     let clock = Instant::now();
     let (part, mut referred) = threads::both(
@@ -178,7 +178,7 @@ fn fit_part(
     steps: usize,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Option<Part> {
     let mut short = settings.clone();
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);

@@ -8,11 +8,11 @@ use crate::problem::{Experiment, Problem};
 use crate::qp::{ConicStatus, Subproblem};
 use crate::solvers::counts::Counts;
 use crate::solvers::fit::Fit;
-use crate::solvers::history::{Row, ratio};
-use crate::solvers::iterate::Point;
+use crate::solvers::history::{IterationRecord, ratio};
+use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::optimality::{Optimality, judged};
-use crate::solvers::reason::{Reason, Unsuited};
+use crate::solvers::reason::{Reason, UnsupportedRecord};
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use std::time::Instant;
@@ -33,7 +33,7 @@ const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 /// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
 /// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
 /// the equation of motion says of the readings there. Scalars keep their values at the start.
-pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> Fit {
+pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationRecord)) -> Fit {
     let clock = Instant::now();
     let mut timings = Timings::default();
     let measurements = timed(&mut timings.start, || {
@@ -80,7 +80,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
             (Outcome::new(word, Reason::Program(status)), None)
         }
     };
-    let history: Vec<Row> = (found.iter())
+    let history: Vec<IterationRecord> = (found.iter())
         .map(|best| row(problem, &first, best))
         .collect();
     history.iter().for_each(observe);
@@ -95,7 +95,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> F
         counts,
         timings,
         elapsed: clock.elapsed(),
-        rungs: Vec::new(),
+        attempts: Vec::new(),
         optimality,
     }
 }
@@ -111,8 +111,8 @@ fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
 }
 
 /// The only row of the history.
-fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
-    Row {
+fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
+    IterationRecord {
         iteration: 1,
         cost: best.evaluation.cost,
         cost_ratio: ratio(best.evaluation.cost, first.evaluation.cost),
@@ -126,7 +126,7 @@ fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
 }
 
 /// The end of a fit whose readings tell no motion: the start, without a cost.
-fn failed(problem: &Problem, start: &[f64], reason: Unsuited) -> Fit {
+fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
     evaluation.device = problem.functions.device(start);
     for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
@@ -135,7 +135,7 @@ fn failed(problem: &Problem, start: &[f64], reason: Unsuited) -> Fit {
         }
     }
     Fit {
-        best: Point::new(
+        best: Iterate::new(
             start.to_vec(),
             evaluation,
             Gradient {
@@ -149,11 +149,11 @@ fn failed(problem: &Problem, start: &[f64], reason: Unsuited) -> Fit {
         initial_norm_squared: f64::NAN,
         history: Vec::new(),
         snapshots: Vec::new(),
-        outcome: Outcome::new(Status::Failed, Reason::Unsuited(reason)),
+        outcome: Outcome::new(Status::Failed, Reason::UnsupportedRecord(reason)),
         counts: Counts::default(),
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
-        rungs: Vec::new(),
+        attempts: Vec::new(),
         optimality: None,
     }
 }
@@ -203,7 +203,7 @@ impl<'a> Cost<'a> {
     /// the equation leaves open. `None` if it cannot be solved again.
     fn optimality(
         &self,
-        point: &Point,
+        point: &Iterate,
         minimum: &Minimum,
         timings: &mut Timings,
     ) -> Option<Optimality> {
@@ -229,7 +229,7 @@ impl<'a> Cost<'a> {
 
     /// The rounding of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With twice the
     /// parameters its error is the sum of those that they stand in.
-    fn rounding(&self, point: &Point) -> f64 {
+    fn rounding(&self, point: &Iterate) -> f64 {
         let twice: Vec<f64> = point.parameters.iter().map(|p| 2.0 * p).collect();
         let terms = self.point(twice).evaluation.misfit;
         let rounding = TERM_ROUNDING * terms.sqrt();
@@ -284,7 +284,7 @@ impl<'a> Cost<'a> {
     }
 
     /// Everything about the parameters `theta`.
-    fn point(&self, theta: Vec<f64>) -> Point {
+    fn point(&self, theta: Vec<f64>) -> Iterate {
         let problem = self.problem;
         let mut evaluation = problem.workspace();
         problem
@@ -305,7 +305,7 @@ impl<'a> Cost<'a> {
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         self.say_motions(&mut evaluation);
         let gradient = self.gradient(&theta);
-        Point::new(theta, evaluation, gradient)
+        Iterate::new(theta, evaluation, gradient)
     }
 
     /// The measured motions, and what the model says of the readings there.

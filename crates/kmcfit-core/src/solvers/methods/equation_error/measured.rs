@@ -5,7 +5,7 @@ use crate::functions::Functions;
 use crate::objective::{Channel, Loss, View};
 use crate::problem::{Experiment, Problem};
 use crate::signal::zero_phase;
-use crate::solvers::reason::{MissingMeasurement, Unsuited};
+use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
 use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
@@ -271,17 +271,20 @@ impl Measurements {
     ///
     /// # Errors
     /// The first experiment whose readings do not tell a motion.
-    pub fn of(problem: &Problem) -> Result<Self, Unsuited> {
+    pub fn of(problem: &Problem) -> Result<Self, UnsupportedRecord> {
         Self::with_scalars(problem, problem.scalars(&problem.start()))
     }
 
-    pub(super) fn with_scalars(problem: &Problem, scalars: &[f64]) -> Result<Self, Unsuited> {
+    pub(super) fn with_scalars(
+        problem: &Problem,
+        scalars: &[f64],
+    ) -> Result<Self, UnsupportedRecord> {
         let one = |(index, experiment): (usize, &Experiment)| {
             if experiment.channels.is_empty() {
                 return Ok(None);
             }
             let measured = Measured::of(problem, experiment, scalars);
-            measured.map(Some).map_err(|reason| Unsuited {
+            measured.map(Some).map_err(|reason| UnsupportedRecord {
                 experiment: index,
                 name: experiment.name.clone(),
                 reason,

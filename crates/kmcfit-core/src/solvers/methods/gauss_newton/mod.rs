@@ -12,9 +12,9 @@ use super::{Step, StepRule, no_step};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::solvers::checkpoint::{Bits, Memory};
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::checkpoint::{ExactF64s, MethodState};
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
@@ -60,32 +60,24 @@ impl Default for GaussNewton {
 }
 
 impl StepRule for GaussNewton {
-    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+    fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let problem = work.problem();
         let first_cost = *self.first_cost.get_or_insert(point.evaluation.cost);
         if point.evaluation.cost <= NO_DECREASE * first_cost {
             return Step::Minimum(Reason::ZeroCost);
         }
-        let mut linearization = work.linearization(point);
-        work.count_linearisation(linearisation_tangents(problem));
-        let mut sub = subproblem(work, point, &linearization);
-        // Diagonal of the proximal term.
-        let scales = point.relative_metric(problem);
+        let mut linear = LinearisedProblem::new(work, point);
         let mut evaluation = self.spare.take().unwrap_or_else(|| problem.workspace());
-        let mut trouble = None;
         let before = self.damping;
         while self.damping <= MOST_DAMPING {
-            let weight = self.damping * point.evaluation.cost;
-            for (d, s) in sub.proximal.iter_mut().zip(&scales) {
-                *d = weight * s;
-            }
-            let proposal = match propose(work, &sub, point) {
+            linear.damp(self.damping * point.evaluation.cost);
+            let proposal = match propose(work, &linear.sub, point) {
                 Answer::Step(proposal) => proposal,
                 Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
                     return Step::Minimum(Reason::NegligibleResiduals);
                 }
                 Answer::Unsolved(status) => {
-                    trouble = Some(status);
+                    linear.trouble = Some(status);
                     self.damping *= 10.0;
                     continue;
                 }
@@ -93,52 +85,37 @@ impl StepRule for GaussNewton {
             let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
             let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
             let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
-            if trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
+            if linear.trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
                 // What is left of the step by damping away the programs that stalled.
                 break;
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
-                if trouble.is_none() && proposal.uncertainty > 0.0 {
-                    trouble = Some(ConicStatus::Almost);
-                }
-                if trouble.is_some() {
+                if linear.trouble.is_some() || proposal.uncertainty > 0.0 {
+                    linear.trouble.get_or_insert(ConicStatus::Almost);
                     // The next programs are others: they get the chance to be solved with less.
                     self.damping = before;
                 }
-                let is_nearby = (gain - 1.0).abs() <= AS_PREDICTED
-                    && distance(problem, point, &linearization, &proposal) <= NEARBY;
-                let to = proposal.parameters;
-                let moved = match is_nearby {
-                    true => work.complete_nearby(point, &linearization, to, evaluation),
-                    false => work.complete(to, evaluation),
-                };
-                return Step::Moved {
-                    point: Box::new(moved),
-                    length: 1.0,
-                    limited: trouble.is_some(),
-                };
+                return linear.step_to(work, point, proposal, evaluation, gain);
             }
-            if linearization.computed_at().is_some() {
+            if linear.linearization.computed_at().is_some() {
                 // The Jacobian of another point may be to blame.
-                work.count_tangents(linearisation_tangents(problem));
-                linearization = work.linearise_again(point);
-                sub = subproblem(work, point, &linearization);
+                linear.linearise_again(work, point);
                 continue;
             }
-            if trouble.is_none()
+            if linear.trouble.is_none()
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
                 return Step::Minimum(reason);
             }
             if proposal.uncertainty > 0.0 {
                 // A shorter step promises less for being short.
-                trouble = trouble.or(Some(ConicStatus::Almost));
+                linear.trouble.get_or_insert(ConicStatus::Almost);
             }
             self.damping *= 8.0;
         }
         self.damping = FIRST_DAMPING;
-        match trouble {
+        match linear.trouble {
             Some(status) => no_step(problem, point, status),
             None => Step::Stuck(Reason::NoLowerGaussNewtonStep),
         }
@@ -148,17 +125,17 @@ impl StepRule for GaussNewton {
         self.spare = Some(evaluation);
     }
 
-    fn memory(&self, point: &Point) -> Memory {
+    fn state(&self, point: &Iterate) -> MethodState {
         let numbers = std::iter::once(self.damping).chain(self.first_cost);
         let made_at = point.linearization().computed_at();
-        Memory::GaussNewton {
-            numbers: Bits(numbers.collect()),
-            made_at: made_at.map(|at| Bits(at.to_vec())),
+        MethodState::GaussNewton {
+            numbers: ExactF64s(numbers.collect()),
+            made_at: made_at.map(|at| ExactF64s(at.to_vec())),
         }
     }
 
-    fn recall(&mut self, memory: Memory, problem: &Problem, point: &mut Point) -> bool {
-        let Memory::GaussNewton { numbers, made_at } = memory else {
+    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
+        let MethodState::GaussNewton { numbers, made_at } = memory else {
             return false;
         };
         let (damping, first_cost) = match *numbers.0.as_slice() {
@@ -166,7 +143,7 @@ impl StepRule for GaussNewton {
             [damping, first_cost] => (damping, Some(first_cost)),
             _ => return false,
         };
-        if let Some(Bits(at)) = made_at {
+        if let Some(ExactF64s(at)) = made_at {
             let is_whole = at.len() == problem.parameters();
             if !is_whole || !point.reuse_linearization(problem, at) {
                 return false;
@@ -187,27 +164,74 @@ impl GaussNewton {
     }
 }
 
-/// The subproblem at a point, without the proximal term.
-fn subproblem(work: &mut Work, point: &Point, linearization: &Linearization) -> Subproblem {
-    let (parameters, evaluation) = (&point.parameters, &point.evaluation);
-    let problem = work.problem();
-    linearise(
-        problem,
-        parameters,
-        evaluation,
-        linearization,
-        &mut work.timings,
-    )
-    .0
+/// The linearised problem of one step.
+struct LinearisedProblem {
+    linearization: Linearization,
+    sub: Subproblem,
+    /// Diagonal of the proximal term.
+    scales: Vec<f64>,
+    /// How the last program ended that was not solved to full accuracy.
+    trouble: Option<ConicStatus>,
 }
 
-/// How far a proposal is from where the Jacobian was computed, relative to the sizes of the functions at the point.
-fn distance(
-    problem: &Problem,
-    point: &Point,
+impl LinearisedProblem {
+    fn new(work: &mut CountedEvaluator, point: &Iterate) -> Self {
+        let linearization = work.linearization(point);
+        work.count_linearisation(linearisation_tangents(work.problem()));
+        Self {
+            sub: subproblem(work, point, &linearization),
+            linearization,
+            scales: point.relative_metric(work.problem()),
+            trouble: None,
+        }
+    }
+
+    /// Computes the Jacobian at `point` itself.
+    fn linearise_again(&mut self, work: &mut CountedEvaluator, point: &Iterate) {
+        work.count_tangents(linearisation_tangents(work.problem()));
+        self.linearization = work.linearise_again(point);
+        self.sub = subproblem(work, point, &self.linearization);
+    }
+
+    /// Gives the proximal term its weight.
+    fn damp(&mut self, weight: f64) {
+        for (d, s) in self.sub.proximal.iter_mut().zip(&self.scales) {
+            *d = weight * s;
+        }
+    }
+
+    /// The step from `point` to a proposal; its linearisation is reused if that is nearby and brought the predicted decrease.
+    fn step_to(
+        &self,
+        work: &mut CountedEvaluator,
+        point: &Iterate,
+        proposal: Proposal,
+        evaluation: Evaluation,
+        gain: f64,
+    ) -> Step {
+        let from = (self.linearization.computed_at()).unwrap_or(&point.parameters);
+        let to = proposal.parameters;
+        let is_nearby = (gain - 1.0).abs() <= AS_PREDICTED
+            && point.distance(work.problem(), from, &to) <= NEARBY;
+        let moved = match is_nearby {
+            true => work.complete_nearby(point, &self.linearization, to, evaluation),
+            false => work.complete(to, evaluation),
+        };
+        Step::Moved {
+            point: Box::new(moved),
+            length: 1.0,
+            limited: self.trouble.is_some(),
+        }
+    }
+}
+
+/// The subproblem at a point, without the proximal term.
+fn subproblem(
+    work: &mut CountedEvaluator,
+    point: &Iterate,
     linearization: &Linearization,
-    proposal: &Proposal,
-) -> f64 {
-    let from = linearization.computed_at().unwrap_or(&point.parameters);
-    point.distance(problem, from, &proposal.parameters)
+) -> Subproblem {
+    let (parameters, evaluation) = (&point.parameters, &point.evaluation);
+    let (problem, timings) = (work.problem(), &mut work.timings);
+    linearise(problem, parameters, evaluation, linearization, timings).0
 }

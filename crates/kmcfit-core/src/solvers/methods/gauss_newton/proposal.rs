@@ -4,8 +4,8 @@ use crate::constraints;
 use crate::objective::{Evaluation, Loss};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::robust_surplus;
 use crate::solvers::optimality::response_rounding;
 use crate::solvers::reason::Reason;
@@ -42,7 +42,11 @@ fn least_decrease(problem: &Problem, cost: f64) -> f64 {
 
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
 /// less than the rounding of the cost, or moves less than rounding moves the motion.
-pub(super) fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) -> Option<Reason> {
+pub(super) fn at_minimum(
+    problem: &Problem,
+    point: &Iterate,
+    proposal: &Proposal,
+) -> Option<Reason> {
     // A prediction below zero by more, or of no number, is that of a wrong solution.
     if proposal.predicted.abs() + proposal.uncertainty
         <= least_decrease(problem, point.evaluation.cost)
@@ -55,13 +59,13 @@ pub(super) fn at_minimum(problem: &Problem, point: &Point, proposal: &Proposal) 
 }
 
 /// The largest change of a function that a proposal asks for, relative to the function's size.
-pub(super) fn change(problem: &Problem, point: &Point, proposal: &Proposal) -> f64 {
+pub(super) fn change(problem: &Problem, point: &Iterate, proposal: &Proposal) -> f64 {
     point.relative_change(problem, &proposal.parameters)
 }
 
 /// The best step that the subproblem offers in the constraint set. Staying is a step as well: whatever predicts
 /// a higher cost is no solution, and the next way is tried.
-pub(super) fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answer {
+pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Iterate) -> Answer {
     let constraints = &work.problem().constraints;
     let cost = point.evaluation.cost;
     let least = least_decrease(work.problem(), cost);
@@ -129,7 +133,12 @@ pub(super) fn propose(work: &mut Work, sub: &Subproblem, point: &Point) -> Answe
 }
 
 /// The subproblem's cost for the step to `parameters`, by tangent solves.
-fn model_cost(work: &mut Work, sub: &Subproblem, point: &Point, parameters: &[f64]) -> f64 {
+fn model_cost(
+    work: &mut CountedEvaluator,
+    sub: &Subproblem,
+    point: &Iterate,
+    parameters: &[f64],
+) -> f64 {
     let problem = work.problem();
     work.count_tangents(1);
     let delta: Vec<f64> = parameters

@@ -6,8 +6,8 @@ use crate::dynamics::{Layout, Method, Ray, Term, Trials, replay};
 use crate::lanes::{LANES, Row};
 use crate::objective::{Evaluation, Weighting};
 use crate::problem::Problem;
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 
 /// Storage of the trials of a point, in two batches of at most four rows.
 #[derive(Default)]
@@ -17,8 +17,8 @@ impl BatchedTrials {
     /// The lowest trial, if it lowers the cost.
     pub fn lowest(
         &mut self,
-        work: &mut Work,
-        point: &Point,
+        work: &mut CountedEvaluator,
+        point: &Iterate,
         ray: Ray,
         lengths: &[f64],
         spare: &mut Vec<Evaluation>,
@@ -91,7 +91,11 @@ fn move_to(
 /// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
 /// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
 /// any other, and where the masses are not moderate.
-pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Point, lengths: &[f64]) -> Option<Ray<'a>> {
+pub(super) fn ray<'a>(
+    problem: &'a Problem,
+    point: &'a Iterate,
+    lengths: &[f64],
+) -> Option<Ray<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
     let oscillator = &problem.oscillator;
     let nodes = experiment.nodes;

@@ -5,8 +5,8 @@ mod batched_trials;
 use super::{Step, StepRule};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::evaluator::Work;
-use crate::solvers::iterate::Point;
+use crate::solvers::evaluator::CountedEvaluator;
+use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
 use batched_trials::BatchedTrials;
 
@@ -33,7 +33,7 @@ struct Best {
 }
 
 impl StepRule for SteepestDescent {
-    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+    fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let lengths = lengths(point);
         let best = match batched_trials::ray(work.problem(), point, &lengths) {
             Some(ray) => (self.batched).lowest(work, point, ray, &lengths, &mut self.spare),
@@ -55,7 +55,12 @@ impl StepRule for SteepestDescent {
 }
 
 impl SteepestDescent {
-    fn one_by_one(&mut self, work: &mut Work, point: &Point, lengths: &[f64]) -> Option<Best> {
+    fn one_by_one(
+        &mut self,
+        work: &mut CountedEvaluator,
+        point: &Iterate,
+        lengths: &[f64],
+    ) -> Option<Best> {
         let mut best = None;
         for &length in lengths {
             let parameters = trial(point, length);
@@ -78,7 +83,7 @@ impl SteepestDescent {
 impl Best {
     /// Takes the place of `best` if its cost is strictly lower than that, and than that of the point; whose storage is not
     /// needed any more goes to `spare`.
-    fn or_lower(self, best: &mut Option<Best>, point: &Point, spare: &mut Vec<Evaluation>) {
+    fn or_lower(self, best: &mut Option<Best>, point: &Iterate, spare: &mut Vec<Evaluation>) {
         let lowest = best
             .as_ref()
             .map_or(point.evaluation.cost, |b| b.evaluation.cost);
@@ -91,7 +96,7 @@ impl Best {
 }
 
 /// The lengths of the trial steps, longest first.
-fn lengths(point: &Point) -> Vec<f64> {
+fn lengths(point: &Iterate) -> Vec<f64> {
     let root = point.gradient.norm_squared.sqrt();
     (1..=TRIALS)
         .map(|i| LONGEST * root / f64::from(i.pow(4)))
@@ -104,7 +109,7 @@ fn take(spare: &mut Vec<Evaluation>, problem: &Problem) -> Evaluation {
 }
 
 /// `p - length g`.
-fn trial(point: &Point, length: f64) -> Vec<f64> {
+fn trial(point: &Iterate, length: f64) -> Vec<f64> {
     let moves = point.parameters.iter().zip(&point.gradient.l2);
     moves.map(|(p, g)| p - length * g).collect()
 }

@@ -39,14 +39,14 @@ fn problem() -> Problem {
 }
 
 /// A search of some steps.
-fn search(problem: &Problem, steps: usize) -> Vec<Point> {
+fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
         gradient: GradientKind::Continuous,
         ..FitSettings::default()
     };
     let mut counted = argmin::core::Problem::new(problem);
-    let mut work = Work::new(&mut counted, &settings);
+    let mut work = CountedEvaluator::new(&mut counted, &settings);
     let mut evaluation = problem.workspace();
     let evaluated = work.evaluate_into(&problem.start(), &mut evaluation);
     evaluated.expect("a motion");
