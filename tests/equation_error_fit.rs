@@ -476,7 +476,7 @@ fn readings_without_a_motion() {
     let problem = Problem::new(oscillator, functions, vec![experiment]);
     let found = run(&problem);
     assert_eq!(found.outcome.status, Status::Failed);
-    assert_snapshot!(found.outcome.reason, @"still: the acceleration is too short or does not oscillate");
+    assert_snapshot!(found.outcome.reason.to_string(), @"still: the acceleration is too short or does not oscillate");
     assert_eq!(found.best.parameters, problem.start());
 
     let mut offset = shaken(1, free_at_nodes(NODES)).0;

@@ -3,7 +3,8 @@
 use kmcfit::config::{Model, ModelFile, Purpose, build};
 use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
 use kmcfit_core::internals::solvers::{
-    Fit, Row, Status, Watch, WeightPath, choose_weight_watched, fit_with_noise_watched,
+    Fit, IterationRecord, Observer, Status, WeightPath, choose_weight_watched,
+    fit_with_noise_watched,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -28,11 +29,11 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
     let flag = Arc::new(AtomicBool::new(false));
     settings.interrupt = Some(Arc::clone(&flag));
     let mut shown = 0;
-    let mut observe = |_: &Row| {
+    let mut observe = |_: &IterationRecord| {
         shown += 1;
         flag.fetch_or(shown >= last, Ordering::Relaxed);
     };
-    let mut watch = Watch::new(&mut observe);
+    let mut watch = Observer::new(&mut observe);
     if let Some(journal) = journal {
         watch = watch.keeping(journal);
     }
@@ -55,7 +56,7 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
 fn told((path, fit): &(Option<WeightPath>, Fit)) -> String {
     format!(
         "{path:?} {:?} {:?} {:?} {:?} {:?} {:?}",
-        fit.best, fit.history, fit.snapshots, fit.outcome, fit.counts, fit.rungs
+        fit.best, fit.history, fit.snapshots, fit.outcome, fit.counts, fit.attempts
     )
 }
 
@@ -136,7 +137,7 @@ fn the_beginning_of_a_long_record() {
     let long = [("functions:\n", "grid: {nodes: 40001}\nfunctions:\n")];
     let (_, model) = model("duffing", &long);
     let (_, fit) = run(&model, None, u64::MAX);
-    assert_eq!(fit.rungs[0].name, "beginning of the record");
+    assert_eq!(fit.attempts[0].start.name(), "beginning of the record");
     again_and_again("duffing", &long, 1);
 }
 

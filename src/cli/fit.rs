@@ -12,8 +12,8 @@ use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
 use kmcfit_core::internals::dynamics::{Breakdown, State};
 use kmcfit_core::internals::solvers::{
-    Fit, Keeper, Moment, Row, Status, Watch, WeightPath, choose_weight_watched,
-    fit_with_noise_watched, without_motion,
+    CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
+    choose_weight_watched, fit_with_noise_watched, without_motion,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -227,11 +227,14 @@ pub(super) fn fit_into(
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
-    keeper: Option<&mut dyn Keeper>,
+    keeper: Option<&mut dyn CheckpointStore>,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
     let start = model.problem.functions.start();
-    let (mut ignore, mut show) = (|_: &Row| {}, |moment: &Moment| progress.show(moment));
-    let mut watch = Watch::new(&mut ignore);
+    let (mut ignore, mut show) = (
+        |_: &IterationRecord| {},
+        |moment: &IterationEvent| progress.show(moment),
+    );
+    let mut watch = Observer::new(&mut ignore);
     if progress.is_seen() {
         watch = watch.looking(&mut show);
     }

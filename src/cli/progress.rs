@@ -1,11 +1,11 @@
 //! A progress line on a terminal, nothing elsewhere.
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use kmcfit_core::internals::solvers::{Moment, Stopping};
+use kmcfit_core::internals::solvers::{IterationEvent, Stopping};
 use std::cell::Cell;
 use std::time::Duration;
 
-/// The line: iteration, cost and gradient, violation of the constraints, rung of the start ladder, time left.
+/// The line: iteration, cost and gradient, violation of the constraints, start strategy, time left.
 pub struct Progress {
     bar: ProgressBar,
     /// Wall-clock limit.
@@ -43,7 +43,7 @@ impl Progress {
     }
 
     /// Shows an iteration.
-    pub fn show(&self, moment: &Moment) {
+    pub fn show(&self, moment: &IterationEvent) {
         let row = moment.row;
         // Every search counts its iterations from 1.
         if row.iteration <= self.last.replace(row.iteration) {
@@ -74,10 +74,10 @@ impl Progress {
 }
 
 /// What is said of an iteration of the search `number`; of the first one not where it started.
-fn message(moment: &Moment, number: u32) -> String {
-    let Moment {
+fn message(moment: &IterationEvent, number: u32) -> String {
+    let IterationEvent {
         row,
-        rung,
+        start,
         violation,
     } = *moment;
     let mut parts = vec![
@@ -86,8 +86,8 @@ fn message(moment: &Moment, number: u32) -> String {
     ];
     parts.extend(violation.map(|violation| format!("violation {violation:.0e}")));
     if number > 1 {
-        let from = if rung.is_empty() { "" } else { ": " };
-        parts.push(format!("search {number}{from}{rung}"));
+        let from = start.map_or(String::new(), |start| format!(": {}", start.name()));
+        parts.push(format!("search {number}{from}"));
     }
     parts.join("  ")
 }
@@ -95,11 +95,11 @@ fn message(moment: &Moment, number: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::Row;
+    use kmcfit_core::internals::solvers::{IterationRecord, StartStrategy};
 
     #[test]
     fn the_line_says_what_there_is_to_say() {
-        let row = Row {
+        let row = IterationRecord {
             iteration: 3,
             cost: 2.0,
             cost_ratio: 0.25,
@@ -107,9 +107,9 @@ mod tests {
             step: 1.0,
             relative_change: 0.1,
         };
-        let mut moment = Moment {
+        let mut moment = IterationEvent {
             row: &row,
-            rung: "equation error",
+            start: Some(StartStrategy::EquationError),
             violation: None,
         };
         let line = "J/J0 2.500e-1  G\u{b2}/G0\u{b2} 1.000e-3";
@@ -121,7 +121,7 @@ mod tests {
             message(&moment, 2),
             format!("{line}  search 2: equation error")
         );
-        moment.rung = "";
+        moment.start = None;
         assert_eq!(message(&moment, 2), format!("{line}  search 2"));
     }
 }

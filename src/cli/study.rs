@@ -16,7 +16,7 @@ use crate::results::{
 use kmcfit_core::internals::identifiability::count;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Keeper, Status};
+use kmcfit_core::internals::solvers::{CheckpointStore, Status};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -390,7 +390,7 @@ impl Work<'_> {
         let mut interrupted = None;
         let compute = || {
             let mut keeper = fit_journal(folder, heading, go_on);
-            let keeper = keeper.as_mut().map(|k| k as &mut dyn Keeper);
+            let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
             interrupted = Some(gather::fit(problem, &found));

@@ -5,7 +5,7 @@ use super::figure::Figure;
 use super::figures::{self, FunctionCurve, RatioCurves};
 use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
 use kmcfit_core::internals::identifiability::{Band, Bands};
-use kmcfit_core::internals::solvers::Row;
+use kmcfit_core::internals::solvers::IterationRecord;
 
 impl FittedModel<'_> {
     /// The figures of a fit.
@@ -95,7 +95,8 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn convergence(&self) -> Figure {
-        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
+        let column =
+            |f: fn(&IterationRecord) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
         figures::convergence(
             &column(|r| r.iteration as f64),
             &column(|r| r.cost_ratio),

@@ -8,7 +8,7 @@ use crate::memory;
 use crate::results;
 use kmcfit_core::internals::dynamics::{Device, Method, Oscillator, Term};
 use kmcfit_core::internals::functions::Quantity;
-use kmcfit_core::internals::solvers::Row;
+use kmcfit_core::internals::solvers::IterationRecord;
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ pub struct Run {
     /// The true device, where the model named it.
     pub truth: Option<Device>,
     /// `history.csv`: one row per iteration.
-    pub history: Vec<Row>,
+    pub history: Vec<IterationRecord>,
     /// `functions.csv`: one row per node; not a number where a field is empty.
     pub functions: Columns,
     /// `trajectory.csv`: one row per node; not a number where a record has ended or was not read.
@@ -180,7 +180,7 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
     })
 }
 
-fn history(folder: &Path, iterations: u64) -> Result<Vec<Row>, InputError> {
+fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, InputError> {
     let rows = usize::try_from(iterations).unwrap_or(usize::MAX);
     let table = Columns::read_rows(&folder.join("history.csv"), rows, "iteration")?;
     let column = |name: &str| table.required(name);
@@ -188,7 +188,7 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<Row>, InputError> {
     let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
     let (step, change) = (column("step")?, column("relative_change")?);
     Ok((0..rows)
-        .map(|i| Row {
+        .map(|i| IterationRecord {
             iteration: i as u64 + 1,
             cost: cost[i],
             cost_ratio: cost_ratio[i],

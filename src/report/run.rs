@@ -25,7 +25,7 @@ use kmcfit_core::internals::identifiability::{
     Bands, Judgement, Verdict, count, is_rounding, is_unhindered,
 };
 use kmcfit_core::internals::solvers::{
-    ActiveGroup, Fit, Optimality, PathPoint, Rung, Solver, Status, WeightPath, WeightRule,
+    ActiveGroup, Attempt, Fit, Optimality, PathPoint, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
 };
 use std::collections::BTreeMap;
@@ -91,7 +91,7 @@ impl FittedModel<'_> {
             model: self.model_summary(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status.name().into(),
-                reason: fit.outcome.reason.clone(),
+                reason: fit.outcome.reason.to_string(),
             },
             cost: CostSummary {
                 initial: fit.initial_cost,
@@ -118,7 +118,7 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
             weights: self.weight_summary(),
-            rungs: self.fit.rungs.iter().map(rung_summary).collect(),
+            rungs: self.fit.attempts.iter().map(rung_summary).collect(),
             experiments: self.experiment_summaries(),
             held_out: self.known.held_out.iter().map(measured::held_out).collect(),
             scalars: match self.is_simulated() {
@@ -430,10 +430,10 @@ fn optimality_summary(measured: &Optimality) -> OptimalitySummary {
     }
 }
 
-fn rung_summary(rung: &Rung) -> RungSummary {
+fn rung_summary(rung: &Attempt) -> RungSummary {
     let known = |x: f64| x.is_finite().then_some(x);
     RungSummary {
-        start: rung.name.into(),
+        start: rung.start.name().into(),
         initial_cost: known(rung.initial_cost),
         cost: known(rung.cost),
         iterations: rung.iterations,

@@ -4,11 +4,11 @@ use super::FittedModel;
 use super::csv::CsvTable;
 use super::drawn::ends;
 use kmcfit_core::internals::functions::{Quantity, Ratios};
-use kmcfit_core::internals::solvers::Row;
+use kmcfit_core::internals::solvers::IterationRecord;
 
 impl FittedModel<'_> {
     pub(super) fn history(&self) -> CsvTable {
-        let column = |f: fn(&Row) -> f64| self.fit.history.iter().map(f).collect();
+        let column = |f: fn(&IterationRecord) -> f64| self.fit.history.iter().map(f).collect();
         CsvTable::new()
             .column("iteration", column(|r| r.iteration as f64))
             .column("cost", column(|r| r.cost))

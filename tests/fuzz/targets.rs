@@ -14,7 +14,7 @@ use kmcfit::results::{
     STUDY_JOURNAL, with_checksums,
 };
 use kmcfit_core::internals::dynamics::State;
-use kmcfit_core::internals::solvers::{Fit, Watch, fit_with_noise_watched};
+use kmcfit_core::internals::solvers::{Fit, Observer, fit_with_noise_watched};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
@@ -131,7 +131,7 @@ fn small(folder: &Path, method: &str) -> (Heading, Model) {
 fn fitted(model: &Model, journal: &mut FitJournal) -> Fit {
     let start = model.problem.start();
     let mut observe = |_: &_| {};
-    let mut watch = Watch::new(&mut observe).keeping(journal);
+    let mut watch = Observer::new(&mut observe).keeping(journal);
     let found = fit_with_noise_watched(&model.problem, &start, &model.settings, &mut watch);
     found.expect("a motion").1
 }

@@ -9,7 +9,7 @@ use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
 use kmcfit_core::internals::problem::{Experiment, Problem};
 use kmcfit_core::internals::qp::{ConicStatus, project};
-use kmcfit_core::internals::solvers::Start;
+use kmcfit_core::internals::solvers::StartProjection;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -546,11 +546,11 @@ fn a_contradiction_names_exactly_the_two() {
     let start = problem.functions.start();
     assert_eq!(
         problem.feasible_start(&start),
-        Start::Contradiction(vec!["mass >= 1".into(), "mean of mass = 0.5".into()])
+        StartProjection::Contradiction(vec!["mass >= 1".into(), "mean of mass = 0.5".into()])
     );
     problem
         .constraints
         .groups
         .retain(|g: &RowGroup| g.name != "mean of mass = 0.5");
-    assert_eq!(problem.feasible_start(&start), Start::Kept(start));
+    assert_eq!(problem.feasible_start(&start), StartProjection::Kept(start));
 }

@@ -133,7 +133,7 @@ fn another_device(records: Records, scale_fixed: bool, truth: &Device) -> Fit {
     let found = fit(&problem, &problem.start(), &settings(), &mut |_| {}).unwrap();
     let misfit = found.best.evaluation.misfit / problem.misfit_of_silence();
     println!("one record: misfit {misfit:.1e} of silence");
-    assert!(misfit < 1e-5, "{misfit} {:#?}", found.rungs);
+    assert!(misfit < 1e-5, "{misfit} {:#?}", found.attempts);
     found
 }
 
@@ -150,7 +150,7 @@ fn two_free_records_determine_the_ratios() {
     assert!(
         errors.iter().all(|e| *e < 2e-3),
         "{errors:?} {:#?}",
-        found.rungs
+        found.attempts
     );
     // The functions themselves are not to be seen: their common factor s(t) is the smoothest one.
     let off = common::errors(&found.best.evaluation.device, &truth);
@@ -170,7 +170,7 @@ fn two_free_records_and_a_forced_one_determine_the_device() {
     assert!(
         errors.iter().all(|e| *e < 5e-3),
         "{errors:?} {:#?}",
-        found.rungs
+        found.attempts
     );
     let one = another_device(&three[2..], false, &truth);
     let off = common::errors(&one.best.evaluation.device, &truth);

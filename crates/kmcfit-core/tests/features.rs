@@ -357,16 +357,16 @@ impl Case {
             "{words}: {} parameters, {error:.1e}, by {:?}",
             truth.len(),
             found
-                .rungs
+                .attempts
                 .iter()
-                .map(|r| (r.name, r.iterations, r.initial_cost, r.cost))
+                .map(|r| (r.start, r.iterations, r.initial_cost, r.cost))
                 .collect::<Vec<_>>()
         );
         assert!(
             error < EXACT,
             "{words}: {error:e}\n{:?}\n{truth:?}\n{:#?}",
             found.best.parameters,
-            found.rungs
+            found.attempts
         );
     }
 }
@@ -686,7 +686,7 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     let pairs = found.best.parameters.iter().zip(&truth);
     let error = pairs.fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
     println!("nodal: {error:.1e} of {} parameters", truth.len());
-    assert!(error < EXACT, "{error:e} {:#?}", found.rungs);
+    assert!(error < EXACT, "{error:e} {:#?}", found.attempts);
 }
 
 /// Fifty periods, with six nodes in each, of a device that is three times as stiff as the start says:
@@ -782,5 +782,5 @@ fn a_part_of_a_filtered_record_is_a_record() {
     assert!(misfit < 1e-18 * part.misfit_of_silence(), "{misfit:e}");
     assert!(rms(part.experiments[0].channels[0].observed()) > 0.1);
     let found = fit(&part, &case.truth(), &settings(), &mut |_| {}).unwrap();
-    assert_eq!(found.rungs.len(), 1);
+    assert_eq!(found.attempts.len(), 1);
 }

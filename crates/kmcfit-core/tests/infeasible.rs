@@ -11,7 +11,7 @@ use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::project;
 use kmcfit_core::internals::solvers::{
-    Fit, FitSettings, Initial, Solver, Start, Status, Stopping, fit,
+    Fit, FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
 
 const NODES: usize = 101;
@@ -93,7 +93,7 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
         // Without an iteration every program is refused.
         let found = run(&problem, solver, 0);
         assert_eq!(found.outcome.status, Status::Stalled, "{solver:?}");
-        assert!(found.outcome.reason.contains("solver stalled"));
+        assert!(found.outcome.reason.to_string().contains("solver stalled"));
         assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
         keeps_the_best_point(&problem, &found);
         // A start within the constraints may be as low, but nothing is lower than the minimum.
@@ -143,10 +143,10 @@ fn badly_scaled_constraints_cost_no_point() {
             let mut problem = problem(&knots());
             problem.constraints.groups = vec![group.clone()];
             let start = match problem.feasible_start(&problem.functions.start()) {
-                Start::Kept(start) => start,
-                Start::Moved { parameters, .. } => parameters,
+                StartProjection::Kept(start) => start,
+                StartProjection::Moved { parameters, .. } => parameters,
                 // A program that stalls here is said before there is a fit.
-                Start::Unsolved(_) => continue,
+                StartProjection::Unsolved(_) => continue,
                 other => panic!("{i} {solver:?}: {other:?}"),
             };
             problem.functions = problem.functions.clone().with_start(&start);
@@ -208,7 +208,7 @@ fn a_start_is_moved_to_where_there_is_a_mass() {
     let nearest = project(&problem.constraints, &start, &metric).theta;
     assert!(least(&nearest) < 0.0, "{}", least(&nearest));
     match problem.feasible_start(&start) {
-        Start::Moved { parameters, .. } => {
+        StartProjection::Moved { parameters, .. } => {
             assert!(least(&parameters) > 0.0);
             assert!(problem.constraints.hold(&parameters, TOLERANCE));
         }

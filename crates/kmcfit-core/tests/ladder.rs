@@ -60,11 +60,15 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     };
     let start = problem.functions.start();
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
-    println!("{:#?}", found.rungs);
+    let names: Vec<&str> = found
+        .attempts
+        .iter()
+        .map(|rung| rung.start.name())
+        .collect();
+    println!("{:#?}", found.attempts);
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
     let silence = problem.misfit_of_silence();
-    let costs: Vec<f64> = found.rungs.iter().map(|rung| rung.cost).collect();
+    let costs: Vec<f64> = found.attempts.iter().map(|rung| rung.cost).collect();
     // The first two end in minima that leave per cents of the record, the last at the answer.
     assert!(
         costs[0] > 0.05 * silence && costs[1] > 0.05 * silence,
@@ -78,7 +82,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     assert!(error < 1e-8, "{error}");
     // Every search takes a gradient at its start and one after each iteration; those of the three parts
     // of the record count as well as those of the three rungs.
-    let iterations: u64 = found.rungs.iter().map(|rung| rung.iterations).sum();
+    let iterations: u64 = found.attempts.iter().map(|rung| rung.iterations).sum();
     assert!(
         found.counts.adjoint >= iterations + 3 + 3,
         "{:?}",
@@ -155,7 +159,11 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     let start = problem.start();
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
     let alone = fit_from(&problem, &start, &settings).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    let names: Vec<&str> = found
+        .attempts
+        .iter()
+        .map(|rung| rung.start.name())
+        .collect();
     assert_eq!(names, ["beginning of the record"]);
     // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
     assert!(
@@ -185,7 +193,7 @@ fn a_silent_beginning_says_nothing() {
     let (problem, truth) = long_record(5000);
     let start = problem.start();
     let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
-    assert_eq!(found.rungs[0].name, "start values");
+    assert_eq!(found.attempts[0].start.name(), "start values");
     for (p, truth) in found.best.parameters.iter().zip(truth) {
         assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
     }
@@ -227,6 +235,6 @@ fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
         interrupt: None,
     };
     let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|r| r.name).collect();
+    let names: Vec<&str> = found.attempts.iter().map(|r| r.start.name()).collect();
     assert!(names.contains(&"growing horizon"), "{names:?}");
 }

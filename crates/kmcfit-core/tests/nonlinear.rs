@@ -78,16 +78,16 @@ impl Case {
                 assert!(
                     error.abs() < 0.01,
                     "{quantity:?} {error} {:#?}",
-                    found.rungs
+                    found.attempts
                 );
                 assert!(error.abs() < 4.0 * spread, "{quantity:?} {error} {spread}");
             }
             println!(
                 "  {:?}",
                 found
-                    .rungs
+                    .attempts
                     .iter()
-                    .map(|r| (r.name, r.iterations))
+                    .map(|r| (r.start, r.iterations))
                     .collect::<Vec<_>>()
             );
         }

@@ -9,7 +9,9 @@ use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Start, Status, Stopping, fit};
+use kmcfit_core::internals::solvers::{
+    FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -119,8 +121,8 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
         interrupt: None,
     };
     let start = match problem.feasible_start(&problem.functions.start()) {
-        Start::Kept(start)
-        | Start::Moved {
+        StartProjection::Kept(start)
+        | StartProjection::Moved {
             parameters: start, ..
         } => start,
         other => panic!("{other:?}"),

@@ -462,7 +462,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
         // Where the sigmas are said to rest.
         assert!((sigma / variance.sqrt() - 1.0).abs() < 1e-6, "{sigma}");
     }
-    assert!(!fit.rungs.is_empty() && !fit.history.is_empty() && !fit.snapshots.is_empty());
+    assert!(!fit.attempts.is_empty() && !fit.history.is_empty() && !fit.snapshots.is_empty());
     let cost = with_sigmas.evaluate(&problem.start()).unwrap().cost;
     assert_eq!(fit.initial_cost, cost);
 }

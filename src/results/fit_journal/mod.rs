@@ -2,7 +2,7 @@
 //!
 //! Lines of iterations are collected for some milliseconds before they are written, so a fit that is killed loses at
 //! most the last of them. The checkpoint holds the state of the running search; it is replaced as a whole every
-//! now and then. Both are removed when the results are written. [`Keeper`] defines what they hold and how a fit is
+//! now and then. Both are removed when the results are written. [`CheckpointStore`] defines what they hold and how a fit is
 //! resumed from it. Times are taken from a monotonic clock.
 
 mod read;
@@ -13,7 +13,9 @@ use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, path_in, push_l
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
-use kmcfit_core::internals::solvers::{Bits, Keeper, Kept, Row, Standing};
+use kmcfit_core::internals::solvers::{
+    CheckpointStore, CheckpointUnit, ExactF64s, IterationRecord, SolverState,
+};
 use read::{Contents, Reader};
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -40,11 +42,11 @@ struct Line<E>(u64, E);
 #[serde(rename_all = "lowercase")]
 enum Entry {
     /// An iteration of the search.
-    Row(Row),
+    Row(IterationRecord),
     /// The search has ended.
-    End(Box<Standing>),
+    End(Box<SolverState>),
     /// Numbers that were computed.
-    Piece(Bits),
+    Piece(ExactF64s),
     /// It ended without a result.
     Nothing,
 }
@@ -233,7 +235,7 @@ impl FitJournal {
         }
     }
 
-    fn checkpoint(&mut self, standing: Standing) -> io::Result<()> {
+    fn checkpoint(&mut self, standing: SolverState) -> io::Result<()> {
         // The iterations before it must not be lost when it is not.
         self.write();
         self.file.sync()?;
@@ -252,8 +254,8 @@ impl Drop for FitJournal {
     }
 }
 
-impl Keeper for FitJournal {
-    fn begin(&mut self) -> Option<Kept> {
+impl CheckpointStore for FitJournal {
+    fn begin(&mut self) -> Option<CheckpointUnit> {
         self.unit += 1;
         self.is_recalled = false;
         let end = self.before.end?;
@@ -285,7 +287,7 @@ impl Keeper for FitJournal {
         self.cut(self.before.begin);
     }
 
-    fn row(&mut self, row: &Row) {
+    fn row(&mut self, row: &IterationRecord) {
         self.append(Entry::Row(row.clone()));
     }
 
@@ -293,7 +295,7 @@ impl Keeper for FitJournal {
         self.trouble.is_none() && self.pace.is_due(parameters)
     }
 
-    fn stand(&mut self, standing: Standing) {
+    fn stand(&mut self, standing: SolverState) {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
@@ -308,7 +310,7 @@ impl Keeper for FitJournal {
 
     fn end(&mut self, piece: Option<&[f64]>) {
         self.append(match piece {
-            Some(piece) => Entry::Piece(Bits(piece.to_vec())),
+            Some(piece) => Entry::Piece(ExactF64s(piece.to_vec())),
             None => Entry::Nothing,
         });
     }

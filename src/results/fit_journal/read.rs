@@ -3,7 +3,7 @@
 use super::{Entry, Line};
 use crate::error::InputError;
 use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark, path_in};
-use kmcfit_core::internals::solvers::{Kept, Row, Standing};
+use kmcfit_core::internals::solvers::{CheckpointUnit, IterationRecord, SolverState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub(super) struct Reader {
 pub(super) struct Contents {
     pub units: BTreeMap<u64, Unit>,
     /// Where the running search stood, and which unit it was.
-    pub standing: Option<(u64, Standing)>,
+    pub standing: Option<(u64, SolverState)>,
     /// Where the unit that is at work begins.
     pub begin: Mark,
     /// The end of what was recalled; `None` when all of it was.
@@ -33,9 +33,9 @@ pub(super) struct Unit {
     pub begin: Mark,
     pub end: Mark,
     /// What it came to, if it ended.
-    pub kept: Option<Kept>,
+    pub kept: Option<CheckpointUnit>,
     /// The iterations, and where the line of each ends.
-    rows: Vec<(Row, Mark)>,
+    rows: Vec<(IterationRecord, Mark)>,
 }
 
 impl Unit {
@@ -60,10 +60,12 @@ impl Unit {
             Entry::End(standing) if standing.iterations == self.rows.len() as u64 => {
                 let rows = std::mem::take(&mut self.rows).into_iter();
                 let rows = rows.map(|(row, _)| row).collect();
-                self.kept = Some(Kept::Search(rows, standing));
+                self.kept = Some(CheckpointUnit::Search(rows, standing));
             }
-            Entry::Piece(piece) if self.rows.is_empty() => self.kept = Some(Kept::Piece(piece.0)),
-            Entry::Nothing if self.rows.is_empty() => self.kept = Some(Kept::Nothing),
+            Entry::Piece(piece) if self.rows.is_empty() => {
+                self.kept = Some(CheckpointUnit::Piece(piece.0))
+            }
+            Entry::Nothing if self.rows.is_empty() => self.kept = Some(CheckpointUnit::Nothing),
             _ => return false,
         }
         self.end = end;
@@ -71,7 +73,7 @@ impl Unit {
     }
 
     /// How a unit that had not ended goes on, and the end of what is of use for it.
-    pub fn at_work(mut self, standing: Option<Standing>) -> (Mark, Option<Kept>) {
+    pub fn at_work(mut self, standing: Option<SolverState>) -> (Mark, Option<CheckpointUnit>) {
         let usable = standing.and_then(|standing| {
             let iterations = usize::try_from(standing.iterations).ok()?;
             let (_, end) = *self.rows.get(iterations.checked_sub(1)?)?;
@@ -82,7 +84,7 @@ impl Unit {
             Some((standing, iterations, end)) => {
                 self.rows.truncate(iterations);
                 let rows = self.rows.into_iter().map(|(row, _)| row).collect();
-                (end, Some(Kept::Search(rows, Box::new(standing))))
+                (end, Some(CheckpointUnit::Search(rows, Box::new(standing))))
             }
         }
     }
@@ -124,7 +126,7 @@ impl Reader {
     }
 
     /// The checkpoint, if it is of this fit and undamaged.
-    fn standing(&self) -> Option<(u64, Standing)> {
+    fn standing(&self) -> Option<(u64, SolverState)> {
         let checkpoint = JournalText::read(&path_in(&self.folder, CHECKPOINT), WHAT).ok()?;
         let is_of_this_fit = checkpoint.heading == self.text.heading;
         let (standing, _) = checkpoint.lines().next()?;

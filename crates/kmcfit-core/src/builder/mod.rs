@@ -37,7 +37,7 @@ use crate::dynamics::{Grid, Method, Oscillator, Term};
 use crate::functions::{Functions, Quantity};
 use crate::problem::Problem;
 use crate::signal::even_spacing;
-use crate::solvers::{Start, states_from_readings};
+use crate::solvers::{StartProjection, states_from_readings};
 
 /// Most nodes: more would be asked for by mistake, and end in a lack of memory.
 const MOST_NODES: usize = 100_000_000;
@@ -307,12 +307,14 @@ fn into_the_constraints(problem: &mut Problem) -> Result<(), BuildError> {
         Err(BuildError::new("demands", problem))
     };
     match problem.feasible_start(&problem.start()) {
-        Start::Kept(_) => Ok(()),
-        Start::Moved { parameters, .. } => {
+        StartProjection::Kept(_) => Ok(()),
+        StartProjection::Moved { parameters, .. } => {
             problem.functions = problem.functions.clone().with_start(&parameters);
             Ok(())
         }
-        Start::Contradiction(names) | Start::ContradictionAmong(names) => contradiction(names),
-        Start::Unsolved(status) => Err(BuildError::new("demands", status.sentence())),
+        StartProjection::Contradiction(names) | StartProjection::ContradictionAmong(names) => {
+            contradiction(names)
+        }
+        StartProjection::Unsolved(status) => Err(BuildError::new("demands", status.sentence())),
     }
 }

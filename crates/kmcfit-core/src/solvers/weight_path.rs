@@ -1,13 +1,17 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
+use super::checkpoint::Observer;
+use super::counts::Counts;
 use super::executor::search;
-use super::gauss_newton::{linearisation_tangents, linearise_at};
-use super::ladder::climb;
-use super::optimality::measured;
-use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch};
+use super::fit::{Attempt, Fit, measured};
+use super::history::IterationRecord;
+use super::iterate::Iterate;
+use super::linearization::{Linearization, linearisation_tangents, linearise};
+use super::settings::FitSettings;
+use super::start_strategy::search_from_starts;
+use super::termination::{Outcome, Status};
+use super::timings::{Timings, timed};
 use crate::dynamics::Breakdown;
-use crate::objective::Channel;
 use crate::problem::Problem;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -99,26 +103,6 @@ impl Problem {
         }
         problem
     }
-
-    /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
-    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
-    pub fn largest_chi_square(&self) -> Option<f64> {
-        let known = self.channels().all(|c| c.weighting().is_sigma());
-        known.then(|| largest_chi_square(self.reading_count()))
-    }
-}
-
-impl Channel {
-    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
-    pub fn largest_chi_square(&self) -> Option<f64> {
-        let known = self.weighting().is_sigma();
-        known.then(|| largest_chi_square(self.len()))
-    }
-}
-
-fn largest_chi_square(readings: usize) -> f64 {
-    let n = readings as f64;
-    n + 2.0 * (2.0 * n).sqrt()
 }
 
 /// Fits `problem` for a path of factors on the penalties `which`, each from its neighbour, and once
@@ -132,7 +116,7 @@ pub fn choose_weight(
     settings: &FitSettings,
     rule: WeightRule,
     which: &[usize],
-    observe: &mut dyn FnMut(&Row),
+    observe: &mut dyn FnMut(&IterationRecord),
 ) -> Result<(WeightPath, Problem, Fit), Breakdown> {
     choose_weight_watched(
         problem,
@@ -140,11 +124,11 @@ pub fn choose_weight(
         settings,
         rule,
         which,
-        &mut Watch::new(observe),
+        &mut Observer::new(observe),
     )
 }
 
-/// [`choose_weight`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what was
+/// [`choose_weight`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what was
 /// kept.
 ///
 /// # Errors
@@ -155,7 +139,7 @@ pub fn choose_weight_watched(
     settings: &FitSettings,
     rule: WeightRule,
     which: &[usize],
-    watch: &mut Watch,
+    watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), Breakdown> {
     let mut walk = Walk {
         problem,
@@ -164,7 +148,7 @@ pub fn choose_weight_watched(
         watch,
         from: start.to_vec(),
         last: None,
-        rungs: Vec::new(),
+        attempts: Vec::new(),
         counts: Counts::default(),
         timings: Timings::default(),
         elapsed: Duration::ZERO,
@@ -202,17 +186,17 @@ pub fn choose_weight_watched(
     Ok((path, weighted, found))
 }
 
-/// A walk along the path. The first fit climbs the ladder of [`fit`]; every other starts where its
+/// A walk along the path. The first fit tries the starting points of [`fit`]; every other starts where its
 /// neighbour ended, and needs none: a fit that explains the record is followed while its weight
 /// changes, also to weights so large that it explains the record no longer.
 struct Walk<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
-    watch: &'a mut Watch<'w>,
+    watch: &'a mut Observer<'w>,
     from: Vec<f64>,
     last: Option<Outcome>,
-    rungs: Vec<Rung>,
+    attempts: Vec<Attempt>,
     counts: Counts,
     timings: Timings,
     elapsed: Duration,
@@ -245,11 +229,11 @@ impl Walk<'_, '_> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
         let from = std::mem::take(&mut self.from);
         let found = match self.last {
-            None => climb(&problem, &from, &self.settings, self.watch)?,
+            None => search_from_starts(&problem, &from, &self.settings, self.watch)?,
             Some(_) => search(&problem, &from, &self.settings, None, self.watch)?,
         };
         if self.last.is_none() {
-            self.rungs.clone_from(&found.rungs);
+            self.attempts.clone_from(&found.attempts);
         }
         self.last = Some(found.outcome.clone());
         self.counts += found.counts;
@@ -273,7 +257,7 @@ impl Walk<'_, '_> {
         })
     }
 
-    /// The fit at a point of the path once more, with the rungs that led onto the path.
+    /// The fit at a point of the path once more, with the attempts that led onto the path.
     fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, Breakdown> {
         let mut found = search(problem, from, &self.settings, None, self.watch)?;
         if self.ended()
@@ -283,7 +267,7 @@ impl Walk<'_, '_> {
             found.outcome = outcome;
         }
         Ok(Fit {
-            rungs: self.rungs.clone(),
+            attempts: self.attempts.clone(),
             ..found
         })
     }
@@ -294,10 +278,14 @@ impl Walk<'_, '_> {
     }
 }
 
-/// The iterations of a fit: those of every rung where it climbed the ladder.
+/// The iterations of a fit: those of all attempts where there are several.
 fn iterations(found: &Fit) -> u64 {
-    let rungs: u64 = found.rungs.iter().map(|rung| rung.iterations).sum();
-    rungs.max(found.history.len() as u64)
+    let attempts: u64 = found
+        .attempts
+        .iter()
+        .map(|attempt| attempt.iterations)
+        .sum();
+    attempts.max(found.history.len() as u64)
 }
 
 fn weights(problem: &Problem) -> Vec<f64> {
@@ -319,7 +307,13 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
 
 /// Trace of the matrix that takes the readings to their fitted values, by random signs.
 fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
-    let (mut sub, readings) = linearise_at(problem, &found.best, timings);
+    let Iterate {
+        parameters,
+        evaluation,
+        ..
+    } = &found.best;
+    let fresh = Linearization::Fresh;
+    let (mut sub, readings) = linearise(problem, parameters, evaluation, &fresh, timings);
     // The proximal term of a fit that has ended is gone.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();

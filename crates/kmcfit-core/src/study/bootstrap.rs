@@ -69,7 +69,7 @@ pub fn bootstrap(
             Err(breakdown) => Err(breakdown.to_string()),
             Ok(fit) => match fit.outcome.status {
                 Status::Converged | Status::Completed => Ok(fit.best.parameters),
-                _ => Err(fit.outcome.reason),
+                _ => Err(fit.outcome.reason.to_string()),
             },
         }
     };

@@ -103,7 +103,7 @@ pub fn run(problem: &Problem) -> Fit {
         found.outcome.status,
         Status::Converged,
         "{:#?}",
-        found.rungs
+        found.attempts
     );
     found
 }

@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::error::{self, InputError};
 use kmcfit_core::internals::constraints::TOLERANCE;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::Start;
+use kmcfit_core::internals::solvers::StartProjection;
 
 /// Moves the functions' start into the constraints, with a warning unless it only was off by
 /// rounding.
@@ -22,8 +22,8 @@ pub(in crate::config::build) fn move_start(
     let found = problem.feasible_start(&start);
     let was_inside = problem.constraints.hold(&start, TOLERANCE);
     match found {
-        Start::Kept(_) => Ok(()),
-        Start::Moved {
+        StartProjection::Kept(_) => Ok(()),
+        StartProjection::Moved {
             parameters,
             constraint,
         } => {
@@ -34,15 +34,15 @@ pub(in crate::config::build) fn move_start(
             problem.functions = problem.functions.clone().with_start(&parameters);
             Ok(())
         }
-        Start::Contradiction(names) => {
+        StartProjection::Contradiction(names) => {
             let hint = "leaving out any one of them resolves it";
             Err(contradiction(file, places, &names, hint))
         }
-        Start::ContradictionAmong(names) => {
+        StartProjection::ContradictionAmong(names) => {
             let hint = "some of them may have no part in it";
             Err(contradiction(file, places, &names, hint))
         }
-        Start::Unsolved(status) => Err(file
+        StartProjection::Unsolved(status) => Err(file
             .error_at("constraints", "no start inside the constraints was found")
             .found(status.sentence())
             .expected("constraints of moderate sizes that some functions satisfy")),

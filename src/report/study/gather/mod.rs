@@ -25,7 +25,7 @@ pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
     };
     FitPiece {
         status: fit.outcome.status.name().into(),
-        reason: fit.outcome.reason.clone(),
+        reason: fit.outcome.reason.to_string(),
         cost: fit.best.evaluation.cost,
         misfit: fit.best.evaluation.misfit,
         parameters: fit.best.parameters.clone(),

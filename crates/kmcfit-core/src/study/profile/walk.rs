@@ -5,7 +5,7 @@ use crate::constraints::RowGroup;
 use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::solvers::{Point, Status, active_constraints, fit_from};
+use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
 
@@ -34,7 +34,7 @@ const SPARE: f64 = 1e-6;
 const BLAMED: f64 = 0.5;
 
 /// Names of the constraints that are active at a point, the profile's own row left out.
-fn names(problem: &Problem, point: &Point) -> Vec<String> {
+fn names(problem: &Problem, point: &Iterate) -> Vec<String> {
     let active = active_constraints(problem, point).into_iter();
     active
         .map(|group| group.name)
@@ -58,7 +58,7 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
 struct Sample {
     value: f64,
     cost: f64,
-    point: Point,
+    point: Iterate,
     /// Names of the constraints that are active there.
     active: Vec<String>,
 }
@@ -134,7 +134,7 @@ impl<'a> Walk<'a> {
             .ok_or_else(|| "the constraints do not allow the value".to_owned())?;
         let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
         match found.outcome.status {
-            Status::Infeasible | Status::Failed => Err(found.outcome.reason),
+            Status::Infeasible | Status::Failed => Err(found.outcome.reason.to_string()),
             // A step that leads out of the valley is too long, and says nothing of its walls.
             _ if self.rise(found.best.evaluation.cost) > LOST * self.how.quantile => {
                 Err("no fit near the optimum was found with the number held there".to_owned())
@@ -191,7 +191,7 @@ impl<'a> Walk<'a> {
         (reached - side * spare, End::Bound)
     }
 
-    fn first_step(&self, start: &Point) -> f64 {
+    fn first_step(&self, start: &Iterate) -> f64 {
         let covariance = self.problem.covariance(&start.evaluation);
         let deviation = covariance.map_or(0.0, |c| 0.5 * self.of.deviation(&c));
         let size: f64 = (self.of.entries.iter())

@@ -1,0 +1,226 @@
+//! Counted and timed evaluations: all solves of a search.
+
+use super::counts::{ADJOINT, FORWARD, QP, TANGENT};
+use super::iterate::Iterate;
+use super::linearization::{Linearization, halfway, in_halves};
+use super::settings::{FitSettings, Solver};
+use super::timings::{Timings, timed};
+use crate::dynamics::{Breakdown, Trajectory};
+use crate::objective::{Channel, Evaluation, Gradient, GradientKind, Loss};
+use crate::problem::Problem;
+use std::sync::OnceLock;
+
+/// The problem behind argmin's counters: the one door through which solvers evaluate.
+pub(crate) struct CountedEvaluator<'a, 'p> {
+    problem: &'a mut argmin::core::Problem<&'p Problem>,
+    kind: GradientKind,
+    /// Whether every operation has its place: the paper's run depends on every bit.
+    in_order: bool,
+    /// Where the record is cut in two, so that iterates need tangent solves and no adjoint.
+    halfway: Option<usize>,
+    /// Most iterations of one quadratic program.
+    pub program_iterations: u32,
+    /// What the work took.
+    pub timings: Timings,
+}
+
+impl<'a, 'p> CountedEvaluator<'a, 'p> {
+    pub fn new(
+        problem: &'a mut argmin::core::Problem<&'p Problem>,
+        settings: &FitSettings,
+    ) -> Self {
+        let needs_jacobians =
+            settings.solver == Solver::GaussNewton && settings.gradient == GradientKind::Discrete;
+        let halfway = problem
+            .problem
+            .filter(|_| needs_jacobians)
+            .and_then(|p| halfway(p));
+        Self {
+            problem,
+            halfway,
+            kind: settings.gradient,
+            in_order: settings.solver == Solver::SteepestDescent
+                || settings.gradient == GradientKind::Continuous,
+            program_iterations: settings.stopping.program_iterations,
+            timings: Timings::default(),
+        }
+    }
+
+    /// The problem itself, for what costs no solve.
+    pub fn problem(&self) -> &'p Problem {
+        self.problem
+            .problem
+            .expect("the executor holds the problem")
+    }
+
+    /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
+    /// the `fingerprint`. `None` if there is no such point.
+    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        let evaluated = match self.in_order {
+            true => problem.evaluate_in_order_into(&parameters, &mut evaluation),
+            false => problem.evaluate_into(&parameters, &mut evaluation),
+        };
+        evaluated.ok()?;
+        let point = self.completed(parameters, evaluation, &mut Timings::default());
+        if point.fingerprint() == fingerprint || self.halfway.is_none() {
+            return Some(point).filter(|point| point.fingerprint() == fingerprint);
+        }
+        // After a short step the gradient was computed by an adjoint solve.
+        let Iterate {
+            parameters,
+            evaluation,
+            ..
+        } = point;
+        let gradient = problem.gradient(&parameters, &evaluation, self.kind);
+        let point = Iterate::new(parameters, evaluation, gradient);
+        (point.fingerprint() == fingerprint).then_some(point)
+    }
+
+    /// The motions at a point that was there before, computed again without counting.
+    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, Breakdown> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        match self.in_order {
+            true => problem.evaluate_in_order_into(parameters, &mut evaluation)?,
+            false => problem.evaluate_into(parameters, &mut evaluation)?,
+        }
+        Ok(evaluation.trajectories)
+    }
+
+    /// One forward solve into `evaluation`.
+    pub fn evaluate_into(
+        &mut self,
+        parameters: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.count(FORWARD, 1);
+        let (problem, in_order) = (self.problem(), self.in_order);
+        timed(&mut self.timings.forward, || match in_order {
+            true => problem.evaluate_in_order_into(parameters, evaluation),
+            false => problem.evaluate_into(parameters, evaluation),
+        })
+    }
+
+    /// Several forward solves at once.
+    pub fn forwards<T>(&mut self, solves: u64, solve: impl FnOnce() -> T) -> T {
+        self.count(FORWARD, solves);
+        timed(&mut self.timings.forward, solve)
+    }
+
+    /// One adjoint solve at an evaluated point.
+    pub fn gradient(&mut self, parameters: &[f64], evaluation: &Evaluation) -> Gradient {
+        self.count(ADJOINT, 1);
+        let (problem, kind) = (self.problem(), self.kind);
+        timed(&mut self.timings.adjoint, || {
+            problem.gradient(parameters, evaluation, kind)
+        })
+    }
+
+    /// Counts the tangent solves of a linearisation, where those of its point have not been counted.
+    pub fn count_linearisation(&mut self, solves: u64) {
+        if self.halfway.is_none() {
+            self.count_tangents(solves);
+        }
+    }
+
+    /// Counts tangent solves.
+    pub fn count_tangents(&mut self, solves: u64) {
+        self.count(TANGENT, solves);
+    }
+
+    /// One quadratic program.
+    pub fn program<T>(&mut self, solve: impl FnOnce() -> T) -> T {
+        self.count(QP, 1);
+        timed(&mut self.timings.qp, solve)
+    }
+
+    /// Linear algebra between the solves.
+    pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        timed(&mut self.timings.linear_algebra, work)
+    }
+
+    /// The linearisation that a step from `point` uses.
+    pub fn linearization(&mut self, point: &Iterate) -> Linearization {
+        match point.linearization() {
+            Linearization::Fresh if self.halfway.is_some() => self.linearise_again(point),
+            known => known.clone(),
+        }
+    }
+
+    /// The linearisation at `point` itself, without counting.
+    pub fn linearise_again(&mut self, point: &Iterate) -> Linearization {
+        Linearization::at(self.problem(), &point.evaluation, &mut self.timings)
+    }
+
+    /// [`CountedEvaluator::complete`] after a short step from `before`: its `linearization` is taken for that of the new point where
+    /// that can be done.
+    pub fn complete_nearby(
+        &mut self,
+        before: &Iterate,
+        linearization: &Linearization,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+    ) -> Iterate {
+        let problem = self.problem();
+        let is_squares = |c: &Channel| c.loss() == Loss::Squares;
+        if linearization.reduced().is_none()
+            || problem.is_regularised()
+            || !problem.channels().all(is_squares)
+        {
+            return self.complete(parameters, evaluation);
+        }
+        let gradient = self.gradient(&parameters, &evaluation);
+        match linearization.nearby(&before.parameters, &evaluation, &gradient) {
+            Some(reused) => {
+                Iterate::new(parameters, evaluation, gradient).with_cached(OnceLock::new(), reused)
+            }
+            None => self.complete(parameters, evaluation),
+        }
+    }
+
+    /// The point that an evaluation belongs to, completed by its gradient.
+    pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Iterate {
+        let mut timings = Timings::default();
+        let point = self.completed(parameters, evaluation, &mut timings);
+        self.timings += timings;
+        if self.halfway.is_some() {
+            self.count_tangents(point.parameters.len() as u64);
+        }
+        if point.linearization().reduced().is_none() {
+            self.count(ADJOINT, 1);
+        }
+        point
+    }
+
+    /// [`CountedEvaluator::complete`] without counting: by the linearised halves of a long record, otherwise by an adjoint solve.
+    fn completed(
+        &self,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+        timings: &mut Timings,
+    ) -> Iterate {
+        let problem = self.problem();
+        if let Some(halfway) = self.halfway {
+            let (reduced, sizes) = timed(&mut timings.tangent, || {
+                let sizes = || problem.natural_sizes(&evaluation);
+                in_halves(problem, &evaluation, halfway, sizes)
+            });
+            if let Some(misfit) = reduced.misfit_gradient() {
+                let gradient = problem.gradient_of_misfit(&parameters, misfit);
+                let halves = Linearization::Halves(reduced);
+                let point = Iterate::new(parameters, evaluation, gradient);
+                return point.with_cached(sizes.into(), halves);
+            }
+        }
+        let gradient = timed(&mut timings.adjoint, || {
+            problem.gradient(&parameters, &evaluation, self.kind)
+        });
+        Iterate::new(parameters, evaluation, gradient)
+    }
+
+    fn count(&mut self, key: &'static str, solves: u64) {
+        *self.problem.counts.entry(key).or_insert(0) += solves;
+    }
+}
