@@ -87,9 +87,12 @@ mod lanes;
 mod objective;
 mod problem;
 mod qp;
+mod record;
 mod signal;
+mod simulate;
 mod solvers;
 mod study;
+mod system;
 mod threads;
 
 /// Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API; outside semantic

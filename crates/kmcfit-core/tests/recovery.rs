@@ -3,7 +3,7 @@
 mod common;
 
 use common::closed_form::Bessel;
-use kmcfit_core::internals::dynamics::{Device, Method, Oscillator};
+use kmcfit_core::internals::dynamics::{Device, Method, Oscillator, reference};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity, Ratios};
 use kmcfit_core::internals::objective::GradientKind;
@@ -182,9 +182,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
                 },
             };
             let motion = &here.trajectories[0];
-            problem
-                .oscillator
-                .tangent(&here.device, None, motion, &direction)
+            reference::tangent(&problem.oscillator, &here.device, None, motion, &direction)
                 .displacement
         })
         .collect();

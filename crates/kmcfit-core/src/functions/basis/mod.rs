@@ -7,9 +7,8 @@
 mod b_spline;
 mod constant;
 mod differences;
-mod gauss;
 mod knots;
-mod nodal;
+mod legendre;
 mod piecewise_constant;
 mod piecewise_linear;
 mod polynomial;
@@ -80,7 +79,7 @@ impl Basis {
     /// The functions of this basis on a record: the one place where the kinds are told apart.
     fn on(&self, grid: &Grid) -> Box<dyn Space> {
         match self {
-            Basis::Nodal => Box::new(nodal::on(grid)),
+            Basis::Nodal => Box::new(piecewise_linear::PiecewiseLinear::on_nodes(grid)),
             Basis::Constant => Box::new(constant::Constant::on(grid)),
             Basis::PiecewiseConstant { knots } => {
                 Box::new(piecewise_constant::PiecewiseConstant::new(knots))

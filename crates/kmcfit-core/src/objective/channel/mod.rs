@@ -7,15 +7,15 @@ pub use misfit::integral_over;
 pub(super) use prediction::add_to_scalars;
 
 use super::{Loss, Sensor, Weighting};
-use crate::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Oscillator, Place, Surroundings, Trajectory,
-};
+use crate::record::ChannelKind;
 use crate::signal::{SecondOrder, zero_phase};
+use crate::simulate::{Engine, Purpose, Trajectory};
+use crate::system::{Device, DeviceTangent, Excitation, Grid, Oscillator, Place, Surroundings};
 
 /// The readings of one sensor.
 ///
 /// The model of reading `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
-/// displacement, velocity or acceleration of the motion ([`Oscillator::sense`]), `b_i` the same of the
+/// displacement, velocity or acceleration of the motion ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the
 /// base where the sensor does not move with it, and `t_0` the time of the first reading. With a
 /// filter, model and readings are filtered alike before they are compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +61,26 @@ pub struct ViewTangent<'a> {
     pub motion: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
+}
+
+impl View<'_> {
+    /// The engine of its response and derivatives.
+    pub(crate) fn engine(&self) -> Engine {
+        let nodes = self.motion.nodes();
+        Engine::choose(self.oscillator, self.excitation, nodes, Purpose::Estimation)
+    }
+
+    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
+    pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> DeviceTangent {
+        let Self {
+            oscillator,
+            device,
+            excitation,
+            motion,
+            ..
+        } = self;
+        (self.engine()).discrete_adjoint(oscillator, device, *excitation, motion, source)
+    }
 }
 
 impl Channel {

@@ -1,16 +1,20 @@
 //! What the model says of a channel's readings, how that changes, and the transpose.
 
 use super::{Channel, View, ViewTangent};
-use crate::dynamics::{ChannelKind, Excitation, Place, Sensed, Slopes, Surroundings, Trajectory};
 use crate::lanes;
 use crate::objective::Sensor;
 use crate::objective::on_nodes::{AddTranspose, Predict};
+use crate::record::ChannelKind;
 use crate::signal::{zero_phase, zero_phase_transpose};
+use crate::simulate::reference::{Sensed, observe};
+use crate::simulate::{Slopes, Trajectory};
+use crate::system::{Excitation, Place, Surroundings};
 
 impl Channel {
     /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
     pub fn sensed(&self, view: View, i: usize) -> Sensed {
-        let mut sensed = view.oscillator.sense(
+        let mut sensed = observe(
+            view.oscillator,
             self.kind,
             view.device,
             view.excitation,

@@ -2,6 +2,7 @@
 //! of nodes, for functions with many parameters.
 
 use crate::constraints::Rows;
+use crate::dynamics::reference::step_jacobians;
 use crate::dynamics::{ChannelKind, StepJacobian, Trajectory};
 use crate::objective::{Channel, Evaluation, View};
 use crate::problem::{Experiment, Problem};
@@ -15,8 +16,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        let oscillator = &problem.oscillator;
-        oscillator.step_jacobians(view.device, view.excitation, view.motion)
+        step_jacobians(view.oscillator, view.device, view.excitation, view.motion)
     });
     each.collect()
 }

@@ -5,7 +5,7 @@
 //! with the same bits.
 
 use super::{Best, lengths, take, trial};
-use crate::dynamics::{Layout, Method, Ray, Term, Trials, replay};
+use crate::dynamics::{Layout, Ray, Trials, is_linear_midpoint, reference, replay};
 use crate::lanes::{LANES, Row};
 use crate::objective::{Evaluation, GradientKind, Weighting};
 use crate::problem::Problem;
@@ -222,7 +222,7 @@ fn move_to(
     let motion = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
     let is_whole = replay(device, initial, states, oscillator.grid.step(), motion);
-    if !is_whole && (oscillator.forward_into(device, initial, None, motion)).is_err() {
+    if !is_whole && reference::forward_into(oscillator, device, initial, None, motion).is_err() {
         return false;
     }
     evaluation.predictions[0][0].clone_from(&motion.displacement);
@@ -238,8 +238,7 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Point, lengths: &[f64]) -
     let nodes = experiment.nodes;
     let is_integral = matches!(channel.weighting(), Weighting::Integral { .. });
     let fits = is_integral
-        && oscillator.method == Method::Midpoint
-        && oscillator.terms == [Term::Damping, Term::Stiffness]
+        && is_linear_midpoint(oscillator)
         && experiment.excitation.is_none()
         && !problem.is_regularised()
         && point.parameters.len() == 3 * nodes;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::dynamics::{Grid, Oscillator, State};
+use crate::dynamics::{Grid, Method, Oscillator, State, Term};
 use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
 use crate::objective::Channel;
 use crate::problem::Experiment;

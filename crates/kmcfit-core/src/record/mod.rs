@@ -1,0 +1,5 @@
+//! Measured records: inputs and channels.
+
+mod kind;
+
+pub use kind::ChannelKind;

@@ -1,0 +1,84 @@
+//! The accelerations at eight neighbouring nodes: what an accelerometer sampled with the grid sees.
+
+use super::elements::with_known;
+use super::padded_loads as window;
+use crate::lanes::{Arithmetic, Eight, LANES, Row};
+use crate::simulate::Trajectory;
+use crate::system::{Device, FUNCTIONS, MOST_TERMS, Oscillator, Term};
+
+/// Accelerations at eight nodes and their derivatives, one node a lane.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Accelerations {
+    /// The accelerations of `y`, relative to the base.
+    pub value: Row,
+    /// Derivatives with respect to displacement and velocity at the node.
+    pub states: [Row; 2],
+    /// Derivatives with respect to each function's value at the node, mass first.
+    pub functions: [Row; FUNCTIONS],
+}
+
+impl Accelerations {
+    pub const NOTHING: Self = Self {
+        value: [0.0; LANES],
+        states: [[0.0; LANES]; 2],
+        functions: [[0.0; LANES]; FUNCTIONS],
+    };
+}
+
+/// Whose accelerations are seen.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight<'a> {
+    pub oscillator: &'a Oscillator,
+    pub device: &'a Device,
+    pub states: &'a Trajectory,
+}
+
+impl Sight<'_> {
+    /// The accelerations at eight nodes from node `i` on, with force and acceleration of the base at each; lanes
+    /// beyond the last node mean nothing.
+    #[inline(always)]
+    pub fn see<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        i: usize,
+        around: [Eight<A>; 2],
+        seen: &mut Accelerations,
+    ) {
+        let terms = self.oscillator.terms.as_slice();
+        with_known!(terms, terms, TERMS => {
+            self.see_terms::<A, TERMS>(arithmetic, terms, i, around, seen);
+        });
+    }
+
+    #[inline(always)]
+    fn see_terms<A: Arithmetic, const TERMS: usize>(
+        &self,
+        arithmetic: A,
+        terms: &[Term],
+        i: usize,
+        [force, base]: [Eight<A>; 2],
+        seen: &mut Accelerations,
+    ) {
+        let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
+        let y = window::eight(arithmetic, &self.states.displacement, i);
+        let v = window::eight(arithmetic, &self.states.velocity, i);
+        let per_mass = one / window::eight(arithmetic, &self.device.mass, i);
+        let minus_per_mass = -per_mass;
+        let mut push = force;
+        let [mut by_y, mut by_v] = [zero; 2];
+        for (j, term) in terms.iter().enumerate().take(TERMS) {
+            let p = &self.device.coefficients[j];
+            let p = window::eight(arithmetic, p, i);
+            let response = term.respond(arithmetic, y, v);
+            push = push - p * response.phi;
+            seen.functions[j + 1] = (response.phi * minus_per_mass).row();
+            by_y = response.by_y.taken_from(by_y, p);
+            by_v = response.by_v.taken_from(by_v, p);
+        }
+        let inertia = push * per_mass;
+        seen.functions[0] = (inertia * minus_per_mass).row();
+        seen.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
+        seen.value = (inertia - base).row();
+    }
+}
