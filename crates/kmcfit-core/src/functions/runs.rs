@@ -139,8 +139,8 @@ impl Runs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::Grid;
     use crate::functions::Basis;
+    use crate::system::Grid;
 
     const NODES: usize = 401;
 

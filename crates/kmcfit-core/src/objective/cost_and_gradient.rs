@@ -90,8 +90,8 @@ impl Problem {
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::{Grid, Method};
     use crate::functions::Functions;
+    use crate::system::{Grid, Method};
 
     /// The paper's problem, on few nodes.
     fn problem() -> Problem {

@@ -1,25 +1,21 @@
 //! The cost of a parameter vector and its derivatives, from one trajectory per point.
 
-mod channel;
 mod cost_and_gradient;
 mod gradient;
 mod jacobian;
-mod loss;
-mod on_nodes;
+mod node_aligned;
+mod prediction;
 mod refine;
-mod sensor;
 mod sizes;
 mod verify;
-mod weighting;
+mod view;
 
-pub use channel::{Channel, View, ViewTangent, integral_over};
+pub use crate::record::{Channel, Loss, Sensor, Weighting, integral_over};
 pub use gradient::{Gradient, GradientKind};
-pub use loss::Loss;
 pub use refine::Refined;
-pub use sensor::Sensor;
 pub use sizes::state_sizes;
 pub use verify::GradientError;
-pub use weighting::Weighting;
+pub use view::{View, ViewTangent};
 
 use crate::problem::Problem;
 use crate::simulate::reference::tangent;

@@ -18,8 +18,8 @@ pub use knots::uniform_knots;
 pub use polynomial::{from_physical_powers, physical_powers};
 
 use super::{Design, Gram};
-use crate::dynamics::Grid;
-use crate::dynamics::quadrature::trapezoid_weights;
+use crate::system::Grid;
+use crate::system::quadrature::trapezoid_weights;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use space::{Space, matrix};
 

@@ -3,7 +3,7 @@
 use super::differences;
 use super::knots::Knots;
 use super::space::{Space, square_integral};
-use crate::dynamics::Grid;
+use crate::system::Grid;
 use nalgebra_sparse::CsrMatrix;
 
 /// Hat functions: 1 at their own knot, 0 at all others.

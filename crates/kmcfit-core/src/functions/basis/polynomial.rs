@@ -6,7 +6,7 @@
 use super::knots::uniform_knots;
 use super::legendre::legendre;
 use super::space::Space;
-use crate::dynamics::Grid;
+use crate::system::Grid;
 
 /// `P_n(x)`, `n = 0..=degree`, with `x = 2 (t - start) / duration - 1`.
 pub(super) struct Legendre {

@@ -4,11 +4,11 @@ mod moving;
 mod reader;
 
 use super::{Channel, Evaluation, View};
-use crate::dynamics::{Course, TILE};
 use crate::lanes::LANES;
 use crate::lanes::sum::are_finite;
 use crate::lanes::tall::Piece;
 use crate::problem::{Experiment, LONG, Problem};
+use crate::simulate::fast::sensitivities::{Course, TILE};
 use moving::Moving;
 use nalgebra::DMatrix;
 use reader::Reader;
@@ -221,9 +221,10 @@ fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
     use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
     use crate::objective::{GradientKind, Weighting};
+    use crate::record::ChannelKind;
+    use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
 
     const NODES: usize = 70;
 

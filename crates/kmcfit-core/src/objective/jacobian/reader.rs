@@ -1,9 +1,12 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::dynamics::{Accelerations, Change, FUNCTIONS, Sensed, Steady, TILE, Tangents};
 use crate::lanes::tall::Piece;
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::objective::{Channel, View};
+use crate::simulate::Sensed;
+use crate::simulate::fast::nodal_observations::Accelerations;
+use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
+use crate::system::FUNCTIONS;
 use std::ops::Range;
 
 /// Takes the tangents of one channel's readings, tile by tile.

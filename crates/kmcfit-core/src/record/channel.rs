@@ -1,16 +1,8 @@
-//! One channel of a record: readings at times of their own, and what the model says of them.
+//! One channel of a record: the samples of one sensor.
 
-mod misfit;
-mod prediction;
-
-pub use misfit::integral_over;
-pub(super) use prediction::add_to_scalars;
-
-use super::{Loss, Sensor, Weighting};
-use crate::record::ChannelKind;
+use super::{ChannelKind, Loss, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
-use crate::simulate::{Engine, Purpose, Trajectory};
-use crate::system::{Device, DeviceTangent, Excitation, Grid, Oscillator, Place, Surroundings};
+use crate::system::{Excitation, Grid, Place, Surroundings};
 
 /// The readings of one sensor.
 ///
@@ -35,52 +27,6 @@ pub struct Channel {
     filter: Vec<SecondOrder>,
     /// Whether reading `i` stands on node `i`.
     on_every_node: bool,
-}
-
-/// The motion that a channel looks at.
-#[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
-    /// Grid, stepper and terms.
-    pub oscillator: &'a Oscillator,
-    /// The device that moves.
-    pub device: &'a Device,
-    /// What drives it.
-    pub excitation: Option<&'a Excitation>,
-    /// Its motion.
-    pub motion: &'a Trajectory,
-    /// Values of all scalars.
-    pub scalars: &'a [f64],
-}
-
-/// How a view changes along a direction.
-#[derive(Debug, Clone, Copy)]
-pub struct ViewTangent<'a> {
-    /// Change of the device.
-    pub device: &'a Device,
-    /// Change of the motion.
-    pub motion: &'a Trajectory,
-    /// Change of the scalars.
-    pub scalars: &'a [f64],
-}
-
-impl View<'_> {
-    /// The engine of its response and derivatives.
-    pub(crate) fn engine(&self) -> Engine {
-        let nodes = self.motion.nodes();
-        Engine::choose(self.oscillator, self.excitation, nodes, Purpose::Estimation)
-    }
-
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
-    pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> DeviceTangent {
-        let Self {
-            oscillator,
-            device,
-            excitation,
-            motion,
-            ..
-        } = self;
-        (self.engine()).discrete_adjoint(oscillator, device, *excitation, motion, source)
-    }
 }
 
 impl Channel {
@@ -334,9 +280,38 @@ impl Channel {
         &self.filter
     }
 
+    /// Force and base at reading `i`: as given, or else linear over the step.
+    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
+        match (&self.around, excitation) {
+            (Some([forces, bases]), _) => Surroundings {
+                force: forces[i],
+                base: bases[i],
+            },
+            (None, Some(excitation)) => excitation.around(self.places[i]),
+            (None, None) => Surroundings::default(),
+        }
+    }
+
+    /// [`Channel::base_at`] every reading; empty for none.
+    #[inline(always)]
+    pub(crate) fn base(&self) -> &[f64] {
+        &self.base
+    }
+
+    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
+    /// with the base.
+    pub fn base_at(&self, i: usize) -> f64 {
+        self.base.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Time since the first reading, s.
+    pub fn age(&self, i: usize) -> f64 {
+        self.times[i] - self.times[0]
+    }
+
     /// Whether the readings are displacements of a plain sensor, and nothing is between model and
     /// readings.
-    fn is_plain(&self) -> bool {
+    pub(crate) fn is_plain(&self) -> bool {
         self.kind == ChannelKind::Displacement
             && self.sensor == Sensor::default()
             && self.base.is_empty()
@@ -344,24 +319,24 @@ impl Channel {
     }
 
     /// Whether all readings are displacements at nodes.
-    pub(super) fn is_displacement_at_nodes(&self) -> bool {
+    pub(crate) fn is_displacement_at_nodes(&self) -> bool {
         let all = || self.places.iter().all(|p| p.as_node().is_some());
         self.kind == ChannelKind::Displacement && (self.on_every_node || all())
     }
 
     /// Whether reading `i` stands on node `i`.
-    pub(super) fn is_on_every_node(&self) -> bool {
+    pub(crate) fn is_on_every_node(&self) -> bool {
         self.on_every_node
     }
 
     /// Forces and accelerations of the base at the readings, if they are given.
     #[inline(always)]
-    pub(super) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
+    pub(crate) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
         self.around.as_ref()
     }
 
     /// What the filter makes of a series over the readings.
-    pub(super) fn filtered(&self, series: &[f64]) -> Vec<f64> {
+    pub(crate) fn filtered(&self, series: &[f64]) -> Vec<f64> {
         zero_phase(&self.filter, series)
     }
 

@@ -1,11 +1,12 @@
 //! Accelerations read on every node, eight at a time.
 
-use super::Channel;
-use super::channel::{View, add_to_scalars};
-use crate::dynamics::{
-    Accelerations, ChannelKind, Excitation, FUNCTIONS, Sight, Slopes, Trajectory, window,
-};
+use super::View;
 use crate::lanes::{Arithmetic, Eight, Kernel, LANES, Row};
+use crate::record::{Channel, ChannelKind};
+use crate::simulate::fast::nodal_observations::{Accelerations, Sight};
+use crate::simulate::fast::padded_loads as window;
+use crate::simulate::{Slopes, Trajectory};
+use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
     /// Whether reading `i` is the acceleration at node `i`.
@@ -117,8 +118,8 @@ impl Kernel for AddTranspose<'_, '_> {
             scalars,
         } = self;
         let [gain, ..] = channel.sensor().values(view.scalars);
-        let indices = channel.sensor().indices();
-        let seeks = indices.iter().any(Option::is_some);
+        let sensor = channel.sensor();
+        let seeks = sensor.indices().iter().any(Option::is_some);
         let factor = Eight::splat(arithmetic, gain);
         let mut seen = Accelerations::NOTHING;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
@@ -153,7 +154,7 @@ impl Kernel for AddTranspose<'_, '_> {
                 for (l, slope) in slopes.iter().enumerate() {
                     let i = from + l;
                     let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
-                    add_to_scalars(indices, factors, *slope, scalars);
+                    sensor.add_gradient(factors, *slope, scalars);
                 }
             }
         }

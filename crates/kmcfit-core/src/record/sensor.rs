@@ -44,4 +44,13 @@ impl Sensor {
     pub fn indices(self) -> [Option<usize>; 3] {
         self.list().map(Value::index)
     }
+
+    /// Adds the gradient with respect to the scalars: `slope` times the `factors` of gain, offset and drift.
+    pub(crate) fn add_gradient(self, factors: [f64; 3], slope: f64, scalars: &mut [f64]) {
+        for (index, factor) in self.indices().into_iter().zip(factors) {
+            if let Some(index) = index {
+                scalars[index] += slope * factor;
+            }
+        }
+    }
 }

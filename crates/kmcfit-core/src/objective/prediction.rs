@@ -1,68 +1,42 @@
 //! What the model says of a channel's readings, how that changes, and the transpose.
 
-use super::{Channel, View, ViewTangent};
+use super::node_aligned::{AddTranspose, Predict};
+use super::{View, ViewTangent};
 use crate::lanes;
-use crate::objective::Sensor;
-use crate::objective::on_nodes::{AddTranspose, Predict};
-use crate::record::ChannelKind;
+use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simulate::reference::{Sensed, observe};
 use crate::simulate::{Slopes, Trajectory};
-use crate::system::{Excitation, Place, Surroundings};
+use crate::system::Place;
 
 impl Channel {
     /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
     pub fn sensed(&self, view: View, i: usize) -> Sensed {
         let mut sensed = observe(
             view.oscillator,
-            self.kind,
+            self.kind(),
             view.device,
             view.excitation,
             view.motion,
-            self.places[i],
+            self.places()[i],
             self.around_reading(view.excitation, i),
         );
-        if let Some(base) = self.base.get(i) {
+        if let Some(base) = self.base().get(i) {
             sensed.value += base;
         }
         sensed
     }
 
-    /// Force and base at reading `i`: as given, or else linear over the step.
-    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
-        match (&self.around, excitation) {
-            (Some([forces, bases]), _) => Surroundings {
-                force: forces[i],
-                base: bases[i],
-            },
-            (None, Some(excitation)) => excitation.around(self.places[i]),
-            (None, None) => Surroundings::default(),
-        }
-    }
-
     /// The value alone of [`Channel::sensed`].
     fn seen(&self, view: View, i: usize) -> f64 {
-        match (self.kind, self.places[i].as_node(), self.base.is_empty()) {
+        match (
+            self.kind(),
+            self.places()[i].as_node(),
+            self.base().is_empty(),
+        ) {
             (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
             _ => self.sensed(view, i).value,
         }
-    }
-
-    /// [`Channel::base_at`] every reading; empty for none.
-    #[inline(always)]
-    pub(in crate::objective) fn base(&self) -> &[f64] {
-        &self.base
-    }
-
-    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
-    /// with the base.
-    pub fn base_at(&self, i: usize) -> f64 {
-        self.base.get(i).copied().unwrap_or(0.0)
-    }
-
-    /// Time since the first reading, s.
-    pub fn age(&self, i: usize) -> f64 {
-        self.times[i] - self.times[0]
     }
 
     /// What the model says of the readings.
@@ -75,7 +49,7 @@ impl Channel {
     /// [`Channel::predict`] into storage that is used again.
     pub fn predict_into(&self, view: View, out: &mut Vec<f64>) {
         out.clear();
-        if self.on_every_node && self.is_plain() {
+        if self.is_on_every_node() && self.is_plain() {
             out.extend_from_slice(&view.motion.displacement[..self.len()]);
             return;
         }
@@ -83,25 +57,25 @@ impl Channel {
             let channel = self;
             out.reserve_exact(self.len());
             lanes::run(Predict { channel, view, out });
-        } else if self.sensor == Sensor::default() {
+        } else if self.sensor() == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
         } else {
-            let [gain, offset, drift] = self.sensor.values(view.scalars);
+            let [gain, offset, drift] = self.sensor().values(view.scalars);
             let model = |i: usize| gain * self.seen(view, i) + offset + drift * self.age(i);
             out.extend((0..self.len()).map(model));
         }
-        if !self.filter.is_empty() {
-            *out = zero_phase(&self.filter, out);
+        if !self.filter().is_empty() {
+            *out = zero_phase(self.filter(), out);
         }
     }
 
     /// The change of [`Channel::predict`] along a direction.
     pub fn predict_tangent(&self, view: View, along: ViewTangent) -> Vec<f64> {
-        let [gain, ..] = self.sensor.values(view.scalars);
-        let [by_gain, by_offset, by_drift] = self.sensor.changes(along.scalars);
+        let [gain, ..] = self.sensor().values(view.scalars);
+        let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
         let model = |i: usize| {
             let sensed = self.sensed(view, i);
-            let Place { step, .. } = self.places[i];
+            let Place { step, .. } = self.places()[i];
             let mut change = gain * answer(&sensed, step, along);
             if by_gain != 0.0 {
                 change += by_gain * sensed.value;
@@ -109,9 +83,9 @@ impl Channel {
             change + by_offset + by_drift * self.age(i)
         };
         let out: Vec<f64> = (0..self.len()).map(model).collect();
-        match self.filter.is_empty() {
+        match self.filter().is_empty() {
             true => out,
-            false => zero_phase(&self.filter, &out),
+            false => zero_phase(self.filter(), &out),
         }
     }
 
@@ -127,14 +101,14 @@ impl Channel {
         scalars: &mut [f64],
     ) {
         let filtered;
-        let slopes = match self.filter.is_empty() {
+        let slopes = match self.filter().is_empty() {
             true => slopes,
             false => {
-                filtered = zero_phase_transpose(&self.filter, slopes);
+                filtered = zero_phase_transpose(self.filter(), slopes);
                 &filtered
             }
         };
-        if self.on_every_node && self.is_plain() {
+        if self.is_on_every_node() && self.is_plain() {
             let pairs = source.displacement.iter_mut().zip(slopes);
             pairs.for_each(|(source, slope)| *source += slope);
             return;
@@ -149,11 +123,11 @@ impl Channel {
                 scalars,
             });
         }
-        let [gain, ..] = self.sensor.values(view.scalars);
-        let indices = self.sensor.indices();
-        let simple = self.kind == ChannelKind::Displacement && indices == [None; 3];
+        let [gain, ..] = self.sensor().values(view.scalars);
+        let indices = self.sensor().indices();
+        let simple = self.kind() == ChannelKind::Displacement && indices == [None; 3];
         for (i, slope) in slopes.iter().enumerate() {
-            let place = self.places[i];
+            let place = self.places()[i];
             if let (true, Some(node)) = (simple, place.as_node()) {
                 source.displacement[node] += gain * slope;
                 continue;
@@ -161,15 +135,15 @@ impl Channel {
             let sensed = self.sensed(view, i);
             spread(&sensed, place.step, gain * slope, source, direct);
             let factors = [sensed.value, 1.0, self.age(i)];
-            add_to_scalars(indices, factors, *slope, scalars);
+            self.sensor().add_gradient(factors, *slope, scalars);
         }
     }
 
     /// Whether the predictions depend on the functions also at fixed states.
     pub fn sees_functions(&self) -> bool {
-        match self.kind {
+        match self.kind() {
             ChannelKind::Displacement => false,
-            ChannelKind::Velocity => self.places.iter().any(|p| p.as_node().is_none()),
+            ChannelKind::Velocity => self.places().iter().any(|p| p.as_node().is_none()),
             ChannelKind::Acceleration => true,
         }
     }
@@ -192,20 +166,6 @@ fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
         }
     }
     change
-}
-
-/// Adds what gain, offset and drift are worth.
-pub(in crate::objective) fn add_to_scalars(
-    indices: [Option<usize>; 3],
-    factors: [f64; 3],
-    slope: f64,
-    scalars: &mut [f64],
-) {
-    for (index, factor) in indices.into_iter().zip(factors) {
-        if let Some(index) = index {
-            scalars[index] += slope * factor;
-        }
-    }
 }
 
 /// Transpose of [`answer`].
