@@ -3,7 +3,7 @@
 //! An [`InputError`] names the place (file, line or row, key), what was found there, what was
 //! expected, and, where one fits, a near spelling. The program prints it and ends with exit code 2.
 
-use crate::input::harmless;
+use crate::escape::harmless;
 use std::fmt;
 use std::path::{Path, PathBuf};
 

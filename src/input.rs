@@ -1,6 +1,5 @@
 //! Reading text files, with errors that say what is wrong with the file.
 
-use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata};
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -253,23 +252,6 @@ pub fn quote(text: &str) -> String {
     }
     quoted.push('`');
     quoted
-}
-
-/// A text as it may be shown on a terminal: control characters, which could command it, become escapes;
-/// line ends and tabs stay.
-pub fn harmless(text: &str) -> Cow<'_, str> {
-    let commands = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
-    if !text.contains(commands) {
-        return Cow::Borrowed(text);
-    }
-    let mut shown = String::new();
-    for c in text.chars() {
-        match commands(c) {
-            true => shown.extend(c.escape_default()),
-            false => shown.push(c),
-        }
-    }
-    Cow::Owned(shown)
 }
 
 /// Names in a row: `a, b, c`; the first of them where there are many.

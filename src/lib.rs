@@ -23,6 +23,7 @@ pub mod config;
 pub mod digest;
 mod digits;
 pub mod error;
+mod escape;
 mod excerpt;
 mod faults;
 pub mod guide;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::complaint::Complaint;
+use super::locate::place;
 use super::locate::{self, Position, key_path, locate};
-use super::model_file::place;
 use super::scalar::Scalar;
 use super::syntax;
 use crate::error::InputError;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::expansion;
 use super::locate::Position;
-use super::model_file::place;
+use super::locate::place;
 use crate::error::InputError;
 use crate::input::quote;
 use serde::de::DeserializeOwned;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::failure;
 use super::guard::{Checked, LONGEST_MODEL};
-use super::locate::{Position, key_path, locate};
+use super::locate::{key_path, locate, place};
 use super::overrides::Override;
 use super::spec::ModelSpec;
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::input::read_text;
 
 /// What a model file should be, in messages.
@@ -158,6 +158,22 @@ impl ModelFile {
         Ok(model)
     }
 
+    /// Name of experiment `i` in reports.
+    pub(super) fn experiment_name(&self, i: usize) -> String {
+        let given = self.spec.experiments[i].name.as_ref();
+        given.map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone())
+    }
+
+    /// `error` about an argument, placed at the key of the model that gives it.
+    pub(super) fn error_about(&self, key: &str, error: InputError) -> InputError {
+        let here = self.error_at(key, &error.problem);
+        InputError {
+            place: here.place,
+            key: here.key,
+            ..error
+        }
+    }
+
     /// An error about the value at a key such as `experiments[0].initial.velocity`.
     ///
     /// The place is the line and column of the value; where the file does not say it, those of the
@@ -236,15 +252,6 @@ pub(super) fn check_path(path: &Path) -> Result<(), InputError> {
             .found("bytes that are no character")
             .expected("a path in UTF-8: the results name the model by its path")
             .hint("rename the file or its folder")),
-    }
-}
-
-/// A position in a file as the place of an error.
-pub(super) fn place(file: &Path, position: Position) -> Place {
-    Place::Line {
-        file: file.to_path_buf(),
-        line: position.line,
-        column: position.column,
     }
 }
 

@@ -13,6 +13,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
+pub use super::scalar::{ColumnSpec, WeightRule};
 use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList, OneOrMany};
 use super::scalar::{Scalar, Start, Text, Weight};
 use super::scalar::{choice, deserialize_scalar, scalar_visits};
@@ -192,20 +193,6 @@ pub struct SmoothSpec {
     pub reference: Option<NumberOrColumn>,
 }
 
-choice! {
-    /// How the weight of a penalty follows from the data.
-    pub enum WeightRule {
-        /// The largest weight that still fits the readings within their noise.
-        Discrepancy = "discrepancy",
-        /// The corner of misfit against roughness.
-        LCurve = "l-curve",
-        /// Generalised cross-validation.
-        Gcv = "gcv",
-        /// So that the function follows the readings within a dominant period of the motion.
-        Period = "period",
-    }
-}
-
 /// A penalty `weight * total variation of p`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a map such as {weight: 0.1}")]
@@ -295,19 +282,6 @@ pub struct RangeSpec {
     pub min: Option<Number>,
     /// Largest value allowed.
     pub max: Option<Number>,
-}
-
-/// A column of a file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {data: file.csv, column: mass_kg}"
-)]
-pub struct ColumnSpec {
-    /// CSV file, relative to the model file.
-    pub data: Text,
-    /// Name of the column.
-    pub column: Text,
 }
 
 /// How to fit.

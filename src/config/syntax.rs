@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use super::locate::place;
 use super::locate::{self, Position};
-use super::model_file::place;
 use crate::error::InputError;
 use crate::input::quote;
 

@@ -1,9 +1,8 @@
 //! What to try next. The summary in the terminal and the page say the same.
 
-use super::document::{ExperimentSummary, ResultDocument};
-use super::meaning::{BEYOND_SIGMA, EXACT, POOR};
-use super::measured::{ChannelSummary, PatternSummary};
+use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultDocument};
 use crate::digits::significant;
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::solvers::{Solver, Status};

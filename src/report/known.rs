@@ -1,81 +1,52 @@
-//! What a fit is worth: how well the readings determine what was found, and what it says of records that it has not seen.
+//! Assessment of a fit and of the records that took no part in it.
 
-use super::meaning::Doubts;
-use super::measured::{self, HalfStep, StatisticsSummary};
 use super::seen::SeenChannel;
 use crate::config::{HoldOut, Model};
+use kmcfit_core::internals::assessment::{FitAssessment, StepCheck};
 use kmcfit_core::internals::dynamics::Breakdown;
-use kmcfit_core::internals::identifiability::{BandSettings, Bands, Judgement, verdicts};
+use kmcfit_core::internals::identifiability::{Bands, Judgement};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, Solver, Status, predict_held_out};
+use kmcfit_core::internals::solvers::{Fit, Solver, predict_held_out};
 use nalgebra::DMatrix;
 
-/// Up to so many free values the bands are computed with every fit: some milliseconds.
-const FEW_PARAMETERS: usize = 64;
-
-/// How well the readings determine what was found: computed once, told in several places.
+/// Assessment of a fit, computed once for all its documents.
 #[derive(Debug, Clone)]
 pub struct Known {
-    pub(super) half_step: HalfStep,
-    pub(super) statistics: StatisticsSummary,
-    /// `None` for the equation error, which simulates no motion to doubt.
-    pub(super) doubts: Option<Doubts>,
-    pub(super) covariance: Option<DMatrix<f64>>,
-    pub(super) bands: Option<Bands>,
-    pub(super) judgements: Vec<Judgement>,
-    /// What is said of the records that took no part.
+    /// `None` for the equation error, which simulates no response.
+    pub(super) assessment: Option<FitAssessment>,
+    /// The records that took no part.
     pub(super) held_out: Vec<HeldOut>,
 }
 
 impl Known {
-    /// For a simulated motion; errors, bands and judgements for up to 64 free values, and only where they can be
-    /// believed.
+    /// Assesses a fit.
     pub fn of(model: &Model, fit: &Fit) -> Self {
-        let (problem, best) = (&model.problem, &fit.best);
-        let mut known = Self {
-            half_step: Ok(None),
-            statistics: StatisticsSummary::default(),
-            doubts: None,
-            covariance: None,
-            bands: None,
-            judgements: Vec::new(),
-            held_out: model
-                .held_out
-                .iter()
-                .map(|out| HeldOut::of(model, fit, out))
-                .collect(),
-        };
-        if model.settings.solver == Solver::EquationError {
-            return known;
+        let is_simulated = model.settings.solver != Solver::EquationError;
+        let held_out = model.held_out.iter();
+        Self {
+            assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
+            held_out: held_out.map(|out| HeldOut::of(model, fit, out)).collect(),
         }
-        known.half_step = measured::refined(problem, &best.evaluation);
-        known.statistics = measured::statistics(problem, &best.evaluation);
-        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let tells_errors = few && problem.reading_count() > problem.parameters();
-        let mut doubts = Doubts::of(
-            problem,
-            &best.evaluation,
-            &known.half_step,
-            &known.statistics,
-            tells_errors,
-        );
-        if fit.outcome.status == Status::Failed {
-            doubts.no_device = Some("the device is not identified: the fit failed".into());
-            doubts.errors_hold = false;
-        }
-        if tells_errors && doubts.errors_hold {
-            let settings = BandSettings {
-                draws: 0,
-                ..BandSettings::default()
-            };
-            let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
-            known.judgements = verdicts(problem, &best.evaluation, &bands);
-            known.bands = Some(bands);
-            known.covariance = problem.covariance(&best.evaluation);
-        }
-        known.doubts = Some(doubts);
-        known
+    }
+
+    /// Covariance of the parameters, where standard errors are meaningful.
+    pub(super) fn covariance(&self) -> Option<&DMatrix<f64>> {
+        self.assessment.as_ref()?.covariance.as_ref()
+    }
+
+    /// Bands of functions and ratios, where standard errors are meaningful.
+    pub(super) fn bands(&self) -> Option<&Bands> {
+        self.assessment.as_ref()?.bands.as_ref()
+    }
+
+    pub(super) fn judgements(&self) -> &[Judgement] {
+        self.assessment.as_ref().map_or(&[], |a| &a.judgements)
+    }
+
+    /// The step-size check, where there is a response on the finer grid.
+    pub(super) fn step_check(&self) -> Option<&StepCheck> {
+        self.assessment.as_ref()?.step_check.as_ref().ok()?.as_ref()
     }
 }
 

@@ -3,21 +3,21 @@
 use super::advice::percent;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
-    ActiveSummary, ConstraintSummary, CostSummary, CountsSummary, ExperimentSummary, FORMAT,
-    FunctionSummary, GradientSummary, IdentifiabilitySummary, ModelSummary, OptimalitySummary,
-    OutcomeSummary, PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary,
-    WeightSummary,
+    ActiveSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
+    ExperimentSummary, FORMAT, FunctionSummary, GradientSummary, IdentifiabilitySummary,
+    ModelSummary, OptimalitySummary, OutcomeSummary, PathSummary, Prediction, ResultDocument,
+    RungSummary, SlackSummary, WeightSummary,
 };
 use super::knowledge::knowledge;
 use super::known::Known;
-use super::meaning::POOR;
-use super::measured::{self, ChannelSummary};
 use super::page::fit_page;
 use super::render;
 use super::seen::SeenChannel;
 use super::timings::{Around, TimingsSummary};
+use super::{findings, measured};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
+use kmcfit_core::internals::assessment::{POOR, constant_probability, diagnostics, standard_error};
 use kmcfit_core::internals::dynamics::{Excitation, Term};
 use kmcfit_core::internals::functions::basis::physical_powers;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
@@ -123,13 +123,15 @@ impl FittedModel<'_> {
             held_out: self.known.held_out.iter().map(measured::held_out).collect(),
             scalars: match self.is_simulated() {
                 true => {
-                    let covariance = self.known.covariance.as_ref();
+                    let covariance = self.known.covariance();
                     measured::scalars(&model.problem, &fit.best.evaluation, covariance)
                 }
                 false => Vec::new(),
             },
-            statistics: self.known.statistics.clone(),
-            half_step: self.known.half_step.clone().unwrap_or_default(),
+            statistics: (self.known.assessment.as_ref())
+                .map(|a| measured::statistics(&a.statistics))
+                .unwrap_or_default(),
+            half_step: self.known.step_check().map(measured::refined),
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -143,7 +145,7 @@ impl FittedModel<'_> {
 
     /// The bands of functions and ratios, for models of few free values.
     pub(super) fn bands(&self) -> Option<&Bands> {
-        self.known.bands.as_ref()
+        self.known.bands()
     }
 
     /// What was known before the fit, and what its optimum tells, if that is a device at all; the equation error has no
@@ -151,7 +153,7 @@ impl FittedModel<'_> {
     fn identifiability(&self) -> IdentifiabilitySummary {
         let problem = &self.model.problem;
         let knowledge = knowledge(problem);
-        let Some(doubts) = &self.known.doubts else {
+        let Some(assessment) = &self.known.assessment else {
             let sentence = "how sure the functions are is not known: the equation error simulates no motion, and noise \
                             biases it; method: gauss-newton, with initial: data, goes on from it";
             return IdentifiabilitySummary {
@@ -168,11 +170,12 @@ impl FittedModel<'_> {
             knowledge,
             ..IdentifiabilitySummary::default()
         };
-        if let Some(why) = &doubts.no_device {
-            summary.open.push(why.clone());
+        let plausibility = &assessment.plausibility;
+        if let Some(why) = &plausibility.unidentified {
+            summary.open.push(findings::unidentified(why));
             return summary;
         }
-        let judgements = &self.known.judgements;
+        let judgements = &assessment.judgements;
         // Where constraints hold what the readings do not show, nothing of that is open.
         let all_known = !judgements.is_empty() && !judgements.iter().any(Judgement::is_open);
         if count.seen_at_most < count.of && !all_known {
@@ -190,12 +193,13 @@ impl FittedModel<'_> {
                 say(judgement.is_open(), &judgement.sentence);
             }
         }
-        summary.open.extend(doubts.open.iter().cloned());
+        let warnings = plausibility.warnings.iter();
+        summary.open.extend(warnings.map(findings::warning));
         for held in &self.known.held_out {
             let fits = held.channels();
             let fits = fits
                 .iter()
-                .map(|c| measured::diagnostics(c.channel, c.predicted).fit_percent);
+                .map(|c| diagnostics(c.channel, c.predicted).fit_percent);
             if let Some(worst) = fits.reduce(f64::min).filter(|worst| *worst < POOR) {
                 summary.open.push(format!(
                     "the record `{}`, which was held out, is matched to {} only: the device does not predict it",
@@ -307,29 +311,26 @@ impl FittedModel<'_> {
         let list = self.named_functions().into_iter().enumerate();
         let best = &self.fit.best;
         let sizes = problem.natural_sizes(&best.evaluation);
-        let is_white = self.known.doubts.as_ref().is_some_and(|d| !d.is_coloured);
+        let assessment = self.known.assessment.as_ref();
+        let is_white = assessment.is_some_and(|a| !a.plausibility.is_coloured);
         let is_minimum = self.fit.outcome.status == Status::Converged;
-        let free = self.known.covariance.as_ref();
+        let free = self.known.covariance();
         let free =
             free.filter(|_| is_white && is_minimum && is_unhindered(problem, &best.parameters));
         list.map(|(i, (function, values))| {
             let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let range = problem.functions.ranges()[i].clone();
             // The judgements on the functions come first, in their order.
-            let judged = self.known.judgements.get(i);
+            let judged = self.known.judgements().get(i);
             let summary = FunctionSummary {
                 unit: self.unit(function).into(),
                 is_rounding: largest > 0.0 && is_rounding(largest, sizes[i]),
                 verdict: judged.map(|j| j.verdict.name().into()),
                 known_range: judged.and_then(|j| j.known_range),
                 powers: self.powers(i),
-                standard_error: measured::standard_error(
-                    function,
-                    range.start,
-                    self.known.covariance.as_ref(),
-                ),
+                standard_error: standard_error(function, range.start, self.known.covariance()),
                 constant_p_value: free.and_then(|covariance| {
-                    measured::constant_probability(problem, i, &best.parameters, covariance)
+                    constant_probability(problem, i, &best.parameters, covariance)
                 }),
                 ..summarise(&values, self.true_function(i))
             };
@@ -356,9 +357,9 @@ impl FittedModel<'_> {
         pairs
             .enumerate()
             .map(|(e, (experiment, predictions))| {
-                let channels = experiment.channels.iter().zip(predictions).enumerate();
+                let channels = 0..predictions.len();
                 let channels: Vec<ChannelSummary> = channels
-                    .map(|(i, (c, predicted))| measured::channel(c, self.note(e, i), predicted))
+                    .map(|i| measured::channel(&self.seen(e, i)))
                     .collect();
                 let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
                 ExperimentSummary {

@@ -2,8 +2,9 @@
 
 use super::csv::CsvTable;
 use super::figure::Figure;
-use super::{figures, measured};
+use super::figures;
 use crate::config::ChannelNote;
+use kmcfit_core::internals::assessment::diagnostics;
 use kmcfit_core::internals::objective::Channel;
 
 /// A channel, what the model says of its readings, and how reports speak of it.
@@ -18,6 +19,12 @@ impl SeenChannel<'_> {
     /// The factor from the unit of the file to that of the SI.
     pub fn factor(&self) -> f64 {
         self.note.map_or(1.0, |n| n.unit.factor())
+    }
+
+    /// Unit in which reports give the channel.
+    pub fn unit(&self) -> &str {
+        self.note
+            .map_or(self.channel.kind().unit(), |n| n.unit.symbol())
     }
 
     fn scaled(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -44,16 +51,16 @@ impl SeenChannel<'_> {
 
     /// The readings alone.
     pub fn observation(&self) -> Figure {
-        let (label, unit) = (self.label(), measured::unit(self.channel, self.note));
+        let (label, unit) = (self.label(), self.unit());
         figures::observation(&[(&label, unit, self.channel.times(), &self.observed())])
     }
 
     /// The readings with what the model says of them, and the residuals.
     pub fn figures(&self) -> [Figure; 2] {
-        let (label, unit) = (self.label(), measured::unit(self.channel, self.note));
+        let (label, unit) = (self.label(), self.unit());
         let label = (label.as_str(), unit);
         let times = self.channel.times();
-        let diagnostics = measured::diagnostics(self.channel, self.predicted);
+        let diagnostics = diagnostics(self.channel, self.predicted);
         [
             figures::channel(label, times, &self.observed(), &self.model()),
             figures::residuals(label, times, &self.residuals(), &diagnostics),

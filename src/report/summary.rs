@@ -2,8 +2,8 @@
 
 use super::advice;
 use super::cost::CostKind;
+use super::document::ChannelSummary;
 use super::document::{Prediction, ResultDocument};
-use super::measured::ChannelSummary;
 use crate::digits::significant;
 use kmcfit_core::internals::identifiability::Verdict;
 use kmcfit_core::internals::solvers::CONTINUED;

@@ -10,7 +10,15 @@ const LOCK: &str = ".kmcfit.lock";
 /// The lock. The operating system releases it when the process ends, so a killed run blocks no other.
 #[derive(Debug)]
 pub(super) struct Lock {
-    _held: File,
+    held: File,
+}
+
+impl Drop for Lock {
+    /// Unlocks also for copies of the file descriptor: a process that another thread forks at this moment has one until it
+    /// starts its program.
+    fn drop(&mut self) {
+        let _ = self.held.unlock();
+    }
 }
 
 /// Another process holds the lock.
@@ -45,12 +53,23 @@ impl Lock {
 
 fn locked(file: File) -> Result<Lock, TryLockError> {
     file.try_lock()?;
-    Ok(Lock { _held: file })
+    Ok(Lock { held: file })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A copy of the descriptor, as a forked process has it, does not keep the lock.
+    #[test]
+    fn released_for_copies_too() {
+        let place = tempfile::tempdir().expect("a folder");
+        let first = Lock::take(place.path()).expect("free").expect("a lock");
+        let copy = first.held.try_clone().expect("a copy");
+        drop(first);
+        assert!(Lock::take(place.path()).expect("free").is_some());
+        drop(copy);
+    }
 
     #[test]
     fn one_at_a_time() {

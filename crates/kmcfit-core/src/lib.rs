@@ -76,6 +76,7 @@
     clippy::result_large_err,
     reason = "what failed is returned to be used again"
 )]
+mod assessment;
 mod builder;
 mod constraints;
 mod diagnostics;
@@ -99,6 +100,9 @@ mod threads;
 /// versioning.
 #[doc(hidden)]
 pub mod internals {
+    pub mod assessment {
+        pub use crate::assessment::*;
+    }
     pub mod builder {
         pub use crate::builder::*;
     }

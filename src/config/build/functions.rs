@@ -192,7 +192,7 @@ pub(super) fn build(
     let list: Vec<CoefficientFunction> = slots(file)
         .iter()
         .map(|slot| {
-            let owner = slot.owner.map(|i| super::experiments::name(file, i));
+            let owner = slot.owner.map(|i| file.experiment_name(i));
             Ok(CoefficientFunction {
                 owner,
                 ..function(file, grid, slot)?

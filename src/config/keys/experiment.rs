@@ -451,3 +451,17 @@ static INITIAL: Group = Group {
             .required(),
     ],
 };
+
+/// A state of the oscillator.
+pub static STATE: Group = Group {
+    name: "state",
+    text: "A state of the oscillator.",
+    keys: &[
+        Key::new("displacement", Number, "Displacement.", "3.3")
+            .unit("m")
+            .required(),
+        Key::new("velocity", Number, "Velocity.", "1.0")
+            .unit("m/s")
+            .required(),
+    ],
+};

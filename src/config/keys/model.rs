@@ -1,7 +1,7 @@
 //! Keys of a whole model file, of its grid, and of a story.
 
 use super::Kind::{AnyOf, Choice, Count, Format, List, Map, Number, Text, Word};
-use super::experiment::EXPERIMENT;
+use super::experiment::{EXPERIMENT, STATE};
 use super::fit::{FIT, TRUTH};
 use super::function::{CONSTRAINT, FUNCTIONS};
 use super::study::STUDY;
@@ -94,20 +94,6 @@ pub static STORY: Group = Group {
             "[paper.yaml, paper-smooth.yaml]",
         )
         .required(),
-    ],
-};
-
-/// A state of the oscillator.
-pub static STATE: Group = Group {
-    name: "state",
-    text: "A state of the oscillator.",
-    keys: &[
-        Key::new("displacement", Number, "Displacement.", "3.3")
-            .unit("m")
-            .required(),
-        Key::new("velocity", Number, "Velocity.", "1.0")
-            .unit("m/s")
-            .required(),
     ],
 };
 

@@ -1,8 +1,7 @@
 //! Keys of a study.
 
 use super::Kind::{Bool, Choice, Count, List, Map, Number, Text};
-use super::experiment::FORCE;
-use super::model::STATE;
+use super::experiment::{FORCE, STATE};
 use super::{Group, Key, NUMBER_OR_COLUMN, NUMBERS};
 use crate::config::spec::{ChannelName, FunctionName, NoiseName};
 

@@ -1,14 +1,20 @@
 //! The reader of one key of a map.
 
-use super::walk::Walk;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use std::cell::Cell;
 use std::fmt;
 
 /// Reads a key and says whether it is the wanted one, or stops at it.
 pub(super) struct Key<'a> {
     pub wanted: Option<&'a str>,
-    pub stop: bool,
-    pub walk: Walk<'a>,
+    /// Where to note that reading stops at the wanted key; `None` to read on.
+    pub stop: Option<&'a Cell<bool>>,
+}
+
+/// The error on purpose, at the goal; `hit` tells it from others.
+pub(super) fn stop<E: Error>(hit: &Cell<bool>) -> E {
+    hit.set(true);
+    E::custom("found")
 }
 
 impl<'de> DeserializeSeed<'de> for Key<'_> {
@@ -37,9 +43,9 @@ impl<'de> Visitor<'de> for Key<'_> {
 
     fn visit_str<E: Error>(self, key: &str) -> Result<bool, E> {
         let same = self.wanted == Some(key);
-        match same && self.stop {
-            true => Err(self.walk.stop()),
-            false => Ok(same),
+        match self.stop.filter(|_| same) {
+            Some(hit) => Err(stop(hit)),
+            None => Ok(same),
         }
     }
 

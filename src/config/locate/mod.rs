@@ -11,6 +11,7 @@ mod walk;
 
 pub use path::{Segment, key_path};
 pub use position::Position;
+pub(super) use position::place;
 
 use serde::de::{Deserialize, DeserializeSeed, IgnoredAny};
 use std::cell::Cell;

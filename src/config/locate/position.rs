@@ -1,5 +1,8 @@
 //! Lines and columns.
 
+use crate::error::Place;
+use std::path::Path;
+
 /// A position in a text; both count from 1, columns in characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position {
@@ -20,5 +23,14 @@ impl Position {
             line: 1 + before.matches('\n').count(),
             column: 1 + before.chars().rev().take_while(|&c| c != '\n').count(),
         }
+    }
+}
+
+/// A position in a file as the place of an error.
+pub(in crate::config) fn place(file: &Path, position: Position) -> Place {
+    Place::Line {
+        file: file.to_path_buf(),
+        line: position.line,
+        column: position.column,
     }
 }

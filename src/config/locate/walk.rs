@@ -1,7 +1,7 @@
 //! The reader that follows a path and stops at its goal.
 
 use super::Segment;
-use super::key::Key;
+use super::key::{Key, stop};
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };
@@ -26,8 +26,7 @@ pub(super) struct Walk<'a> {
 impl Walk<'_> {
     /// The error on purpose, at the goal.
     pub fn stop<E: Error>(&self) -> E {
-        self.hit.set(true);
-        E::custom("found")
+        stop(self.hit)
     }
 }
 
@@ -110,10 +109,11 @@ impl<'de> Visitor<'de> for Walk<'_> {
         while let Some(same) = map.next_key_seed(Key {
             wanted,
             stop: match self.goal {
-                Goal::Key { occurrence: goal } if rest.is_empty() => goal == occurrence + 1,
-                _ => false,
+                Goal::Key { occurrence: goal } if rest.is_empty() && goal == occurrence + 1 => {
+                    Some(self.hit)
+                }
+                _ => None,
             },
-            walk: self,
         })? {
             occurrence += usize::from(same);
             if same && occurrence == 1 && !rest.is_empty() || same && self.goal == Goal::Value {

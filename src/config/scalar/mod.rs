@@ -188,6 +188,6 @@ pub use list::{OneOrList, OneOrMany};
 pub(super) use names::choose;
 pub use nodes::Nodes;
 pub use number::Number;
-pub use over_time::{NumberOrColumn, Start};
+pub use over_time::{ColumnSpec, NumberOrColumn, Start};
 pub use text::Text;
-pub use weight::Weight;
+pub use weight::{Weight, WeightRule};

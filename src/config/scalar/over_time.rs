@@ -1,12 +1,25 @@
 //! Values that may change over time: a number, a list, or a column of a file.
 
 use super::list::elements;
-use super::{Number, Scalar};
+use super::{Number, Scalar, Text};
 use crate::config::complaint::Complaint;
-use crate::config::spec::ColumnSpec;
+use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a map such as {data: file.csv, column: mass_kg}"
+)]
+pub struct ColumnSpec {
+    /// CSV file, relative to the model file.
+    pub data: Text,
+    /// Name of the column.
+    pub column: Text,
+}
 
 /// A number, or a column of a file with one value per line.
 #[derive(Debug, Clone, PartialEq)]

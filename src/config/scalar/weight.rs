@@ -3,9 +3,22 @@
 use super::written::number_in;
 use super::{Number, Scalar, choose};
 use crate::config::complaint::Complaint;
-use crate::config::spec::WeightRule;
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
+
+choice! {
+    /// How the weight of a penalty follows from the data.
+    pub enum WeightRule {
+        /// The largest weight that still fits the readings within their noise.
+        Discrepancy = "discrepancy",
+        /// The corner of misfit against roughness.
+        LCurve = "l-curve",
+        /// Generalised cross-validation.
+        Gcv = "gcv",
+        /// So that the function follows the readings within a dominant period of the motion.
+        Period = "period",
+    }
+}
 
 /// The weight of a penalty: a number, or the name of a rule.
 #[derive(Debug, Clone, Copy, PartialEq)]

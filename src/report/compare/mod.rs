@@ -5,6 +5,7 @@
 //! `compare.csv` and `compare.html` show the same ones.
 
 mod conclusions;
+mod errors;
 mod figures;
 mod measures;
 mod page;
@@ -13,7 +14,8 @@ mod table;
 mod text;
 mod verdict;
 
-pub use measures::{Errors, Measures, Roughness};
+pub use errors::Errors;
+pub use measures::{Measures, Roughness};
 pub use run::{ComparedRun, MatchedMotion};
 
 use super::render;
@@ -32,6 +34,9 @@ pub const CLOSE: f64 = 0.05;
 /// Root-mean-square residual, as a share of the root-mean-square reading, up to which a motion
 /// without a sigma counts as matched: the paper's optimum leaves 0.9 %.
 pub const MATCHED: f64 = 0.01;
+
+/// Sizes below this are what rounding leaves: one digit says all there is to say.
+const ROUNDING: f64 = 1e-12;
 
 /// Version of the document's format.
 const FORMAT: u32 = 1;

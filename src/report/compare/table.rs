@@ -1,6 +1,8 @@
 //! The table: one row per quantity, one cell per run; terminal, CSV and page show the same rows.
 
-use super::measures::{Errors, Measures};
+use super::ROUNDING;
+use super::errors::Errors;
+use super::measures::Measures;
 use crate::report::document::Prediction;
 
 /// One quantity of all runs.
@@ -50,9 +52,6 @@ impl Cell {
         }
     }
 }
-
-/// Sizes below this are what rounding leaves: one digit says all there is to say.
-pub(super) const ROUNDING: f64 = 1e-12;
 
 /// A number with four digits; with one where it is rounding.
 pub(super) fn short(x: f64) -> String {

@@ -1,9 +1,8 @@
 //! What the numbers of a run mean, in one line.
 
-use super::measures::Errors;
+use super::errors::Errors;
 use super::run::ComparedRun;
-use super::table::ROUNDING;
-use super::{CLOSE, MATCHED, RECOVERED};
+use super::{CLOSE, MATCHED, RECOVERED, ROUNDING};
 use crate::report::cost::CostKind;
 use crate::report::document::ResultDocument;
 

@@ -3,8 +3,8 @@
 use super::table::{list, number, table};
 use crate::report::advice;
 use crate::report::cost::CostKind;
+use crate::report::document::ChannelSummary;
 use crate::report::document::{FunctionSummary, ResultDocument};
-use crate::report::measured::ChannelSummary;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::identifiability::Verdict;

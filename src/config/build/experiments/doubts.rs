@@ -1,6 +1,6 @@
 //! What looks wrong in a record, and what no record can tell.
 
-use super::{RawChannel, Record, is_equation_error, name};
+use super::{RawChannel, Record, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
@@ -50,7 +50,7 @@ pub fn sizes(
             warnings.push(format!(
                 "experiments[{i}] ({}): {what} {ratio:.3e} times what it should be: {factor}? \
                  `units` converts",
-                name(file, i)
+                file.experiment_name(i)
             ));
         }
     };
@@ -104,7 +104,7 @@ pub fn signs(
                 warnings.push(format!(
                     "experiments[{i}] ({}): the {high} goes against what the {low} says of it, as if one of them had the \
                      wrong sign: `sensors: {{{high}: {{gain: -1}}}}` turns the {high}",
-                    name(file, i)
+                    file.experiment_name(i)
                 ));
             }
         }
@@ -181,7 +181,7 @@ pub fn stillness(
         warnings.push(format!(
             "experiments[{i}] ({}): the {} stands still before {} s: a free motion begins where nothing holds or strikes the \
              device any more: `window: {{min: {}}}`",
-            name(file, i),
+            file.experiment_name(i),
             channel.kind.name(),
             from,
             from,
@@ -218,7 +218,7 @@ pub fn outliers(
         warnings.push(format!(
             "experiments[{i}] ({}): {lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: \
              huber}}`{})",
-            name(file, i),
+            file.experiment_name(i),
             significant(channel.values[*first] / channel.unit.factor(), 4),
             channel.unit.symbol(),
             in_file(spec, channel, *first),
@@ -237,7 +237,7 @@ pub fn ranges(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<St
             warnings.push(format!(
                 "experiments[{i}] ({}): {readings} readings of the {} lie at {} {}, the end of its range: if the sensor \
                  reads no further, the motion was cut off there, and these readings are better left out (empty fields)",
-                name(file, i),
+                file.experiment_name(i),
                 channel.kind.name(),
                 level / channel.unit.factor(),
                 channel.unit.symbol(),

@@ -1,7 +1,7 @@
 //! The state at the beginning of an experiment.
 
+use super::Record;
 use super::value::{Named, value};
-use super::{Record, name};
 use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, InitialSpec};
@@ -36,7 +36,7 @@ pub fn build(
     for q in 0..2 {
         let named = Named {
             key: format!("experiments[{i}].initial.{}", names[q]),
-            name: format!("initial {} of {}", names[q], name(file, i)),
+            name: format!("initial {} of {}", names[q], file.experiment_name(i)),
             unit: [ChannelKind::Displacement, ChannelKind::Velocity][q].unit_of(angular),
             start: starts[q],
             size: sizes[q],

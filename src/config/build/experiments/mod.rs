@@ -88,12 +88,6 @@ pub struct HoldOut {
     pub notes: Vec<ChannelNote>,
 }
 
-/// What reports call experiment `i`.
-pub(super) fn name(file: &ModelFile, i: usize) -> String {
-    let given = file.spec.experiments[i].name.as_ref();
-    given.map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone())
-}
-
 /// Two experiments of one name could not be told apart.
 pub(super) fn distinct_names(file: &ModelFile) -> Result<(), InputError> {
     let mut names: Vec<&str> = Vec::new();
@@ -282,7 +276,7 @@ fn place(
         _ => grid.nodes(),
     };
     let (initial, sought) = initial::build(file, i, record.as_ref(), scalars)?;
-    let mut experiment = Experiment::free(name(file, i), initial, nodes);
+    let mut experiment = Experiment::free(file.experiment_name(i), initial, nodes);
     experiment.sought = sought;
     experiment.device = device;
     let mut notes = Vec::new();

@@ -177,7 +177,7 @@ fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputE
     match &error.place {
         crate::error::Place::Argument(name) => {
             let key = format!("{experiment}.format.{name}");
-            about_key(file, &key)(error)
+            file.error_about(&key, error)
         }
         _ => error,
     }
@@ -263,21 +263,6 @@ fn two_times(file: &ModelFile, experiment: &str) -> InputError {
     )
     .found("`sample_rate` beside a column of times")
     .expected("one of the two")
-}
-
-/// An error about an argument, said at the key of the model that gives it.
-pub(super) fn about_key<'a>(
-    file: &'a ModelFile,
-    key: &'a str,
-) -> impl Fn(InputError) -> InputError + 'a {
-    move |error| {
-        let here = file.error_at(key, &error.problem);
-        InputError {
-            place: here.place,
-            key: here.key,
-            ..error
-        }
-    }
 }
 
 /// First and last time that is used, as the file counts.

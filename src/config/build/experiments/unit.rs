@@ -1,6 +1,5 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
-use super::source::about_key;
 use crate::config::ModelFile;
 use crate::config::scalar::Text;
 use crate::error::InputError;
@@ -36,7 +35,8 @@ impl Column<'_> {
         let (si, suffix) = (Unit::si(kind), stated.suffix(kind));
         let differs = |unit: &Unit, used: Unit| unit.factor() != used.factor();
         if let Some(text) = self.given {
-            let unit = Unit::parse(kind, &text.0).map_err(about_key(self.file, &units_key))?;
+            let unit = Unit::parse(kind, &text.0)
+                .map_err(|error| self.file.error_about(&units_key, error))?;
             let other = stated.explicit(kind).or(suffix);
             if let Some(other) = other.filter(|other| differs(other, unit)) {
                 warnings.push(format!(

@@ -1,9 +1,9 @@
 //! What the readings see: the spectrum of the sensitivity, bands and verdicts.
 
 use crate::config::StudyPlan;
-use crate::report::meaning::Doubts;
-use crate::report::measured;
+use crate::report::findings;
 use crate::report::study::pieces::*;
+use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::normal_half_width;
 use kmcfit_core::internals::dynamics::Device;
 use kmcfit_core::internals::functions::Ratios;
@@ -70,19 +70,14 @@ pub fn bands(
     };
     let bands = Bands::at(problem, theta, evaluation, &settings);
     let factor = normal_half_width(plan.confidence);
-    let doubts = Doubts::of(
-        problem,
-        evaluation,
-        &measured::refined(problem, evaluation),
-        &measured::statistics(problem, evaluation),
-        true,
-    );
-    let judged = match doubts.errors_hold {
+    let plausibility = Plausibility::at(problem, evaluation);
+    let judged = match plausibility.errors_hold {
         true => verdicts(problem, evaluation, &bands),
         false => Vec::new(),
     };
     let mut notes = bands.notes.clone();
-    notes.extend(doubts.no_device.into_iter().chain(doubts.open));
+    notes.extend(plausibility.unidentified.iter().map(findings::unidentified));
+    notes.extend(plausibility.warnings.iter().map(findings::warning));
     let ratios = truth.map(Ratios::of);
     let list = bands.functions.iter().chain(&bands.ratios);
     let records = list.enumerate().map(|(i, band)| {

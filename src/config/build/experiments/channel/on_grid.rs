@@ -1,6 +1,5 @@
 //! Channels on the grid, with their sensors.
 
-use super::super::name;
 use super::super::value::{Named, value};
 use super::{RawChannel, Spec, spec_of};
 use crate::config::ModelFile;
@@ -122,7 +121,11 @@ fn sensor(
         if let Some(given) = given {
             let named = Named {
                 key: format!("experiments[{i}].sensors.{}.{part}", kind.name()),
-                name: format!("{part} of the {} of {}", kind.name(), name(file, i)),
+                name: format!(
+                    "{part} of the {} of {}",
+                    kind.name(),
+                    file.experiment_name(i)
+                ),
                 unit,
                 start,
                 size,

@@ -1,10 +1,14 @@
 //! `result.json`: the document that a run leaves behind. Its keys are stable.
 
-use super::cost::CostKind;
-use super::measured::{
-    ChannelSummary, HoldOutSummary, RefinedSummary, ScalarSummary, StatisticsSummary,
+mod channel;
+
+pub use channel::{
+    ChannelSummary, HoldOutSummary, IgnoredSummary, PatternSummary, RefinedSummary, ScalarSummary,
+    StatisticsSummary,
 };
-use super::timings::TimingsSummary;
+
+use crate::report::cost::CostKind;
+use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::dynamics::Grid;
 use kmcfit_core::internals::functions::Quantity;
 use serde::{Deserialize, Deserializer, Serialize};

@@ -1,11 +1,13 @@
-//! Whether what a fit came to is a device to speak of, and the only one of its kind.
+//! Plausibility of a fit: reasons why its optimum identifies no system, and warnings about its intervals.
 
-use super::measured::{HalfStep, StatisticsSummary, diagnostics};
-use kmcfit_core::internals::diagnostics::rms;
-use kmcfit_core::internals::dynamics::{Excitation, Term};
-use kmcfit_core::internals::functions::Quantity;
-use kmcfit_core::internals::objective::{Channel, Evaluation, Loss};
-use kmcfit_core::internals::problem::Problem;
+use super::channel::diagnostics;
+use super::statistics::{FitStatistics, statistics};
+use super::step_check::{StepCheckOutcome, step_check};
+use crate::diagnostics::rms;
+use crate::dynamics::{Breakdown, Excitation, Term};
+use crate::functions::Quantity;
+use crate::objective::{Channel, Evaluation, Loss};
+use crate::problem::Problem;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
@@ -15,13 +17,13 @@ const STEPPER: f64 = 0.1;
 /// A fit is absurd that misses all channels by more than twice what their readings vary, per cent.
 const ABSURD: f64 = -100.0;
 /// Below this share of the readings the fit does not explain the record, per cent.
-pub(super) const POOR: f64 = 90.0;
+pub const POOR: f64 = 90.0;
 /// Residuals may be this many times sigma before nothing is made of sigma any more.
-pub(super) const BEYOND_SIGMA: f64 = 3.0;
+pub const BEYOND_SIGMA: f64 = 3.0;
 /// The probability of such residuals under white noise below which they are certainly none.
 const CERTAIN: f64 = 1e-6;
 /// What such a fit leaves is the rounding of the readings, per cent.
-pub(super) const EXACT: f64 = 99.99;
+pub const EXACT: f64 = 99.99;
 /// Noise would do if it had this chance.
 const CHANCE: f64 = 1e-3;
 /// A function is negative below this share of the size at which it matters.
@@ -33,56 +35,110 @@ const PERIODS_PER_READING: f64 = 0.4;
 /// Equally spaced readings are no further from their places than this part of the spacing.
 const EVEN: f64 = 0.01;
 
-/// What is to be doubted of a fit.
+/// Why an optimum identifies no system.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unidentified {
+    /// The fit failed.
+    Failed,
+    /// There is no response with half the step.
+    NoResponseOnHalfStep(Breakdown),
+    /// Half the step changes the response by more than a tenth of the largest reading.
+    StepDependent,
+    /// All channels are missed by more than twice what their readings vary.
+    Unrelated,
+    /// Noise of the size of the readings would be matched as well.
+    Noise,
+}
+
+/// A warning about a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FitWarning {
+    /// The residuals are so many times sigma: standard errors are not known.
+    BeyondSigma {
+        /// Root of the reduced chi-square.
+        times: f64,
+    },
+    /// Half the step changes the response by so many times the residuals: standard errors are not known.
+    CoarseSteps {
+        /// Change over the root-mean-square residual.
+        times: f64,
+    },
+    /// The residuals are large and not white: standard errors are not known.
+    PoorFit,
+    /// The residuals are not white: standard errors are too small.
+    Coloured,
+    /// Systems of other frequencies match equally spaced readings as well: standard errors are not known.
+    Aliased {
+        /// Readings in a period.
+        per_period: f64,
+        /// Natural frequency found, Hz.
+        frequency: f64,
+    },
+    /// A function is negative at most times, which is not passive.
+    Negative {
+        /// Name of the function.
+        function: String,
+    },
+    /// The measured force is negligible beside the inertia force of the system.
+    NegligibleForce {
+        /// Name of the experiment.
+        experiment: String,
+    },
+}
+
+/// Plausibility of a fit.
 #[derive(Debug, Clone)]
-pub(super) struct Doubts {
-    /// Why no statement on the device means anything, if that is so.
-    pub no_device: Option<String>,
-    /// What is open, in sentences.
-    pub open: Vec<String>,
-    /// Whether what the linearised fit says of the errors of the functions means anything.
+pub struct Plausibility {
+    /// Why the optimum identifies no system, if so.
+    pub unidentified: Option<Unidentified>,
+    /// Warnings.
+    pub warnings: Vec<FitWarning>,
+    /// Whether the standard errors of the linearised fit are meaningful.
     pub errors_hold: bool,
-    /// Whether the residuals of a channel are certainly no noise, so that errors are too small.
+    /// Whether the residuals of a channel are certainly not white, so that standard errors are too small.
     pub is_coloured: bool,
 }
 
-impl Doubts {
-    /// Of the optimum `evaluation`, with what half the step changes and the statistics of the readings, and whether
-    /// errors are told also where the readings have no sigma.
+impl Plausibility {
+    /// Of the optimum `evaluation` with its step-size check and statistics; `tells_errors` where standard errors are
+    /// reported also for readings without a sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
-        half_step: &HalfStep,
-        statistics: &StatisticsSummary,
+        step_check: &StepCheckOutcome,
+        statistics: &FitStatistics,
         tells_errors: bool,
     ) -> Self {
-        let no_device = meaningless(problem, evaluation, half_step)
-            .or_else(|| {
-                let is_noise = tells_errors && noise_would_do(problem, evaluation);
-                is_noise
-                    .then(|| "noise of the size of these readings would be matched as well".into())
-            })
-            .map(|why| format!("the device is not identified: {why}"));
+        let unidentified = meaningless(problem, evaluation, step_check).or_else(|| {
+            (tells_errors && noise_would_do(problem, evaluation)).then_some(Unidentified::Noise)
+        });
         let (coloured, poor) = residuals(problem, evaluation, tells_errors);
-        let unexplained = unexplained(statistics).or_else(|| coarse(problem, evaluation, half_step)).or_else(|| {
-            poor.then(|| {
-                "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
-                    .to_owned()
-            })
-        });
+        let unexplained = unexplained(statistics)
+            .or_else(|| coarse(problem, evaluation, step_check))
+            .or_else(|| poor.then_some(FitWarning::PoorFit));
         let aliased = aliased(problem, evaluation);
-        let errors_hold = no_device.is_none() && unexplained.is_none() && aliased.is_none();
-        let optimistic = (errors_hold && coloured).then(|| {
-            "by how much the errors are too small is not known: they hold for white residuals, and these are not"
-                .to_owned()
-        });
-        let open = unexplained.into_iter().chain(optimistic).chain(aliased);
+        let errors_hold = unidentified.is_none() && unexplained.is_none() && aliased.is_none();
+        let optimistic = (errors_hold && coloured).then_some(FitWarning::Coloured);
+        let warnings = unexplained.into_iter().chain(optimistic).chain(aliased);
         Self {
-            open: open.chain(absurd(problem, evaluation)).collect(),
-            no_device,
+            warnings: warnings.chain(absurd(problem, evaluation)).collect(),
+            unidentified,
             errors_hold,
             is_coloured: coloured,
         }
+    }
+
+    /// Of the optimum `evaluation`, with standard errors reported for all readings.
+    pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
+        let step_check = step_check(problem, evaluation);
+        let statistics = statistics(problem, evaluation);
+        Self::of(problem, evaluation, &step_check, &statistics, true)
+    }
+
+    /// Of a fit that failed.
+    pub fn fail(&mut self) {
+        self.unidentified = Some(Unidentified::Failed);
+        self.errors_hold = false;
     }
 }
 
@@ -102,14 +158,15 @@ fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> 
 }
 
 /// Why no statement on the functions means anything; `None` where they may.
-fn meaningless(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep) -> Option<String> {
-    match half_step {
-        Err(breakdown) => return Some(format!("on half the step there is no motion: {breakdown}")),
+fn meaningless(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    step_check: &StepCheckOutcome,
+) -> Option<Unidentified> {
+    match step_check {
+        Err(breakdown) => return Some(Unidentified::NoResponseOnHalfStep(*breakdown)),
         Ok(Some(half)) if half.change_per_reading > STEPPER => {
-            return Some(
-                "on half the step the model's readings change by more than a tenth of the largest one"
-                    .into(),
-            );
+            return Some(Unidentified::StepDependent);
         }
         Ok(_) => {}
     }
@@ -118,7 +175,7 @@ fn meaningless(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep)
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent)
         .peekable();
     let absurd = fits.peek().is_some() && fits.all(|fit| fit < ABSURD);
-    absurd.then(|| "its motion misses the readings by more than twice what they vary".into())
+    absurd.then_some(Unidentified::Unrelated)
 }
 
 /// Whether a fit with as many parameters would match white noise as well, by the ratio of likelihoods of the device and of
@@ -151,24 +208,24 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
 
 /// What is said where half the step changes the model's readings by more than what is left of them: then the steps decide
 /// what is found, and not the readings.
-fn coarse(problem: &Problem, evaluation: &Evaluation, half_step: &HalfStep) -> Option<String> {
-    let half = half_step.as_ref().ok()?.as_ref()?;
+fn coarse(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    step_check: &StepCheckOutcome,
+) -> Option<FitWarning> {
+    let half = step_check.as_ref().ok()?.as_ref()?;
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
     // Readings that were made with these steps are matched to their rounding.
     let is_exact = fits.all(|fit| fit > EXACT);
-    (half.change_per_residual > 1.0 && !is_exact).then(|| {
-        format!(
-            "how sure the functions are is not known: half the step changes the model's readings by {:.1} times the residuals",
-            half.change_per_residual
-        )
-    })
+    let times = half.change_per_residual;
+    (times > 1.0 && !is_exact).then_some(FitWarning::CoarseSteps { times })
 }
 
 /// What is said of optima that are hardly devices.
-fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<String> {
-    let mut said = Vec::new();
+fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+    let mut warnings = Vec::new();
     let sizes = problem.natural_sizes(evaluation);
     let passive = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
     let values = problem
@@ -182,10 +239,9 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<String> {
         sorted.sort_by(f64::total_cmp);
         let is_negative = sorted[sorted.len() / 2] < -NEGATIVE * sizes[f];
         if is_negative && function.parameters() > 0 && passive.contains(&function.quantity) {
-            said.push(format!(
-                "the {} is negative at most times, as that of no passive device",
-                function.name()
-            ));
+            warnings.push(FitWarning::Negative {
+                function: function.name(),
+            });
         }
     }
     let step = problem.oscillator.grid.step();
@@ -201,31 +257,25 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<String> {
         let inertia = motion.velocity.windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
-            said.push(format!(
-                "the force of {} is nothing beside those of the device: as if it did not act",
-                experiment.name
-            ));
+            warnings.push(FitWarning::NegligibleForce {
+                experiment: experiment.name.clone(),
+            });
         }
     }
-    said
+    warnings
 }
 
 /// What is said where the residuals are larger than the readings' sigma allows: the errors of all functions are then
 /// too small. `None` where they are not, or nobody gave a sigma.
-fn unexplained(statistics: &StatisticsSummary) -> Option<String> {
+fn unexplained(statistics: &FitStatistics) -> Option<FitWarning> {
     let times = statistics.reduced_chi_square?.sqrt();
-    (times > BEYOND_SIGMA).then(|| {
-        format!(
-            "how sure the functions are is not known: the residuals are {times:.1} times sigma, so the device does not \
-             explain the readings, or sigma is too small"
-        )
-    })
+    (times > BEYOND_SIGMA).then_some(FitWarning::BeyondSigma { times })
 }
 
 /// What is said of a device that swings so fast that its readings are those of other devices as well; `None` where they
 /// are not. Readings of one kind on a raster, of a free motion of frequency `f`, are those of one of `1/spacing - f`;
 /// times off the raster, a force, or a second kind of reading tell them apart.
-fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<String> {
+fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     let mut channels = problem.channels();
     let first = channels.next()?;
     let spacing = raster(first)?;
@@ -246,12 +296,9 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<String> {
     squares.sort_by(f64::total_cmp);
     // That of most times: at the ends of a record k/m may be anything.
     let frequency = squares[squares.len() / 2].sqrt() / TAU;
-    (frequency * spacing > PERIODS_PER_READING).then(|| {
-        format!(
-            "devices of other frequencies may match as well: with {:.1} readings in a period of {frequency:.3} Hz its \
-             aliases do; read more often, or at uneven times",
-            1.0 / (frequency * spacing)
-        )
+    (frequency * spacing > PERIODS_PER_READING).then(|| FitWarning::Aliased {
+        per_period: 1.0 / (frequency * spacing),
+        frequency,
     })
 }
 

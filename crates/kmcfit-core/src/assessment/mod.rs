@@ -1,0 +1,78 @@
+//! Assessment of a fit: statistics of the residuals, step-size check, plausibility, standard errors and bands.
+
+mod channel;
+mod constancy;
+mod plausibility;
+mod statistics;
+mod step_check;
+
+pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
+pub use constancy::{constant_probability, standard_error};
+pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
+pub use statistics::{FitStatistics, statistics};
+pub use step_check::{StepCheck, StepCheckOutcome, step_check};
+
+use crate::identifiability::{BandSettings, Bands, Judgement, verdicts};
+use crate::problem::Problem;
+use crate::solvers::{Fit, Status};
+use nalgebra::DMatrix;
+
+/// Up to so many parameters the bands are computed with every fit: some milliseconds.
+const FEW_PARAMETERS: usize = 64;
+
+/// Assessment of a fit of a simulated response.
+#[derive(Debug, Clone)]
+pub struct FitAssessment {
+    /// The optimum with half the step.
+    pub step_check: StepCheckOutcome,
+    /// Statistics of all channels.
+    pub statistics: FitStatistics,
+    /// Plausibility and warnings.
+    pub plausibility: Plausibility,
+    /// Covariance of the parameters, where standard errors are meaningful.
+    pub covariance: Option<DMatrix<f64>>,
+    /// Bands of functions and ratios, where standard errors are meaningful.
+    pub bands: Option<Bands>,
+    /// Classification of functions and ratios by their bands.
+    pub judgements: Vec<Judgement>,
+}
+
+impl FitAssessment {
+    /// Assesses `fit`; covariance, bands and judgements for up to 64 parameters.
+    pub fn of(problem: &Problem, fit: &Fit) -> Self {
+        let best = &fit.best;
+        let step_check = step_check(problem, &best.evaluation);
+        let statistics = statistics(problem, &best.evaluation);
+        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+        let tells_errors = few && problem.reading_count() > problem.parameters();
+        let mut plausibility = Plausibility::of(
+            problem,
+            &best.evaluation,
+            &step_check,
+            &statistics,
+            tells_errors,
+        );
+        if fit.outcome.status == Status::Failed {
+            plausibility.fail();
+        }
+        let mut assessment = Self {
+            step_check,
+            statistics,
+            plausibility,
+            covariance: None,
+            bands: None,
+            judgements: Vec::new(),
+        };
+        if tells_errors && assessment.plausibility.errors_hold {
+            let settings = BandSettings {
+                draws: 0,
+                ..BandSettings::default()
+            };
+            let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
+            assessment.judgements = verdicts(problem, &best.evaluation, &bands);
+            assessment.bands = Some(bands);
+            assessment.covariance = problem.covariance(&best.evaluation);
+        }
+        assessment
+    }
+}

@@ -1,0 +1,63 @@
+//! Statistics of all channels together.
+
+use crate::diagnostics::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+use crate::objective::{Evaluation, Loss, Weighting};
+use crate::problem::Problem;
+
+/// Goodness of fit and information criteria of a fit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FitStatistics {
+    /// Number of readings.
+    pub readings: usize,
+    /// Number of parameters of functions and scalars.
+    pub parameters: usize,
+    /// `J / (n - p)` for a chi-square of readings with known sigma; `None` where it has no meaning.
+    pub reduced_chi_square: Option<f64>,
+    /// Akaike's criterion.
+    pub aic: Option<f64>,
+    /// The same corrected for small records.
+    pub aicc: Option<f64>,
+    /// Schwarz's criterion.
+    pub bic: Option<f64>,
+}
+
+/// Statistics at the point of `evaluation`; chi-square and criteria for least squares without penalties.
+pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
+    let readings = problem.reading_count();
+    let parameters = problem.parameters();
+    let mut summary = FitStatistics {
+        readings,
+        parameters,
+        ..FitStatistics::default()
+    };
+    // Penalties reduce the degrees of freedom by a number that is not computed here.
+    let plain = problem.penalties.is_empty() && problem.variations.is_empty();
+    let squares = problem.channels().all(|c| c.loss() == Loss::Squares);
+    if !(plain && squares) || readings <= parameters {
+        return summary;
+    }
+    let p = parameters as f64;
+    let sigma = |known: bool| {
+        problem
+            .channels()
+            .all(|c| matches!(c.weighting(), Weighting::Sigma(_) | Weighting::Sigmas(_)) == known)
+    };
+    let criteria: Option<InformationCriteria> = if sigma(true) {
+        summary.reduced_chi_square = Some(evaluation.misfit / (readings as f64 - p));
+        with_known_sigma(evaluation.misfit, readings, p)
+    } else if sigma(false) && problem.channels().count() == 1 {
+        let squares = problem
+            .channels()
+            .zip(evaluation.predictions.iter().flatten());
+        let sum: f64 = squares
+            .flat_map(|(c, predicted)| c.residuals(predicted).map(|r| r * r).collect::<Vec<f64>>())
+            .sum();
+        with_estimated_sigma(sum, readings, p)
+    } else {
+        None
+    };
+    summary.aic = criteria.map(|c| c.aic);
+    summary.aicc = criteria.and_then(|c| c.aicc);
+    summary.bic = criteria.map(|c| c.bic);
+    summary
+}

@@ -1,0 +1,58 @@
+//! Step-size check: the optimum on a grid of half the step.
+
+use crate::diagnostics::rms;
+use crate::dynamics::Breakdown;
+use crate::objective::{Evaluation, Refined};
+use crate::problem::Problem;
+
+/// The optimum on a grid of half the step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepCheck {
+    /// Half the step, s.
+    pub step: f64,
+    /// Misfit there.
+    pub misfit: f64,
+    /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
+    pub change_per_residual: f64,
+    /// Largest change of a prediction as a share of the largest reading, over the channels.
+    pub change_per_reading: f64,
+}
+
+/// The check: `None` where the readings do not lie on the finer grid, an error where there is no response on it.
+pub type StepCheckOutcome = Result<Option<StepCheck>, Breakdown>;
+
+/// Simulates the optimum with half the step.
+///
+/// # Errors
+/// A [`Breakdown`] if there is no response with half the step.
+pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcome {
+    let Some(Refined {
+        step,
+        misfit,
+        changes,
+    }) = problem.on_half_step(evaluation)?
+    else {
+        return Ok(None);
+    };
+    let mut summary = StepCheck {
+        step,
+        misfit,
+        change_per_residual: 0.0,
+        change_per_reading: 0.0,
+    };
+    let channels = problem
+        .channels()
+        .zip(evaluation.predictions.iter().flatten());
+    for ((channel, predicted), change) in channels.zip(changes.into_iter().flatten()) {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        let rms = rms(&residuals);
+        let largest = channel
+            .observed()
+            .iter()
+            .fold(0.0f64, |m, y| m.max(y.abs()));
+        let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
+        summary.change_per_residual = summary.change_per_residual.max(share(rms));
+        summary.change_per_reading = summary.change_per_reading.max(share(largest));
+    }
+    Ok(Some(summary))
+}

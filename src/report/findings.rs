@@ -1,0 +1,59 @@
+//! Sentences about the plausibility of a fit.
+
+use kmcfit_core::internals::assessment::{FitWarning, Unidentified};
+
+/// Why the optimum identifies no system.
+pub fn unidentified(why: &Unidentified) -> String {
+    let why = match why {
+        Unidentified::Failed => "the fit failed".to_owned(),
+        Unidentified::NoResponseOnHalfStep(breakdown) => {
+            format!("on half the step there is no motion: {breakdown}")
+        }
+        Unidentified::StepDependent => {
+            "on half the step the model's readings change by more than a tenth of the largest one"
+                .into()
+        }
+        Unidentified::Unrelated => {
+            "its motion misses the readings by more than twice what they vary".into()
+        }
+        Unidentified::Noise => {
+            "noise of the size of these readings would be matched as well".into()
+        }
+    };
+    format!("the device is not identified: {why}")
+}
+
+/// A warning.
+pub fn warning(warning: &FitWarning) -> String {
+    match warning {
+        FitWarning::BeyondSigma { times } => format!(
+            "how sure the functions are is not known: the residuals are {times:.1} times sigma, so the device does not \
+             explain the readings, or sigma is too small"
+        ),
+        FitWarning::CoarseSteps { times } => format!(
+            "how sure the functions are is not known: half the step changes the model's readings by {times:.1} times the \
+             residuals"
+        ),
+        FitWarning::PoorFit => {
+            "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
+                .into()
+        }
+        FitWarning::Coloured => {
+            "by how much the errors are too small is not known: they hold for white residuals, and these are not"
+                .into()
+        }
+        FitWarning::Aliased {
+            per_period,
+            frequency,
+        } => format!(
+            "devices of other frequencies may match as well: with {per_period:.1} readings in a period of {frequency:.3} \
+             Hz its aliases do; read more often, or at uneven times"
+        ),
+        FitWarning::Negative { function } => {
+            format!("the {function} is negative at most times, as that of no passive device")
+        }
+        FitWarning::NegligibleForce { experiment } => format!(
+            "the force of {experiment} is nothing beside those of the device: as if it did not act"
+        ),
+    }
+}
