@@ -3,8 +3,8 @@
 use super::View;
 use crate::lanes::{Arithmetic, Eight, Kernel, LANES, Row};
 use crate::record::{Channel, ChannelKind};
-use crate::simulate::fast::nodal_observations::{Accelerations, Sight};
-use crate::simulate::fast::padded_loads as window;
+use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
+use crate::simulate::fast::padded_loads;
 use crate::simulate::{Slopes, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
@@ -24,7 +24,7 @@ impl Channel {
         i: usize,
     ) -> [Eight<A>; 2] {
         if let Some(around) = self.surroundings() {
-            return [0, 1].map(|part| window::eight(arithmetic, &around[part], i));
+            return [0, 1].map(|part| padded_loads::eight(arithmetic, &around[part], i));
         }
         let mut rows = [[0.0; LANES]; 2];
         if excitation.is_some() {
@@ -47,13 +47,13 @@ impl Channel {
         i: usize,
         seen: &mut Accelerations,
     ) {
-        let sight = Sight {
+        let nodes = NodalObservations {
             oscillator: view.oscillator,
             device: view.device,
             states: view.motion,
         };
         let around = self.around_eight(arithmetic, view.excitation, i);
-        sight.see(arithmetic, i, around, seen);
+        nodes.accelerations(arithmetic, i, around, seen);
     }
 }
 
@@ -78,7 +78,7 @@ impl Kernel for Predict<'_> {
             channel.accelerations(arithmetic, view, from, &mut seen);
             let mut value = Eight::load(arithmetic, &seen.value);
             if !channel.base().is_empty() {
-                value += window::eight(arithmetic, channel.base(), from);
+                value += padded_loads::eight(arithmetic, channel.base(), from);
             }
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {

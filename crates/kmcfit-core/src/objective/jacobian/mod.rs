@@ -8,7 +8,7 @@ use crate::lanes::LANES;
 use crate::lanes::sum::are_finite;
 use crate::lanes::tall::Piece;
 use crate::problem::{Experiment, LONG, Problem};
-use crate::simulate::fast::sensitivities::{Course, TILE};
+use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
 use moving::Moving;
 use nalgebra::DMatrix;
 use reader::Reader;
@@ -160,7 +160,7 @@ fn sweep(
         *piece = take(full);
         piece.restart(next);
     };
-    let course = Course {
+    let course = BaseTrajectory {
         oscillator: view.oscillator,
         device: view.device,
         excitation: view.excitation,

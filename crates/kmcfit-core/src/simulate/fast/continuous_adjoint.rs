@@ -1,6 +1,7 @@
 //! Eq. 13 with its coefficients formed eight steps at a time.
 
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
+use super::padded_loads::places;
+use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::{Adjoint, AdjointEquation};
 
 /// [`AdjointEquation::solve`], to the bit.
@@ -125,22 +126,8 @@ impl Kernel for Sweep<'_> {
 /// Values at the right nodes of the eight steps from `first` on, and their means with those at the left nodes.
 #[inline(always)]
 fn right_and_middle<A: Arithmetic>(arithmetic: A, f: &[f64], first: usize) -> [Eight<A>; 2] {
-    let nine = f[first..].first_chunk::<{ LANES + 1 }>();
-    let inside = nine.and_then(|nine| Some((nine.first_chunk()?, nine.last_chunk()?)));
-    let (left, right) = match inside {
-        Some((left, right)) => (
-            Eight::load(arithmetic, left),
-            Eight::load(arithmetic, right),
-        ),
-        None => {
-            let (left, right) = (window(f, first), window(f, first + 1));
-            (
-                Eight::load(arithmetic, &left),
-                Eight::load(arithmetic, &right),
-            )
-        }
-    };
-    [right, (right + left) * Eight::splat(arithmetic, 0.5)]
+    let [_, middle, right] = places(arithmetic, f, first);
+    [right, middle]
 }
 
 /// What eight steps need at one place, from the values there, in the order of [`Sweep::lists`].

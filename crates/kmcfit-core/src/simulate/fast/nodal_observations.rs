@@ -1,7 +1,8 @@
-//! The accelerations at eight neighbouring nodes: what an accelerometer sampled with the grid sees.
+//! Accelerations at eight neighbouring nodes, as an accelerometer sampled with the grid measures them:
+//! [`observe`](crate::simulate::reference::observe()) to some machine precisions.
 
 use super::elements::with_known;
-use super::padded_loads as window;
+use super::padded_loads;
 use crate::lanes::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::system::{Device, FUNCTIONS, MOST_TERMS, Oscillator, Term};
@@ -26,59 +27,59 @@ impl Accelerations {
     };
 }
 
-/// Whose accelerations are seen.
+/// A response observed at its nodes.
 #[derive(Clone, Copy)]
-pub(crate) struct Sight<'a> {
+pub(crate) struct NodalObservations<'a> {
     pub oscillator: &'a Oscillator,
     pub device: &'a Device,
     pub states: &'a Trajectory,
 }
 
-impl Sight<'_> {
+impl NodalObservations<'_> {
     /// The accelerations at eight nodes from node `i` on, with force and acceleration of the base at each; lanes
     /// beyond the last node mean nothing.
     #[inline(always)]
-    pub fn see<A: Arithmetic>(
+    pub fn accelerations<A: Arithmetic>(
         &self,
         arithmetic: A,
         i: usize,
         around: [Eight<A>; 2],
-        seen: &mut Accelerations,
+        out: &mut Accelerations,
     ) {
         let terms = self.oscillator.terms.as_slice();
         with_known!(terms, terms, TERMS => {
-            self.see_terms::<A, TERMS>(arithmetic, terms, i, around, seen);
+            self.of_terms::<A, TERMS>(arithmetic, terms, i, around, out);
         });
     }
 
     #[inline(always)]
-    fn see_terms<A: Arithmetic, const TERMS: usize>(
+    fn of_terms<A: Arithmetic, const TERMS: usize>(
         &self,
         arithmetic: A,
         terms: &[Term],
         i: usize,
         [force, base]: [Eight<A>; 2],
-        seen: &mut Accelerations,
+        out: &mut Accelerations,
     ) {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
-        let y = window::eight(arithmetic, &self.states.displacement, i);
-        let v = window::eight(arithmetic, &self.states.velocity, i);
-        let per_mass = one / window::eight(arithmetic, &self.device.mass, i);
+        let y = padded_loads::eight(arithmetic, &self.states.displacement, i);
+        let v = padded_loads::eight(arithmetic, &self.states.velocity, i);
+        let per_mass = one / padded_loads::eight(arithmetic, &self.device.mass, i);
         let minus_per_mass = -per_mass;
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
         for (j, term) in terms.iter().enumerate().take(TERMS) {
             let p = &self.device.coefficients[j];
-            let p = window::eight(arithmetic, p, i);
+            let p = padded_loads::eight(arithmetic, p, i);
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;
-            seen.functions[j + 1] = (response.phi * minus_per_mass).row();
+            out.functions[j + 1] = (response.phi * minus_per_mass).row();
             by_y = response.by_y.taken_from(by_y, p);
             by_v = response.by_v.taken_from(by_v, p);
         }
         let inertia = push * per_mass;
-        seen.functions[0] = (inertia * minus_per_mass).row();
-        seen.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
-        seen.value = (inertia - base).row();
+        out.functions[0] = (inertia * minus_per_mass).row();
+        out.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
+        out.value = (inertia - base).row();
     }
 }

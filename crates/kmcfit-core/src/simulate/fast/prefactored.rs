@@ -1,34 +1,34 @@
-//! The forward solve with what does not depend on the motion made ahead, eight steps at a time: each
-//! function by the mass, and the drive, times the step and the tableau's factors. What is left of a step
-//! are products and sums of its states, in an order in which few wait for each other: a stage's velocity
-//! waits for four operations on the displacement of the stage before.
+//! The response with prefactored stages: each function divided by the mass, and the input, times the step and the
+//! tableau's factors, are formed eight steps at a time. The rest of a step are products and sums of its states, in
+//! an order with few dependencies: a stage's velocity waits for four operations on the displacement of the stage
+//! before.
 
-use super::padded_loads as window;
+use super::padded_loads;
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{MIDPOINT, MOST_TERMS, Method, RK4, State, Tableau, Term};
 
-/// The motion, which differs from that of the paper's order of operations by rounding. `false` if
-/// a kind of term is there twice: then nothing is done.
+/// [`forward_into`](crate::simulate::reference::forward_into()), to 40 machine precisions of the largest value for each
+/// step. `false` if a kind of term is there twice: then nothing is done.
 pub(crate) fn forward(
-    rhs: EquationOfMotion,
+    equation: EquationOfMotion,
     method: Method,
     initial: State,
     trajectory: &mut Trajectory,
 ) -> bool {
     let mut kinds = [None; MOST_TERMS];
-    for (j, term) in rhs.terms.iter().enumerate() {
+    for (j, term) in equation.terms.iter().enumerate() {
         if kinds[place(*term)].replace(j).is_some() {
             return false;
         }
     }
-    let width = rhs.terms.iter().find_map(|term| match term {
+    let width = equation.terms.iter().find_map(|term| match term {
         Term::CoulombFriction { width } => Some(*width),
         _ => None,
     });
     lanes::run(Forward {
-        rhs,
+        equation,
         method,
         kinds,
         width: width.unwrap_or(1.0),
@@ -68,28 +68,28 @@ struct Rates {
     drive: Row,
 }
 
-/// What the acceleration of a stage brings.
+/// Contributions of the acceleration of a stage.
 #[derive(Clone, Copy)]
-struct Brought {
+struct StageRates {
     /// To the velocity of the next stage.
     next: Rates,
     /// To the velocity at the right node.
     end: Rates,
 }
 
-const NOTHING: Brought = {
+const NOTHING: StageRates = {
     let rates = Rates {
         kinds: [[0.0; LANES]; MOST_TERMS],
         drive: [0.0; LANES],
     };
-    Brought {
+    StageRates {
         next: rates,
         end: rates,
     }
 };
 
 struct Forward<'a> {
-    rhs: EquationOfMotion<'a>,
+    equation: EquationOfMotion<'a>,
     method: Method,
     /// The term of each kind.
     kinds: [Option<usize>; MOST_TERMS],
@@ -133,9 +133,9 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
-        let steady = Steady::of(&self.rhs, &self.kinds);
-        let mut brought = [NOTHING; STAGES];
-        let mut per_mass = PerMass::at(arithmetic, &self.rhs, 0);
+        let steady = Steady::of(&self.equation, &self.kinds);
+        let mut stages = [NOTHING; STAGES];
+        let mut per_mass = PerMass::at(arithmetic, &self.equation, 0);
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
         let motion = &mut *self.trajectory;
         let steps = motion.nodes() - 1;
@@ -143,31 +143,31 @@ impl Forward<'_> {
         let mut from = 0;
         while from < steps {
             if from > 0 && !steady.mass {
-                per_mass = PerMass::at(arithmetic, &self.rhs, from);
+                per_mass = PerMass::at(arithmetic, &self.equation, from);
             }
             prepare_drive(
                 arithmetic,
                 tableau,
-                &self.rhs,
+                &self.equation,
                 &per_mass,
                 from,
-                &mut brought,
+                &mut stages,
             );
             for k in 0..MOST_TERMS {
                 if from > 0 && steady.kinds[k] {
                     continue;
                 }
                 if let Some(j) = self.kinds[k] {
-                    let values = &self.rhs.device.coefficients[j];
+                    let values = &self.equation.device.coefficients[j];
                     prepare(
                         arithmetic,
                         tableau,
-                        self.rhs.dt,
+                        self.equation.dt,
                         values,
                         &per_mass,
                         from,
                         k,
-                        &mut brought,
+                        &mut stages,
                     );
                 }
             }
@@ -179,10 +179,10 @@ impl Forward<'_> {
                 let l = l & (LANES - 1);
                 step(
                     tableau,
-                    &brought,
+                    &stages,
                     there,
                     self.width,
-                    self.rhs.dt,
+                    self.equation.dt,
                     l,
                     &mut y,
                     &mut v,
@@ -203,9 +203,9 @@ struct Steady {
 
 impl Steady {
     #[inline(always)]
-    fn of(rhs: &EquationOfMotion, kinds: &[Option<usize>; MOST_TERMS]) -> Self {
-        let mass = is_constant(&rhs.device.mass);
-        let is_steady = |j: usize| mass && is_constant(&rhs.device.coefficients[j]);
+    fn of(equation: &EquationOfMotion, kinds: &[Option<usize>; MOST_TERMS]) -> Self {
+        let mass = is_constant(&equation.device.mass);
+        let is_steady = |j: usize| mass && is_constant(&equation.device.coefficients[j]);
         Self {
             mass,
             kinds: kinds.map(|kind| kind.is_some_and(is_steady)),
@@ -228,9 +228,9 @@ struct PerMass<A: Arithmetic>([Eight<A>; 3]);
 
 impl<A: Arithmetic> PerMass<A> {
     #[inline(always)]
-    fn at(arithmetic: A, rhs: &EquationOfMotion, i: usize) -> Self {
+    fn at(arithmetic: A, equation: &EquationOfMotion, i: usize) -> Self {
         let one = Eight::splat(arithmetic, 1.0);
-        Self(window::places(arithmetic, &rhs.device.mass, i).map(|mass| one / mass))
+        Self(padded_loads::places(arithmetic, &equation.device.mass, i).map(|mass| one / mass))
     }
 }
 
@@ -248,13 +248,13 @@ fn prepare<A: Arithmetic, const S: usize>(
     per_mass: &PerMass<A>,
     i: usize,
     kind: usize,
-    brought: &mut [Brought; STAGES],
+    stages: &mut [StageRates; STAGES],
 ) {
-    let mut p = window::places(arithmetic, values, i);
+    let mut p = padded_loads::places(arithmetic, values, i);
     for (p, per_mass) in p.iter_mut().zip(per_mass.0) {
         *p = *p * per_mass;
     }
-    for (s, stage) in brought.iter_mut().enumerate().take(S) {
+    for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let [next, end] = factors(tableau, dt, s);
         let p = p[tableau.position[s] as usize];
         stage.next.kinds[kind] = (p * Eight::splat(arithmetic, next)).row();
@@ -267,18 +267,26 @@ fn prepare<A: Arithmetic, const S: usize>(
 fn prepare_drive<A: Arithmetic, const S: usize>(
     arithmetic: A,
     tableau: &Tableau<S>,
-    rhs: &EquationOfMotion,
+    equation: &EquationOfMotion,
     per_mass: &PerMass<A>,
     i: usize,
-    brought: &mut [Brought; STAGES],
+    stages: &mut [StageRates; STAGES],
 ) {
-    let force = window::stepwise(arithmetic, rhs.excitation.and_then(|e| e.force.as_ref()), i);
-    let base = window::stepwise(arithmetic, rhs.excitation.and_then(|e| e.base.as_ref()), i);
-    for (s, stage) in brought.iter_mut().enumerate().take(S) {
+    let force = padded_loads::stepwise(
+        arithmetic,
+        equation.excitation.and_then(|e| e.force.as_ref()),
+        i,
+    );
+    let base = padded_loads::stepwise(
+        arithmetic,
+        equation.excitation.and_then(|e| e.base.as_ref()),
+        i,
+    );
+    for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
         let push = force[q] * per_mass.0[q];
         let drive = push - base[q];
-        let [next, end] = factors(tableau, rhs.dt, s);
+        let [next, end] = factors(tableau, equation.dt, s);
         stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();
         stage.end.drive = (drive * Eight::splat(arithmetic, end)).row();
     }
@@ -303,7 +311,7 @@ fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] 
 )]
 fn step<const S: usize>(
     tableau: &Tableau<S>,
-    brought: &[Brought; STAGES],
+    stages: &[StageRates; STAGES],
     there: [bool; MOST_TERMS],
     width: f64,
     dt: f64,
@@ -313,7 +321,7 @@ fn step<const S: usize>(
 ) {
     let (mut y_s, mut v_s) = (*y, *v);
     let (mut y_end, mut v_end) = (*y, *v);
-    for (s, stage) in brought.iter().enumerate().take(S) {
+    for (s, stage) in stages.iter().enumerate().take(S) {
         let phi = Phi::at(there, width, y_s, v_s);
         let [next, end] = factors(tableau, dt, s);
         if tableau.b[s] != 0.0 {

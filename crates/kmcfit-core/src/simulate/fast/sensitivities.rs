@@ -1,10 +1,12 @@
-//! Tangents along many directions at once, eight in the lanes of a group.
+//! Forward sensitivities: tangents along many directions at once, eight in the lanes of a group.
 //!
-//! What the directions share, the linearised steps, is computed once, in eight steps at a time. The
+//! Each equals [`tangent`](crate::simulate::reference::tangent()) to 40 machine precisions of the largest value for each
+//! step.
+//! The linearised steps, which the directions share, are computed once, in eight steps at a time. The
 //! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
 //! are ever in memory as a whole.
 
-use super::step_linearisation::{self as maps, Maps, Wanted};
+use super::step_linearisation::{self, StepLinearisation, Wanted};
 use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -66,12 +68,12 @@ pub(crate) struct Tangents {
     begun: Vec<bool>,
     /// What constants push displacement and velocity of each group by in eight steps: one direction a row.
     held: Vec<Aligned<[[Row; LANES]; 2]>>,
-    maps: Maps,
+    maps: StepLinearisation,
 }
 
-/// A motion to go through.
+/// The response about which tangents are taken.
 #[derive(Clone, Copy)]
-pub(crate) struct Course<'a> {
+pub(crate) struct BaseTrajectory<'a> {
     pub oscillator: &'a Oscillator,
     pub device: &'a Device,
     pub excitation: Option<&'a Excitation>,
@@ -100,7 +102,7 @@ impl Tangents {
                 .map(|states| states.as_flattened().iter().any(|x| *x != 0.0))
                 .collect(),
             held: vec![Aligned([[[0.0; LANES]; LANES]; 2]); initial.len()],
-            maps: Maps::NOTHING,
+            maps: StepLinearisation::NOTHING,
             states,
         }
     }
@@ -155,15 +157,15 @@ impl Tangents {
     }
 
     /// Goes on by a tile: over the steps `steps`, at most [`TILE`] and not the same as before.
-    pub fn advance(&mut self, course: Course, steps: Range<usize>) {
-        let Course {
+    pub fn advance(&mut self, course: BaseTrajectory, steps: Range<usize>) {
+        let BaseTrajectory {
             oscillator,
             device,
             excitation,
             motion,
         } = course;
         lanes::run(Advance {
-            rhs: EquationOfMotion::new(oscillator, device, excitation, motion.nodes()),
+            equation: EquationOfMotion::new(oscillator, device, excitation, motion.nodes()),
             method: oscillator.method,
             motion,
             steps,
@@ -173,7 +175,7 @@ impl Tangents {
 }
 
 struct Advance<'a> {
-    rhs: EquationOfMotion<'a>,
+    equation: EquationOfMotion<'a>,
     method: Method,
     motion: &'a Trajectory,
     steps: Range<usize>,
@@ -200,15 +202,15 @@ impl Kernel for Advance<'_> {
                 None => wanted.ends[slot.function] = true,
             }
         }
-        let mass = &self.rhs.device.mass;
+        let mass = &self.equation.device.mass;
         // The last eight steps may reach beyond the tile, for lanes that nobody asks.
-        let constant_mass = maps::constant_mass(&mass[first..=first + count]);
+        let constant_mass = step_linearisation::constant_mass(&mass[first..=first + count]);
         let mut from = 0;
         while from < count {
-            maps::linearise(
+            step_linearisation::linearise(
                 arithmetic,
                 self.method,
-                &self.rhs,
+                &self.equation,
                 self.motion,
                 first + from,
                 constant_mass,
@@ -268,7 +270,7 @@ impl Kernel for Advance<'_> {
 #[inline(always)]
 fn hold<A: Arithmetic>(
     arithmetic: A,
-    maps: &Maps,
+    maps: &StepLinearisation,
     function: usize,
     steady: Steady,
     held: &mut [[Row; LANES]; 2],
@@ -295,7 +297,7 @@ struct Pushes<'a> {
 #[inline(always)]
 fn carry<A: Arithmetic>(
     arithmetic: A,
-    maps: &Maps,
+    maps: &StepLinearisation,
     pushes: Pushes,
     states: &mut [[Row; 2]; TILE_NODES],
     steps: Range<usize>,

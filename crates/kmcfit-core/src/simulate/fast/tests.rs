@@ -1,8 +1,8 @@
 //! Every specialisation against its reference function, over random systems, records, steppers and excitations.
 
 use super::continuous_adjoint;
-use super::nodal_observations::{Accelerations, Sight};
-use super::sensitivities::{Course, Slot, Steady, TILE, Tangents};
+use super::nodal_observations::{Accelerations, NodalObservations};
+use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
 use super::step_batch::{Layout, Ray, Trials, replay};
 use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::record::ChannelKind;
@@ -195,17 +195,17 @@ fn linear_free_case() -> impl Strategy<Value = Case> {
 }
 
 /// Accelerations and their derivatives at eight nodes.
-struct See<'a>(Sight<'a>, usize, [f64; 2]);
+struct Observe<'a>(NodalObservations<'a>, usize, [f64; 2]);
 
-impl Kernel for See<'_> {
+impl Kernel for Observe<'_> {
     type Output = Accelerations;
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> Accelerations {
-        let Self(sight, node, around) = self;
+        let Self(nodes, node, around) = self;
         let mut seen = Accelerations::NOTHING;
         let around = around.map(|x| Eight::splat(arithmetic, x));
-        sight.see(arithmetic, node, around, &mut seen);
+        nodes.accelerations(arithmetic, node, around, &mut seen);
         seen
     }
 }
@@ -244,7 +244,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
     ];
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
     let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
-    let course = Course {
+    let course = BaseTrajectory {
         oscillator: &case.oscillator,
         device: &case.device,
         excitation: case.excitation(),
@@ -393,8 +393,8 @@ proptest! {
         let around = [case.numbers[0], case.numbers[1]];
         let surroundings = crate::system::Surroundings { force: around[0], base: around[1] };
         for first in (0..case.nodes()).step_by(LANES) {
-            let sight = Sight { oscillator, device, states: &states };
-            let seen = lanes::run(See(sight, first, around));
+            let nodes = NodalObservations { oscillator, device, states: &states };
+            let seen = lanes::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
                 let place = Place::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;

@@ -7,8 +7,9 @@
 //! step after the other, each waits for the one before; in eight lanes the processor has always
 //! something to do.
 //!
-//! Against [`Oscillator::forward`](super::Oscillator::forward) step by step the results differ by
-//! rounding: each step adds an increment of the state, as there, and the relative error of a block's map
+//! Responses, adjoints and least squares equal [`forward`](crate::simulate::reference::forward()) and
+//! [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of the largest value for
+//! each step: each step adds an increment of the state, as there, and the relative error of a block's map
 //! is that of its few steps.
 
 mod adjoint;
