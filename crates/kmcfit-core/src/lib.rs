@@ -16,7 +16,7 @@
 //!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction.
 //! 9. `builder`: a problem in a few lines of Rust.
 //!
-//! Beside these, `signal` has interpolation, excitation, filters and spectra; `lanes` vector arithmetic.
+//! Beside these, `signal` has interpolation, excitation, filters and spectra; `simd` vector arithmetic.
 //!
 //! # Example
 //!
@@ -84,12 +84,12 @@ mod dynamics;
 mod functions;
 mod host;
 mod identifiability;
-mod lanes;
 mod objective;
 mod problem;
 mod qp;
 mod record;
 mod signal;
+mod simd;
 mod simulate;
 mod solvers;
 mod study;
@@ -124,9 +124,6 @@ pub mod internals {
     pub mod identifiability {
         pub use crate::identifiability::*;
     }
-    pub mod lanes {
-        pub use crate::lanes::*;
-    }
     pub mod objective {
         pub use crate::objective::*;
     }
@@ -138,6 +135,9 @@ pub mod internals {
     }
     pub mod signal {
         pub use crate::signal::*;
+    }
+    pub mod simd {
+        pub use crate::simd::*;
     }
     pub mod solvers {
         pub use crate::solvers::*;

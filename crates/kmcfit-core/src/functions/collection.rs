@@ -1,7 +1,7 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
 use super::{CoefficientFunction, Design, Gram, Runs, Scalar};
-use crate::lanes::sum::largest_difference;
+use crate::simd::sum::largest_difference;
 use crate::system::Device;
 use crate::system::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Accelerations read on every node, eight at a time.
 
 use super::View;
-use crate::lanes::{Arithmetic, Eight, Kernel, LANES, Row};
 use crate::record::{Channel, ChannelKind};
+use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
 use crate::simulate::fast::padded_loads;
 use crate::simulate::{Slopes, Trajectory};

@@ -2,9 +2,9 @@
 
 use super::node_aligned::{AddTranspose, Predict};
 use super::{View, ViewTangent};
-use crate::lanes;
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
+use crate::simd;
 use crate::simulate::reference::{Sensed, observe};
 use crate::simulate::{Slopes, Trajectory};
 use crate::system::Place;
@@ -56,7 +56,7 @@ impl Channel {
         if self.is_acceleration_on_nodes() {
             let channel = self;
             out.reserve_exact(self.len());
-            lanes::run(Predict { channel, view, out });
+            simd::run(Predict { channel, view, out });
         } else if self.sensor() == Sensor::default() {
             out.extend((0..self.len()).map(|i| self.seen(view, i)));
         } else {
@@ -114,7 +114,7 @@ impl Channel {
             return;
         }
         if self.is_acceleration_on_nodes() {
-            return lanes::run(AddTranspose {
+            return simd::run(AddTranspose {
                 channel: self,
                 view,
                 slopes,

@@ -2,10 +2,10 @@
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
-use crate::lanes::sum::{dot, largest};
 use crate::problem::{Experiment, LONG, Problem};
 use crate::record::ChannelKind;
 use crate::signal::Spectrum;
+use crate::simd::sum::{dot, largest};
 use crate::simulate::Trajectory;
 use crate::system::quadrature::curvature_into;
 use crate::system::{MOST_TERMS, Term};

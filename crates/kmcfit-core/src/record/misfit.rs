@@ -1,7 +1,7 @@
 //! How far the predictions are from the readings, and what that costs.
 
 use super::{Channel, LONG, Loss, Weighting};
-use crate::lanes::sum::squared_distance;
+use crate::simd::sum::squared_distance;
 use crate::system::quadrature::trapezoid_weights_at;
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! Simulations that end early.
 
 use super::Trajectory;
-use crate::lanes::sum::are_positive;
+use crate::simd::sum::are_positive;
 use crate::system::{Device, Grid};
 use std::fmt;
 

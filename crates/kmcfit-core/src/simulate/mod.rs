@@ -23,7 +23,7 @@ use crate::system::{Device, Excitation, Oscillator, State};
 /// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the
 /// same bits.
 pub fn arithmetic() -> &'static str {
-    crate::lanes::name()
+    crate::simd::name()
 }
 
 impl Oscillator {

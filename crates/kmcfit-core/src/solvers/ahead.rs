@@ -12,9 +12,9 @@
 
 use super::gauss_newton::{FEW_PARAMETERS, Half, Reduced, halfway, is_wide};
 use super::{FitSettings, Point, Solver, Timings};
-use crate::lanes::tall::Piece;
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
+use crate::simd::tall_qr::Piece;
 use crate::threads::{self, Companion};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,6 +1,6 @@
 //! Sums and differences on an equally spaced grid, in the paper's order of operations.
 
-use crate::lanes::{self, Elementwise};
+use crate::simd::{self, Elementwise};
 
 /// Trapezoid rule for values at the nodes: `dt/2 (f_0 + f_last)`, then the inner nodes in order.
 pub fn trapezoid(f: &[f64], dt: f64) -> f64 {
@@ -40,7 +40,7 @@ pub fn trapezoid_weights_at(times: &[f64]) -> Vec<f64> {
 pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
     let last = f.len() - 1;
     let mut d = vec![0.0; f.len()];
-    lanes::run(Elementwise(|| {
+    simd::run(Elementwise(|| {
         for (d, w) in d[1..].iter_mut().zip(f.windows(3)) {
             *d = 0.5 * (-w[0] + w[2]) / dt;
         }
@@ -68,7 +68,7 @@ pub fn curvature_into(f: &[f64], dt: f64, first: usize, out: &mut [f64]) {
     let (last, end) = (f.len() - 1, first + out.len());
     let inner = first.max(1)..end.min(last);
     let around = &f[inner.start - 1..=inner.end];
-    lanes::run(Elementwise(|| {
+    simd::run(Elementwise(|| {
         let out = out[inner.start - first..inner.end - first].iter_mut();
         for (d, w) in out.zip(around.windows(3)) {
             *d = second(w[0], w[1], w[2], dt);

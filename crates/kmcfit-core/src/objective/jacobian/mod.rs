@@ -4,10 +4,10 @@ mod moving;
 mod reader;
 
 use super::{Channel, Evaluation, View};
-use crate::lanes::LANES;
-use crate::lanes::sum::are_finite;
-use crate::lanes::tall::Piece;
 use crate::problem::{Experiment, LONG, Problem};
+use crate::simd::LANES;
+use crate::simd::sum::are_finite;
+use crate::simd::tall_qr::Piece;
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
 use moving::Moving;
 use nalgebra::DMatrix;

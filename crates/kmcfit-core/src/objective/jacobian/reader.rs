@@ -1,8 +1,8 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::lanes::tall::Piece;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::objective::{Channel, View};
+use crate::simd::tall_qr::Piece;
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::Sensed;
 use crate::simulate::fast::nodal_observations::Accelerations;
 use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
@@ -81,7 +81,7 @@ impl<'a> Reader<'a> {
     /// Takes the readings in the steps `steps`, over which the tangents have just gone, until the `piece` is
     /// full: whether there may be more.
     pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut Piece) -> bool {
-        lanes::run(Read {
+        simd::run(Read {
             reader: self,
             tangents,
             steps,

@@ -1,14 +1,14 @@
 //! Eq. 13 with its coefficients formed eight steps at a time.
 
 use super::padded_loads::places;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::{Adjoint, AdjointEquation};
 
 /// [`AdjointEquation::solve`], to the bit.
 pub(crate) fn solve(equation: &AdjointEquation) -> Adjoint {
     let lists = equation.functions.each_ref().map(|f| &**f);
     let mut z = vec![0.0; lists[0].len()];
-    let first_slope = lanes::run(Sweep {
+    let first_slope = simd::run(Sweep {
         dt: equation.dt,
         lists,
         z: &mut z,
@@ -197,15 +197,15 @@ mod tests {
         };
         let mut noticed = 0;
         for _ in 0..2000 {
-            let [rate, mass] = lanes::tests::hardest(&mut random);
+            let [rate, mass] = simd::tests::hardest(&mut random);
             for ([products, divisions], is_same) in
-                lanes::on_each(|| Both { mass, rate }).into_iter().flatten()
+                simd::on_each(|| Both { mass, rate }).into_iter().flatten()
             {
                 assert!(!is_same || products == divisions, "{mass} {rate}");
                 noticed += usize::from(!is_same);
             }
             // All others are the same.
-            for ([products, divisions], is_same) in lanes::on_each(|| Both {
+            for ([products, divisions], is_same) in simd::on_each(|| Both {
                 mass: 1.3,
                 rate: 0.9,
             })
@@ -215,7 +215,7 @@ mod tests {
                 assert!(is_same && products == divisions);
             }
         }
-        let is_fused = lanes::on_each(|| Both {
+        let is_fused = simd::on_each(|| Both {
             mass: 1.0,
             rate: 1.0,
         })

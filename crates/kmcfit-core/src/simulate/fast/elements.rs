@@ -1,6 +1,6 @@
 //! The responses of the elements in eight lanes.
 
-use crate::lanes::{Arithmetic, Eight, LANES};
+use crate::simd::{Arithmetic, Eight, LANES};
 use crate::system::Term;
 
 /// A response and its derivatives with respect to displacement and velocity.

@@ -1,6 +1,6 @@
 //! Eight neighbouring values of what is known at the nodes or over the steps.
 
-use crate::lanes::{Arithmetic, Eight, LANES, Row, window};
+use crate::simd::{Arithmetic, Eight, LANES, Row, window};
 use crate::system::Stepwise;
 
 /// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.

@@ -4,7 +4,7 @@
 //! before.
 
 use super::padded_loads;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{MIDPOINT, MOST_TERMS, Method, RK4, State, Tableau, Term};
@@ -27,7 +27,7 @@ pub(crate) fn forward(
         Term::CoulombFriction { width } => Some(*width),
         _ => None,
     });
-    lanes::run(Forward {
+    simd::run(Forward {
         equation,
         method,
         kinds,

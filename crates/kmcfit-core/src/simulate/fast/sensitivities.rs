@@ -7,7 +7,7 @@
 //! are ever in memory as a whole.
 
 use super::step_linearisation::{self, StepLinearisation, Wanted};
-use crate::lanes::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simd::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{Device, Excitation, FUNCTIONS, Method, Oscillator};
@@ -164,7 +164,7 @@ impl Tangents {
             excitation,
             motion,
         } = course;
-        lanes::run(Advance {
+        simd::run(Advance {
             equation: EquationOfMotion::new(oscillator, device, excitation, motion.nodes()),
             method: oscillator.method,
             motion,
@@ -248,8 +248,8 @@ impl Kernel for Advance<'_> {
                 }
                 let held = match holds {
                     true => Aligned([
-                        lanes::transposed(arithmetic, &held[0]),
-                        lanes::transposed(arithmetic, &held[1]),
+                        simd::transposed(arithmetic, &held[0]),
+                        simd::transposed(arithmetic, &held[1]),
                     ]),
                     false => *held,
                 };

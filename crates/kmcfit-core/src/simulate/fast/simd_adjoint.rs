@@ -2,7 +2,7 @@
 //! products of a step wait for the step after it.
 
 use super::step_linearisation::{self, StepLinearisation, Wanted};
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::simulate::{Slopes, Trajectory};
 use crate::system::{Device, DeviceTangent, FUNCTIONS, Method, State};
@@ -31,7 +31,7 @@ pub(crate) fn back(
     source: &Trajectory,
     gradient: Slopes,
 ) -> State {
-    lanes::run(Back {
+    simd::run(Back {
         equation,
         method,
         trajectory,

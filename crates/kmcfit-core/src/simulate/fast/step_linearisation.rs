@@ -3,7 +3,7 @@
 use super::elements::with_known;
 use super::padded_loads;
 use super::prefactored::is_constant;
-use crate::lanes::{Arithmetic, Eight, LANES, Row};
+use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{

@@ -4,8 +4,8 @@ use super::continuous_adjoint;
 use super::nodal_observations::{Accelerations, NodalObservations};
 use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
 use super::step_batch::{Layout, Ray, Trials, replay};
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::record::ChannelKind;
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::reference::{self, AdjointEquation};
 use crate::simulate::{Engine, Purpose, Trajectory, least_squares};
 use crate::system::quadrature::trapezoid;
@@ -394,7 +394,7 @@ proptest! {
         let surroundings = crate::system::Surroundings { force: around[0], base: around[1] };
         for first in (0..case.nodes()).step_by(LANES) {
             let nodes = NodalObservations { oscillator, device, states: &states };
-            let seen = lanes::run(Observe(nodes, first, around));
+            let seen = simd::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
                 let place = Place::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;

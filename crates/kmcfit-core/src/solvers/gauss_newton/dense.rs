@@ -1,10 +1,10 @@
 //! The Gauss–Newton subproblem from tangent solves, for functions with few parameters.
 
-use crate::lanes::LANES;
-use crate::lanes::tall::{PIECE, Piece, Triangle};
 use crate::objective::{Channel, Evaluation};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::simd::LANES;
+use crate::simd::tall_qr::{PIECE, Piece, Triangle};
 use crate::solvers::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;

@@ -6,9 +6,9 @@
 
 use super::{Best, lengths, take, trial};
 use crate::dynamics::{Layout, Ray, Trials, is_linear_midpoint, reference, replay};
-use crate::lanes::{LANES, Row};
 use crate::objective::{Evaluation, GradientKind, Weighting};
 use crate::problem::Problem;
+use crate::simd::{LANES, Row};
 use crate::solvers::Point;
 use crate::solvers::point::Work;
 use crate::threads::{self, Companion};

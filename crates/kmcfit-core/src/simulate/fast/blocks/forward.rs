@@ -3,7 +3,7 @@
 use super::LinearDevice;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
-use crate::lanes::{Arithmetic, Kernel, LANES};
+use crate::simd::{Arithmetic, Kernel, LANES};
 use crate::system::State;
 
 /// Everything that one solve needs.

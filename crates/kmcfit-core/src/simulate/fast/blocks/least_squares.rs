@@ -12,7 +12,7 @@ use super::adjoint::{collect, ends};
 use super::forward::starts;
 use super::tile::Tile;
 use super::workspace::{Chart, Ends, Workspace, with_workspace};
-use crate::lanes::{self, Arithmetic, Kernel, LANES};
+use crate::simd::{self, Arithmetic, Kernel, LANES};
 use crate::system::State;
 use crate::threads;
 use std::sync::{Mutex, PoisonError};
@@ -161,7 +161,7 @@ impl LeastSquares<'_> {
         let rest = behind(tiles);
         let charts = both(tiles.split_at(middle), at_once, |tiles| {
             with_workspace(|workspace| {
-                lanes::run(Survey {
+                simd::run(Survey {
                     of,
                     tiles,
                     workspace,
@@ -176,7 +176,7 @@ impl LeastSquares<'_> {
         let parts = ((former, [m.0, c.0, k.0]), (latter, [m.1, c.1, k.1]));
         let harvest = both(parts, at_once, |(legs, gradient)| {
             with_workspace(|workspace| {
-                lanes::run(Descent {
+                simd::run(Descent {
                     of,
                     legs,
                     gradient,

@@ -21,7 +21,7 @@ mod tests;
 mod tile;
 mod workspace;
 
-use crate::lanes::{self, Arithmetic};
+use crate::simd::{self, Arithmetic};
 use crate::simulate::Trajectory;
 use crate::system::{Device, DeviceTangent, Oscillator, State};
 use step::{Coefficients, Constants, Rates};
@@ -60,7 +60,7 @@ impl<'a> LinearDevice<'a> {
             h,
         };
         // Also behind the end of a record that is shorter than the grid.
-        lanes::run(Within(mass)).then_some(device)
+        simd::run(Within(mass)).then_some(device)
     }
 
     /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner
@@ -131,7 +131,7 @@ impl<'a> LinearDevice<'a> {
     /// leaves the finite numbers, the last state is not finite.
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {
-            lanes::run(forward::Forward {
+            simd::run(forward::Forward {
                 device: self,
                 initial,
                 displacement: &mut trajectory.displacement,
@@ -155,7 +155,7 @@ impl<'a> LinearDevice<'a> {
         };
         let parts = [&mut gradient.mass, damping, stiffness].map(|g| &mut g[..nodes]);
         let initial = with_workspace(|workspace| {
-            lanes::run(adjoint::Adjoint {
+            simd::run(adjoint::Adjoint {
                 device: self,
                 displacement: &trajectory.displacement,
                 velocity: &trajectory.velocity,
@@ -175,7 +175,7 @@ impl<'a> LinearDevice<'a> {
 /// the range of numbers.
 struct Within<'a>(&'a [f64]);
 
-impl lanes::Kernel for Within<'_> {
+impl simd::Kernel for Within<'_> {
     type Output = bool;
 
     #[inline(always)]

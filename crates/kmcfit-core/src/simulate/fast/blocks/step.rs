@@ -10,7 +10,7 @@
 //!
 //! with `m_h`, `c_h`, `k_h` the means of the two nodes.
 
-use crate::lanes::{Arithmetic, Eight};
+use crate::simd::{Arithmetic, Eight};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A number, or eight of them.

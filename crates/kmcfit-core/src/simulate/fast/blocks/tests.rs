@@ -1,5 +1,5 @@
 use super::*;
-use crate::lanes::LANES;
+use crate::simd::LANES;
 use crate::simulate::{Engine, reference};
 use crate::system::{Grid, Method, Term};
 
@@ -158,7 +158,7 @@ fn squares_are_motion_and_gradient_in_one() {
 /// A motion and what follows from it, with one arithmetic.
 struct Whole<'a>(&'a Oscillator, &'a Device);
 
-impl lanes::Kernel for Whole<'_> {
+impl simd::Kernel for Whole<'_> {
     type Output = Vec<u64>;
 
     #[inline(always)]
@@ -215,7 +215,7 @@ impl lanes::Kernel for Whole<'_> {
 fn all_arithmetics_give_the_same_bits() {
     for nodes in NODES {
         let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let outputs = lanes::on_each(|| Whole(&oscillator, &device));
+        let outputs = simd::on_each(|| Whole(&oscillator, &device));
         assert!(
             outputs.iter().all(|output| output == &outputs[0]),
             "{nodes}"

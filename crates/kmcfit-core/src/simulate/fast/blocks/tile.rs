@@ -1,6 +1,6 @@
 //! A part of the record cut into blocks, one a lane and half.
 
-use crate::lanes::{self, Arithmetic, LANES, Row};
+use crate::simd::{self, Arithmetic, LANES, Row};
 
 /// Most steps of one lane: what a tile needs then stays in the second cache.
 pub(super) const LONGEST: usize = 512;
@@ -50,7 +50,7 @@ impl Tile {
                 let from = b * self.length + q * LANES;
                 lane.copy_from_slice(&values[from..from + LANES]);
             }
-            *square = lanes::transposed(arithmetic, &lanes);
+            *square = simd::transposed(arithmetic, &lanes);
         }
         let done = self.length - rest.len();
         for (j, row) in rest.iter_mut().enumerate() {
@@ -71,7 +71,7 @@ impl Tile {
         let values = &mut values[self.first..self.first + LANES * self.length];
         let (squares, rest) = rows[..self.length].as_chunks::<LANES>();
         for (q, square) in squares.iter().enumerate() {
-            for (b, row) in lanes::transposed(arithmetic, square).iter().enumerate() {
+            for (b, row) in simd::transposed(arithmetic, square).iter().enumerate() {
                 let from = b * self.length + q * LANES;
                 values[from..from + LANES].copy_from_slice(row);
             }

@@ -2,7 +2,7 @@
 
 use super::step::{Coefficients, Constants, Rates};
 use super::tile::LONGEST;
-use crate::lanes::{Arithmetic, Eight, LANES, Row};
+use crate::simd::{Arithmetic, Eight, LANES, Row};
 use std::cell::RefCell;
 
 /// One row a node.

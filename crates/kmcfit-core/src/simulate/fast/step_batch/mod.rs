@@ -11,7 +11,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-use crate::lanes::{self, LANES, Row};
+use crate::simd::{self, LANES, Row};
 use crate::system::State;
 use std::ops::Range;
 
@@ -168,7 +168,7 @@ impl Trials {
         let costs = halved(&mut self.costs, HALF, &mut no_costs);
         let whole = lengths[usize::from(HALF)..].first_chunk();
         if let (Some(whole), Some(states), Some(costs)) = (whole, states, costs) {
-            lanes::run(rows::Rows::<R, HALF> {
+            simd::run(rows::Rows::<R, HALF> {
                 ray,
                 lengths: (&lengths[0], whole),
                 states,

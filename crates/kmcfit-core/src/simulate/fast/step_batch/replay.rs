@@ -2,7 +2,7 @@
 
 use super::part;
 use super::rows::{Steps, Values};
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 use crate::simulate::Trajectory;
 use crate::system::{Device, State};
 
@@ -22,7 +22,7 @@ pub(crate) fn replay(
         return false;
     }
     let nodes = trajectory.nodes();
-    let ends = lanes::run(Replay {
+    let ends = simd::run(Replay {
         functions: [
             &device.mass,
             &device.coefficients[0],
@@ -81,7 +81,7 @@ impl Kernel for Replay<'_> {
                 for (lane, row) in rows.iter_mut().enumerate() {
                     *row = window(f, lane * part + first + 1);
                 }
-                *ahead = lanes::transposed(arithmetic, &rows);
+                *ahead = simd::transposed(arithmetic, &rows);
             }
             let mut seen = [[[0.0; LANES]; LANES]; 2];
             for j in 0..LANES {
@@ -98,7 +98,7 @@ impl Kernel for Replay<'_> {
                 ends = [seen[0][part - first], seen[1][part - first]];
             }
             for which in 0..2 {
-                let columns = lanes::transposed(arithmetic, &seen[which]);
+                let columns = simd::transposed(arithmetic, &seen[which]);
                 for (lane, column) in columns.iter().enumerate() {
                     let from = lane * part + first;
                     let count = LANES.min(part - first).min(nodes.saturating_sub(from));

@@ -1,7 +1,7 @@
 //! Rows of devices, one a lane, and the steps that they take.
 
 use super::{Ray, States, part};
-use crate::lanes::{Arithmetic, Eight, Kernel, Row};
+use crate::simd::{Arithmetic, Eight, Kernel, Row};
 
 /// A row of devices, of which four lanes count, and `R` whole ones.
 pub(super) struct Rows<'a, const R: usize, const HALF: bool> {

@@ -5,7 +5,7 @@
 //! until it is seen: the columns are taken in the order in which they begin.
 
 use super::{Column, HIGH, LANES, PIECE, Piece, Row};
-use crate::lanes::{self, Arithmetic, Eight, Kernel};
+use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
 /// Columns that are reflected at once.
@@ -58,7 +58,7 @@ impl Triangle {
     /// Adds the rows of a piece, with `D` and `d` for each; what the piece holds then means nothing.
     pub fn add_weighted(&mut self, piece: &mut Piece, roots: &[f64], right: &[f64]) {
         let places = self.begin(piece);
-        lanes::run(Weigh {
+        simd::run(Weigh {
             columns: &mut piece.columns[..places],
             roots,
         });
@@ -92,7 +92,7 @@ impl Triangle {
         for column in columns.iter_mut() {
             column.as_flattened_mut()[right.len()..].fill(0.0);
         }
-        lanes::run(Reflect {
+        simd::run(Reflect {
             triangle: self,
             piece: columns,
         });
@@ -310,7 +310,7 @@ impl Reflector<'_> {
         for j in 0..J {
             rows[j] = sums[j].row();
         }
-        let lanes = lanes::transposed(arithmetic, &rows);
+        let lanes = simd::transposed(arithmetic, &rows);
         let mut sum = Eight::load(arithmetic, &lanes[0]);
         for lane in &lanes[1..] {
             sum += Eight::load(arithmetic, lane);

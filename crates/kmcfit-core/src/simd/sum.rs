@@ -169,12 +169,12 @@ mod tests {
             }
             let one_by_one = |values: &[f64]| values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             let difference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-            let sizes = crate::lanes::on_each(|| LargestDifference::<false>(&a, &a));
+            let sizes = crate::simd::on_each(|| LargestDifference::<false>(&a, &a));
             assert!(
                 sizes.iter().all(|size| *size == one_by_one(&a)),
                 "{sizes:?}"
             );
-            let sizes = crate::lanes::on_each(|| LargestDifference::<true>(&a, &b));
+            let sizes = crate::simd::on_each(|| LargestDifference::<true>(&a, &b));
             assert!(
                 sizes.iter().all(|size| *size == one_by_one(&difference)),
                 "{sizes:?}"

@@ -11,7 +11,7 @@
 
 mod portable;
 pub(crate) mod sum;
-pub(crate) mod tall;
+pub(crate) mod tall_qr;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
