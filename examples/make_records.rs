@@ -4,9 +4,10 @@
 //! `cargo run --example make_records -- data`
 
 use kmcfit::results::write_whole;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
-    Surroundings, Term, Trajectory, reference,
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -136,7 +136,7 @@ fn the_beginning_of_a_long_record() {
     let long = [("functions:\n", "grid: {nodes: 40001}\nfunctions:\n")];
     let (_, model) = model("duffing", &long);
     let (_, fit) = run(&model, None, u64::MAX);
-    assert_eq!(fit.rungs[0].name, "beginning of the record");
+    assert_eq!(fit.rungs[0].start.name(), "beginning of the record");
     again_and_again("duffing", &long, 1);
 }
 

@@ -86,8 +86,8 @@ fn message(moment: &Moment, number: u32) -> String {
     ];
     parts.extend(violation.map(|violation| format!("violation {violation:.0e}")));
     if number > 1 {
-        let from = if rung.is_empty() { "" } else { ": " };
-        parts.push(format!("search {number}{from}{rung}"));
+        let from = rung.map_or(String::new(), |start| format!(": {}", start.name()));
+        parts.push(format!("search {number}{from}"));
     }
     parts.join("  ")
 }
@@ -95,7 +95,7 @@ fn message(moment: &Moment, number: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::Row;
+    use kmcfit_core::internals::solvers::{Row, StartStrategy};
 
     #[test]
     fn the_line_says_what_there_is_to_say() {
@@ -109,7 +109,7 @@ mod tests {
         };
         let mut moment = Moment {
             row: &row,
-            rung: "equation error",
+            rung: Some(StartStrategy::EquationError),
             violation: None,
         };
         let line = "J/J0 2.500e-1  G\u{b2}/G0\u{b2} 1.000e-3";
@@ -121,7 +121,7 @@ mod tests {
             message(&moment, 2),
             format!("{line}  search 2: equation error")
         );
-        moment.rung = "";
+        moment.rung = None;
         assert_eq!(message(&moment, 2), format!("{line}  search 2"));
     }
 }

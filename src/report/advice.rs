@@ -4,8 +4,8 @@ use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultD
 use crate::digits::significant;
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
-use kmcfit_core::internals::dynamics::Method;
-use kmcfit_core::internals::solvers::{Solver, Status};
+use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
+use kmcfit_core::internals::system::Method;
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;
@@ -13,8 +13,6 @@ const PATTERN: f64 = 1e-3;
 const COARSE: f64 = 1e-3;
 /// A free record that is matched to less, per cent, may be none.
 const HARDLY: f64 = 50.0;
-/// Name of the rung that starts from the model's start values.
-const FROM_START_VALUES: &str = "start values";
 /// So many things to try next are enough.
 const MOST: usize = 3;
 
@@ -184,7 +182,10 @@ fn about_residuals(document: &ResultDocument) -> Option<String> {
             && c.fit_percent < EXACT
             && c.whiteness_p_value.is_some_and(|p| p < PATTERN)
     };
-    let tried = document.rungs.iter().any(|r| r.start != FROM_START_VALUES);
+    let tried = document
+        .rungs
+        .iter()
+        .any(|r| r.start != StartStrategy::StartValues.name());
     let is_simulated = document.model.method != Solver::EquationError.name();
     let elsewhere = match tried || !is_simulated {
         true => "",

@@ -18,7 +18,6 @@ use super::{findings, measured};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use kmcfit_core::internals::assessment::{POOR, constant_probability, diagnostics, standard_error};
-use kmcfit_core::internals::dynamics::{Excitation, Term};
 use kmcfit_core::internals::functions::basis::physical_powers;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::identifiability::{
@@ -28,6 +27,7 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Fit, Optimality, PathPoint, Rung, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
 };
+use kmcfit_core::internals::system::{Excitation, Term};
 use std::collections::BTreeMap;
 use std::io;
 use std::time::Duration;
@@ -91,7 +91,7 @@ impl FittedModel<'_> {
             model: self.model_summary(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status.name().into(),
-                reason: fit.outcome.reason.clone(),
+                reason: fit.outcome.reason.to_string(),
             },
             cost: CostSummary {
                 initial: fit.initial_cost,
@@ -433,7 +433,7 @@ fn optimality_summary(measured: &Optimality) -> OptimalitySummary {
 fn rung_summary(rung: &Rung) -> RungSummary {
     let known = |x: f64| x.is_finite().then_some(x);
     RungSummary {
-        start: rung.name.into(),
+        start: rung.start.name().into(),
         initial_cost: known(rung.initial_cost),
         cost: known(rung.cost),
         iterations: rung.iterations,

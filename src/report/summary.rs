@@ -6,7 +6,7 @@ use super::document::ChannelSummary;
 use super::document::{Prediction, ResultDocument};
 use crate::digits::significant;
 use kmcfit_core::internals::identifiability::Verdict;
-use kmcfit_core::internals::solvers::CONTINUED;
+use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
 /// The outcome, the misfit and the functions, as text.
@@ -245,7 +245,10 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
         .iter()
         .map(|rung| rung.iterations)
         .sum::<u64>();
-    let starts = document.rungs.iter().filter(|rung| rung.start != CONTINUED);
+    let starts = document
+        .rungs
+        .iter()
+        .filter(|rung| rung.start != StartStrategy::Continued.name());
     let starts = count(starts.count(), "start");
     match estimates_sigma(document) {
         true => format!("{last} after {all} from {starts}"),

@@ -2,9 +2,7 @@
 
 use crate::constraints::{Constraints, RowGroup};
 use crate::functions::{Functions, Penalty, Variation};
-pub(crate) use crate::record::LONG;
-pub use crate::record::{BaseMotion, Drive, Experiment, Waveform};
-use crate::record::{Channel, Weighting};
+use crate::record::{Channel, Experiment, Weighting};
 use crate::system::Oscillator;
 
 /// What is fitted: an oscillator, how its functions are represented, and the records.

@@ -3,12 +3,14 @@
 mod common;
 
 use common::reference::{Inputs, motion};
-use kmcfit_core::internals::dynamics::quadrature::trapezoid_weights;
-use kmcfit_core::internals::dynamics::{
-    Device, DeviceTangent, Engine, Excitation, Grid, Method, Oscillator, Purpose, State, Term,
-    Trajectory, continuous_adjoint, reference,
-};
 use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::simulate::{
+    Engine, Purpose, Trajectory, continuous_adjoint, reference,
+};
+use kmcfit_core::internals::system::quadrature::trapezoid_weights;
+use kmcfit_core::internals::system::{
+    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term,
+};
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
 

@@ -4,9 +4,10 @@
 mod common;
 
 use common::closed_form::constant_coefficients;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
-    Surroundings, Term, Trajectory, reference,
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
 };
 use std::f64::consts::PI;
 

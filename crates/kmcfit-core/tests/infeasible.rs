@@ -4,7 +4,6 @@
 mod common;
 
 use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
@@ -13,6 +12,7 @@ use kmcfit_core::internals::qp::project;
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Solver, Start, Status, Stopping, fit,
 };
+use kmcfit_core::internals::system::{Device, Method};
 
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;
@@ -93,7 +93,7 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
         // Without an iteration every program is refused.
         let found = run(&problem, solver, 0);
         assert_eq!(found.outcome.status, Status::Stalled, "{solver:?}");
-        assert!(found.outcome.reason.contains("solver stalled"));
+        assert!(found.outcome.reason.to_string().contains("solver stalled"));
         assert!(problem.constraints.hold(&found.best.parameters, TOLERANCE));
         keeps_the_best_point(&problem, &found);
         // A start within the constraints may be as low, but nothing is lower than the minimum.

@@ -2,13 +2,14 @@
 
 mod common;
 
-use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
 };
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 
 /// Nodes from one reading to the next.
 const STRIDE: usize = 20;
@@ -60,7 +61,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     };
     let start = problem.functions.start();
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.start.name()).collect();
     println!("{:#?}", found.rungs);
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
     let silence = problem.misfit_of_silence();
@@ -155,7 +156,7 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     let start = problem.start();
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
     let alone = fit_from(&problem, &start, &settings).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.name).collect();
+    let names: Vec<&str> = found.rungs.iter().map(|rung| rung.start.name()).collect();
     assert_eq!(names, ["beginning of the record"]);
     // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
     assert!(
@@ -185,7 +186,7 @@ fn a_silent_beginning_says_nothing() {
     let (problem, truth) = long_record(5000);
     let start = problem.start();
     let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
-    assert_eq!(found.rungs[0].name, "start values");
+    assert_eq!(found.rungs[0].start.name(), "start values");
     for (p, truth) in found.best.parameters.iter().zip(truth) {
         assert!((p - truth).abs() <= 1e-9 * truth, "{p} {truth}");
     }
@@ -227,6 +228,6 @@ fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
         interrupt: None,
     };
     let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
-    let names: Vec<&str> = found.rungs.iter().map(|r| r.name).collect();
+    let names: Vec<&str> = found.rungs.iter().map(|r| r.start.name()).collect();
     assert!(names.contains(&"growing horizon"), "{names:?}");
 }

@@ -4,12 +4,12 @@
 mod common;
 
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Start, Status, Stopping, fit};
+use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

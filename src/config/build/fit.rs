@@ -71,7 +71,7 @@ pub(super) fn measurements(
             &format!("experiments[{}]", place.unwrap_or_default()),
             "the method `equation-error` cannot tell the motion from these readings",
         )
-        .found(unsuited.reason)
+        .found(unsuited.reason.to_string())
         .expected("readings from which displacement, velocity and acceleration follow")
     })?;
     warnings.extend(measurements.remarks(problem));

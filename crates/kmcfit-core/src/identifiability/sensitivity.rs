@@ -2,9 +2,9 @@
 
 use super::directions::Directions;
 use super::linear::right_svd;
-use crate::dynamics::{Slopes, Trajectory};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simulate::{Slopes, Trajectory};
 use nalgebra::DMatrix;
 use std::ops::Range;
 

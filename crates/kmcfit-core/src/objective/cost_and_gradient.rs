@@ -1,8 +1,8 @@
 //! The cost and its gradient and nothing else.
 
 use crate::functions::Design;
-use crate::objective::Channel;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment};
 use crate::simulate::{Breakdown, least_squares};
 use crate::system::Excitation;
 

@@ -10,7 +10,6 @@ mod sizes;
 mod verify;
 mod view;
 
-pub use crate::record::{Channel, Loss, Sensor, Weighting, integral_over};
 pub use gradient::{Gradient, GradientKind};
 pub use refine::Refined;
 pub use sizes::state_sizes;
@@ -103,20 +102,11 @@ impl Problem {
         self.evaluate_for(Purpose::Estimation, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] one step and one reading after the other, in the paper's order of
-    /// operations: its run depends on every bit.
+    /// [`Problem::evaluate_into`] by the engine of a [`Purpose`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
-    pub fn evaluate_in_order_into(
-        &self,
-        theta: &[f64],
-        evaluation: &mut Evaluation,
-    ) -> Result<(), Breakdown> {
-        self.evaluate_for(Purpose::Reproduction, theta, evaluation)
-    }
-
-    fn evaluate_for(
+    pub fn evaluate_for(
         &self,
         purpose: Purpose,
         theta: &[f64],

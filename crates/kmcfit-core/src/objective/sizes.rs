@@ -2,8 +2,8 @@
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
-use crate::problem::{Experiment, LONG, Problem};
-use crate::record::ChannelKind;
+use crate::problem::Problem;
+use crate::record::{ChannelKind, Experiment, LONG};
 use crate::signal::Spectrum;
 use crate::simd::sum::{dot, largest};
 use crate::simulate::Trajectory;

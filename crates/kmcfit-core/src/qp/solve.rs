@@ -6,7 +6,7 @@ use super::{Candidate, Kkt, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
 /// How a program ended, by kmcfit's own judgement of the point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ConicStatus {
     /// The residuals of the optimality conditions are those of a solution ([`Kkt::is_solution`]).
     Solved,

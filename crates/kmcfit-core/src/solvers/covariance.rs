@@ -1,6 +1,6 @@
 //! How well the readings determine the parameters, at one point.
 
-use super::gauss_newton::weighted_jacobian;
+use super::linearization::weighted_jacobian;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use nalgebra::DMatrix;

@@ -1,58 +1,23 @@
 //! The loop around every solver, run by argmin's executor.
 
-use super::ahead::Ahead;
-use super::gauss_newton::GaussNewton;
-use super::keep::{Bits, Memory, Standing, Watch};
-use super::lbfgs::Lbfgs;
-use super::optimality::measured;
-use super::outcome::{Outcome, Status};
-use super::point::{Counts, Point, Work};
-use super::projected_gradient::ProjectedGradient;
-use super::recorder::{Recorder, Reference, Row, Snapshot, ratio};
-use super::steepest_descent::SteepestDescent;
-use super::{Descend, FitSettings, Optimality, Rung, Solver, Step, Timings, equation_error};
-use crate::dynamics::{Breakdown, Cause};
-use crate::objective::{Channel, Evaluation, GradientKind};
+use super::checkpoint::{Bits, Memory, Standing, Watch};
+use super::counts::Counts;
+use super::evaluator::Work;
+use super::fit::{Fit, measured};
+use super::history::{Recorder, Reference, Row};
+use super::iterate::Point;
+use super::methods::{Step, StepRule, equation_error, step_rule};
+use super::reason::Reason;
+use super::settings::{FitSettings, Solver};
+use super::termination::{Outcome, Status};
+use super::timings::Timings;
+use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
+use crate::record::Channel;
+use crate::simulate::{Breakdown, Cause};
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-
-/// A finished fit: the best point, how it was reached and how it ended.
-#[derive(Debug, Clone)]
-pub struct Fit {
-    /// The point with the lowest cost.
-    pub best: Point,
-    /// Cost at the start values of the functions, whatever start the search took.
-    pub initial_cost: f64,
-    /// Cost at the point from which the search set out.
-    pub started_from: f64,
-    /// `G^2` at the start values.
-    pub initial_norm_squared: f64,
-    /// One row per iteration.
-    pub history: Vec<Row>,
-    /// Motions on the way.
-    pub snapshots: Vec<Snapshot>,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Work done.
-    pub counts: Counts,
-    /// What that work took; the rest of `elapsed` is bookkeeping.
-    pub timings: Timings,
-    /// Wall-clock time.
-    pub elapsed: Duration,
-    /// The starts that were tried, in order.
-    pub rungs: Vec<Rung>,
-    /// The first-order condition at the best point, once it is measured.
-    pub optimality: Option<Optimality>,
-}
-
-impl Fit {
-    /// `J / J0`.
-    pub fn cost_ratio(&self) -> f64 {
-        ratio(self.best.evaluation.cost, self.initial_cost)
-    }
-}
 
 /// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
 /// search goes on from there. `reference` is what the
@@ -110,34 +75,31 @@ pub(super) fn search_prepared(
     }
     let settings = &settings;
     let kept = watch.begin_search();
-    let mut method = method(settings.solver);
+    let mut method = step_rule(settings.solver);
     if let Some(spare) = prepared.spare {
         method.recycle(spare);
     }
-    std::thread::scope(|scope| {
-        let run = Run {
-            method,
-            settings,
-            reference,
-            at_start: prepared.evaluation,
-            clock: Instant::now(),
-            timings: Timings::default(),
-            progress: Err(NOT_STARTED),
-            outcome: None,
-            kept,
-            before: Before::default(),
-            watch,
-            ahead: Ahead::new(scope, problem, settings),
-        };
-        let result = Executor::new(problem, run)
-            .configure(|state: SearchState| state.param(prepared.parameters))
-            .ctrlc(false)
-            .timer(false)
-            .run()
-            .expect("Run reports by outcome and never returns an error to the executor");
-        let counts = Counts::of(&result.problem);
-        result.solver.finish(counts)
-    })
+    let run = Run {
+        method,
+        settings,
+        reference,
+        at_start: prepared.evaluation,
+        clock: Instant::now(),
+        timings: Timings::default(),
+        progress: Err(NOT_STARTED),
+        outcome: None,
+        kept,
+        before: Before::default(),
+        watch,
+    };
+    let result = Executor::new(problem, run)
+        .configure(|state: SearchState| state.param(prepared.parameters))
+        .ctrlc(false)
+        .timer(false)
+        .run()
+        .expect("Run reports by outcome and never returns an error to the executor");
+    let counts = Counts::of(&result.problem);
+    result.solver.finish(counts)
 }
 
 /// One search from `start` alone, without the ladder of [`fit`](super::fit): for fits whose start is
@@ -154,19 +116,9 @@ pub fn fit_from(
     Ok(measured(problem, fit, settings))
 }
 
-fn method(solver: Solver) -> Box<dyn Descend> {
-    match solver {
-        Solver::SteepestDescent => Box::<SteepestDescent>::default(),
-        Solver::Lbfgs { memory } => Box::new(Lbfgs::new(memory)),
-        Solver::ProjectedGradient => Box::<ProjectedGradient>::default(),
-        Solver::GaussNewton => Box::<GaussNewton>::default(),
-        Solver::EquationError => unreachable!("it takes no steps"),
-    }
-}
-
 /// One method at work, seen by argmin as a solver.
-struct Run<'a, 'w, 's, 'p> {
-    method: Box<dyn Descend>,
+struct Run<'a, 'w> {
+    method: Box<dyn StepRule>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
     /// The evaluation at the start, if there is one already.
@@ -179,8 +131,6 @@ struct Run<'a, 'w, 's, 'p> {
     kept: Option<(Vec<Row>, Standing)>,
     before: Before,
     watch: &'a mut Watch<'w>,
-    /// Held by the work while there is some.
-    ahead: Option<Ahead<'s, 'p>>,
 }
 
 /// What a search did before it was ended from outside.
@@ -207,7 +157,7 @@ const NOT_STARTED: Breakdown = Breakdown {
 /// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl<'p> Run<'_, '_, '_, 'p> {
+impl Run<'_, '_> {
     fn start(&mut self, work: &mut Work, parameters: Vec<f64>) -> Result<Progress, Breakdown> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
@@ -244,10 +194,15 @@ impl<'p> Run<'_, '_, '_, 'p> {
             true => work.motions_again(parameters).ok(),
             false => None,
         };
-        let recorder = Recorder::recalled(rows, &standing, motions)?;
-        let point = work.again(standing.parameters.0, standing.fingerprint)?;
+        if rows.len() as u64 != standing.iterations {
+            return None;
+        }
+        let snapshots = standing.snapshots.into_iter();
+        let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
+        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
+        let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
-            && !(self.method).recall(standing.memory, work.problem(), &point)
+            && !(self.method).recall(standing.memory, work.problem(), &mut point)
         {
             return None;
         }
@@ -287,15 +242,13 @@ impl<'p> Run<'_, '_, '_, 'p> {
             parameters: Bits(point.parameters.clone()),
             fingerprint: point.fingerprint(),
             memory: match outcome {
-                None => self.method.memory(),
+                None => self.method.memory(point),
                 Some(_) => Memory::Nothing,
             },
-            references: Bits(vec![
-                recorder.initial_cost,
-                recorder.started_from,
-                recorder.initial_norm_squared,
-            ]),
-            snapshots: recorder.snapshot_points(),
+            references: Bits(recorder.references()),
+            snapshots: (recorder.snapshot_points())
+                .map(|(iteration, at)| (iteration, Bits(at.to_vec())))
+                .collect(),
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
             elapsed: self.before.elapsed + self.clock.elapsed(),
@@ -324,7 +277,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
             Step::Moved {
                 point,
                 length,
-                hindered,
+                limited,
             } => {
                 progress
                     .recorder
@@ -339,7 +292,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
                         Some(worst.relative.max(0.0))
                     });
                     let stopping = &self.settings.stopping;
-                    self.outcome = stopping.after(row, previous_cost, hindered);
+                    self.outcome = stopping.after(row, previous_cost, limited);
                 }
             }
         }
@@ -351,23 +304,20 @@ impl<'p> Run<'_, '_, '_, 'p> {
     /// The outcome of a search that is over before its first iteration.
     fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
         let cost = self.progress.as_ref().ok()?.point.evaluation.cost;
-        let converged = |reason: &str| Some(Outcome::new(Status::Converged, reason));
+        let converged = |reason| Some(Outcome::new(Status::Converged, reason));
         if problem.is_some_and(|p| p.parameters() == 0) {
-            return converged("there is nothing to fit: every function is fixed");
+            return converged(Reason::NoParameters);
         }
         if cost == 0.0 {
             // Beside an infinite sigma, which is what squares beyond 1e308 come to, every residual is zero.
             let infinite = |c: &Channel| c.weighting().sigma(0).is_some_and(|s| !s.is_finite());
             if problem.is_some_and(|p| p.channels().any(infinite)) {
-                let reason = "the squares of the readings leave the range of numbers: give them in a larger unit";
-                return Some(Outcome::new(Status::Failed, reason));
+                return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
             // Squares of readings below 1e-154 are zero.
             return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {
-                true => converged(
-                    "there is nothing to explain: the readings, or their squares, are zero",
-                ),
-                false => converged("the start fits exactly"),
+                true => converged(Reason::ZeroReadings),
+                false => converged(Reason::ExactStart),
             };
         }
         self.settings.stopping.out_of_iterations(0)
@@ -376,14 +326,11 @@ impl<'p> Run<'_, '_, '_, 'p> {
     fn ended_from_outside(&self) -> Option<Outcome> {
         let flag = self.settings.interrupt.as_ref();
         if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            let reason = "asked to stop; the best point so far is kept";
-            return Some(Outcome::new(Status::Interrupted, reason));
+            return Some(Outcome::new(Status::Interrupted, Reason::Interrupted));
         }
         let limit = self.settings.stopping.limit?;
-        (self.elapsed() >= limit).then(|| {
-            let reason = format!("the limit of {} s is reached", limit.as_secs_f64());
-            Outcome::new(Status::TimeLimit, reason)
-        })
+        let is_over = self.elapsed() >= limit;
+        is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
     fn finish(mut self, counts: Counts) -> Result<Fit, Breakdown> {
@@ -402,9 +349,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
             initial_norm_squared: recorder.initial_norm_squared,
             history: recorder.rows,
             snapshots: recorder.snapshots,
-            outcome: self
-                .outcome
-                .unwrap_or_else(|| Outcome::new(Status::Failed, "the search ended without a word")),
+            outcome: self.outcome.expect("a search ends with an outcome"),
             counts: self.before.counts + counts,
             timings: self.before.timings + self.timings,
             elapsed,
@@ -423,7 +368,7 @@ impl<'p> Run<'_, '_, '_, 'p> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -434,17 +379,15 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> 
         mut state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
-        let mut work = Work::new(problem, self.ahead.take(), self.settings);
+        let mut work = Work::new(problem, self.settings);
         match self.recalled(&work) {
             Some(progress) => {
                 self.at_start = None;
                 self.progress = Ok(progress);
-                self.ahead = work.ahead;
             }
             None => {
                 self.progress = self.start(&mut work, parameters);
                 self.timings += work.timings;
-                self.ahead = work.ahead;
                 self.outcome = self.nothing_to_do(problem.problem);
             }
         }
@@ -456,19 +399,18 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_, '_, 'p> 
         problem: &mut argmin::core::Problem<&'p Problem>,
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), Error> {
-        let mut work = Work::new(problem, self.ahead.take(), self.settings);
+        let mut work = Work::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
-        self.ahead = work.ahead;
         self.keep(Counts::of(problem));
         Ok((self.view(state), None))
     }
 
     fn terminate(&mut self, _state: &SearchState) -> TerminationStatus {
         match (&self.outcome, &self.progress) {
-            (Some(outcome), _) => {
-                TerminationStatus::Terminated(TerminationReason::SolverExit(outcome.reason.clone()))
-            }
+            (Some(outcome), _) => TerminationStatus::Terminated(TerminationReason::SolverExit(
+                outcome.reason.to_string(),
+            )),
             (None, Err(breakdown)) => {
                 TerminationStatus::Terminated(TerminationReason::SolverExit(breakdown.to_string()))
             }

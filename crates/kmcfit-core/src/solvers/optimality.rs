@@ -4,18 +4,21 @@
 //! linearised once more at the point that is returned, and solved under its constraints; how much of J that solution promises is
 //! what the point is short of a minimum.
 
-use super::gauss_newton::{linearise_at, response_rounding};
-
-use super::{Fit, FitSettings, Outcome, Point, Row, Solver, Status};
+use super::iterate::Point;
+use super::linearization::{Linearization, linearise};
+use super::reason::{ConditionFailure, Reason};
+use super::termination::{Outcome, Status};
+use super::timings::Timings;
 use crate::constraints::TOLERANCE;
 use crate::host;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Solution, Subproblem};
-use std::time::Instant;
+use crate::qp::{Solution, Subproblem};
 
 /// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
 /// measurements.
 const EXACT: f64 = 1e-20;
+/// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
+const MOTION_ROUNDING: f64 = 1000.0;
 /// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
 const BYTES_PER_NODE: u64 = 4000;
 
@@ -62,24 +65,15 @@ impl Optimality {
             && self.feasibility <= TOLERANCE
     }
 
-    /// Which part of the condition does not hold.
-    fn failure(&self) -> String {
-        let Self {
-            stationarity,
-            feasibility,
-            complementarity,
-            tolerance,
-            ..
-        } = self;
-        if *feasibility > TOLERANCE {
-            return format!("a constraint is violated by {feasibility:.1e} of its scale");
+    /// The part of the condition that does not hold.
+    fn failure(&self) -> ConditionFailure {
+        if self.feasibility > TOLERANCE {
+            return ConditionFailure::Violation(self.feasibility);
         }
-        if *complementarity > *tolerance {
-            return format!(
-                "moving to its bounds promises to lower J by a fraction of {complementarity:.1e}"
-            );
+        if self.complementarity > self.tolerance {
+            return ConditionFailure::Complementarity(self.complementarity);
         }
-        format!("the linearised cost can be lowered by a fraction of {stationarity:.1e}")
+        ConditionFailure::Stationarity(self.stationarity)
     }
 
     /// The cost of which shares are taken: J, or 1e-12 of the misfit of zero response where J is less. A fit whose residuals
@@ -113,7 +107,13 @@ impl Optimality {
         if !host::has_memory(BYTES_PER_NODE.saturating_mul(nodes as u64)) {
             return None;
         }
-        let (mut sub, _) = linearise_at(problem, point, &mut super::Timings::default());
+        let (mut sub, _) = linearise(
+            problem,
+            &point.parameters,
+            &point.evaluation,
+            &Linearization::Fresh,
+            &mut Timings::default(),
+        );
         let scales = point.relative_metric(problem);
         for (d, s) in sub.proximal.iter_mut().zip(&scales) {
             *d = cost * s;
@@ -136,6 +136,13 @@ impl Optimality {
             tolerance,
         })
     }
+}
+
+/// A change of the cost that is within the rounding of the response, which changes a sum of squared residuals by their
+/// product.
+pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
+    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
+    2.0 * rounding * cost.sqrt() + rounding * rounding
 }
 
 /// The minimum of a linearised problem.
@@ -181,47 +188,14 @@ fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
     2.0 * rows.map(distance).sum::<f64>()
 }
 
-/// `fit` with its first-order condition measured, and `converged` taken back where it does not hold.
-///
-/// A fit that ended by a limit on `J / J0` or `G^2 / G0^2` did what was asked of it, whether there is a minimum or not.
-/// The work is not counted: it is no part of the search.
-pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) -> Fit {
-    let status = fit.outcome.status;
-    let cost = fit.best.evaluation.cost;
-    let is_asked = |row: &Row| settings.stopping.ratios_met(row).is_some();
-    // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
-    let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
-    let is_measurable = cost > 0.0 && cost.is_finite();
-    // A fit that has done what it was asked for claims no minimum, and linearising takes time and memory.
-    let is_claimed = status == Status::Converged && !fit.history.last().is_some_and(is_asked);
-    if !is_search || !is_measurable || !is_claimed {
-        return fit;
-    }
-    let clock = Instant::now();
-    let tolerance = settings.stopping.tolerance.unwrap_or(0.0);
-    fit.optimality = Optimality::at(problem, &fit.best, tolerance.max(Optimality::LEAST));
-    fit.outcome = judged(fit.outcome, fit.optimality.as_ref());
-    let took = clock.elapsed();
-    fit.timings.linear_algebra += took;
-    fit.elapsed += took;
-    fit
-}
-
 /// A `converged` that asserts a minimum, or `stalled` where the first-order condition contradicts it.
 pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outcome {
-    let Outcome { reason, .. } = &outcome;
-    match optimality {
-        Some(optimality) if optimality.holds() => outcome,
-        Some(optimality) => Outcome::new(
-            Status::Stalled,
-            format!("{reason}; but this is no minimum: {}", optimality.failure()),
-        ),
-        None => Outcome::new(
-            Status::Stalled,
-            format!(
-                "{reason}; whether this is a minimum could not be measured: {}",
-                ConicStatus::Stalled.sentence()
-            ),
-        ),
+    if optimality.is_some_and(Optimality::holds) {
+        return outcome;
     }
+    let reason = Reason::NoMinimum {
+        met: Box::new(outcome.reason),
+        failure: optimality.map(Optimality::failure),
+    };
+    Outcome::new(Status::Stalled, reason)
 }

@@ -1,14 +1,18 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
+use super::checkpoint::Watch;
+use super::counts::Counts;
 use super::executor::search;
-use super::gauss_newton::{linearisation_tangents, linearise_at};
-use super::ladder::climb;
-use super::optimality::measured;
-use super::timings::timed;
-use super::{Counts, Fit, FitSettings, Outcome, Row, Rung, Status, Timings, Watch};
-use crate::dynamics::Breakdown;
-use crate::objective::Channel;
+use super::fit::{Fit, Rung, measured};
+use super::history::Row;
+use super::iterate::Point;
+use super::linearization::{Linearization, linearisation_tangents, linearise};
+use super::settings::FitSettings;
+use super::start_strategy::climb;
+use super::termination::{Outcome, Status};
+use super::timings::{Timings, timed};
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
@@ -99,26 +103,6 @@ impl Problem {
         }
         problem
     }
-
-    /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
-    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
-    pub fn largest_chi_square(&self) -> Option<f64> {
-        let known = self.channels().all(|c| c.weighting().is_sigma());
-        known.then(|| largest_chi_square(self.reading_count()))
-    }
-}
-
-impl Channel {
-    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
-    pub fn largest_chi_square(&self) -> Option<f64> {
-        let known = self.weighting().is_sigma();
-        known.then(|| largest_chi_square(self.len()))
-    }
-}
-
-fn largest_chi_square(readings: usize) -> f64 {
-    let n = readings as f64;
-    n + 2.0 * (2.0 * n).sqrt()
 }
 
 /// Fits `problem` for a path of factors on the penalties `which`, each from its neighbour, and once
@@ -319,7 +303,13 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
 
 /// Trace of the matrix that takes the readings to their fitted values, by random signs.
 fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
-    let (mut sub, readings) = linearise_at(problem, &found.best, timings);
+    let Point {
+        parameters,
+        evaluation,
+        ..
+    } = &found.best;
+    let fresh = Linearization::Fresh;
+    let (mut sub, readings) = linearise(problem, parameters, evaluation, &fresh, timings);
     // The proximal term of a fit that has ended is gone.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();

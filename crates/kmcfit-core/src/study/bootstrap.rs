@@ -13,9 +13,9 @@ use super::functional::Linear;
 use super::parallel::map;
 use super::refit::settings;
 use super::simulate::{normal, sigmas, stream, with_readings};
-use crate::dynamics::Breakdown;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 use crate::solvers::{Status, fit_from};
 use nalgebra::DMatrix;
 use rand::RngExt;
@@ -69,7 +69,7 @@ pub fn bootstrap(
             Err(breakdown) => Err(breakdown.to_string()),
             Ok(fit) => match fit.outcome.status {
                 Status::Converged | Status::Completed => Ok(fit.best.parameters),
-                _ => Err(fit.outcome.reason),
+                _ => Err(fit.outcome.reason.to_string()),
             },
         }
     };

@@ -3,8 +3,9 @@
 mod moving;
 mod reader;
 
-use super::{Channel, Evaluation, View};
-use crate::problem::{Experiment, LONG, Problem};
+use super::{Evaluation, View};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment, LONG};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
 use crate::simd::tall_qr::Piece;
@@ -222,8 +223,9 @@ fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<
 mod tests {
     use super::*;
     use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
-    use crate::objective::{GradientKind, Weighting};
+    use crate::objective::GradientKind;
     use crate::record::ChannelKind;
+    use crate::record::Weighting;
     use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
 
     const NODES: usize = 70;

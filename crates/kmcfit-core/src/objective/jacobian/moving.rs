@@ -1,7 +1,7 @@
 //! Which functions change along which parameter, tile by tile.
 
 use crate::functions::{Design, Functions, Runs};
-use crate::problem::Experiment;
+use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
 

@@ -1,6 +1,7 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::objective::{Channel, View};
+use crate::objective::View;
+use crate::record::Channel;
 use crate::simd::tall_qr::Piece;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::Sensed;

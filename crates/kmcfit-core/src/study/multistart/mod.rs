@@ -204,7 +204,7 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
                 iterations: fit.history.len(),
             }),
             status: fit.outcome.status,
-            reason: fit.outcome.reason,
+            reason: fit.outcome.reason.to_string(),
         },
     }
 }

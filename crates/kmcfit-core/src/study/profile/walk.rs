@@ -2,9 +2,9 @@
 
 use super::{End, FAR, Mark, Profile, ProfileSettings, Verdict};
 use crate::constraints::RowGroup;
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::simulate::Breakdown;
 use crate::solvers::{Point, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
@@ -134,7 +134,7 @@ impl<'a> Walk<'a> {
             .ok_or_else(|| "the constraints do not allow the value".to_owned())?;
         let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
         match found.outcome.status {
-            Status::Infeasible | Status::Failed => Err(found.outcome.reason),
+            Status::Infeasible | Status::Failed => Err(found.outcome.reason.to_string()),
             // A step that leads out of the valley is too long, and says nothing of its walls.
             _ if self.rise(found.best.evaluation.cost) > LOST * self.how.quantile => {
                 Err("no fit near the optimum was found with the number held there".to_owned())

@@ -1,0 +1,227 @@
+//! Which constraints are active at a point, and how hard the data push against them.
+
+use crate::constraints::{Cone, ConeGroup, RowGroup};
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::iterate::Point;
+
+/// A row is active if it is this near to its bound, relative to its scale: nearer than a quadratic
+/// program brings a row that it does not mean to touch.
+const NEAR: f64 = 1e-6;
+/// A push counts if giving way by one per cent of the row's scale would lower J by more than this
+/// share of it, and by more than [`ROUNDING`] of what there is to explain.
+const PUSH: f64 = 1e-6;
+/// Rounding of a change of J, as a share of the misfit of no motion: residuals are rounded in the
+/// last digits of the motion, and a change of the motion in the thousands of steps that make it.
+const ROUNDING: f64 = 1e-12;
+
+/// A group of constraints with active rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveGroup {
+    /// Name of the group.
+    pub name: String,
+    /// Number of active rows.
+    pub rows: usize,
+    /// Spans of time on which rows are active, s.
+    pub spans: Vec<[f64; 2]>,
+    /// Spans on which the data push against the bound, s.
+    pub pushed: Vec<[f64; 2]>,
+    /// Sum of the sizes of the rows' multipliers: what J would lose per unit by which all bounds
+    /// give way.
+    pub multiplier: f64,
+}
+
+impl ActiveGroup {
+    /// In words.
+    pub fn sentence(&self) -> String {
+        let list = |spans: &[[f64; 2]]| -> String {
+            let words: Vec<String> = spans.iter().take(MOST_SPANS).map(span).collect();
+            let more = spans.len().saturating_sub(MOST_SPANS);
+            match more {
+                0 => words.join(", "),
+                1 => format!("{} and 1 more span", words.join(", ")),
+                _ => format!("{} and {more} more spans", words.join(", ")),
+            }
+        };
+        match self.pushed.as_slice() {
+            [] => format!(
+                "`{}` is touched but not pushed on {}",
+                self.name,
+                list(&self.spans)
+            ),
+            pushed => format!("the data push against `{}` on {}", self.name, list(pushed)),
+        }
+    }
+}
+
+/// Most spans that a sentence lists.
+const MOST_SPANS: usize = 4;
+
+fn span(&[from, to]: &[f64; 2]) -> String {
+    if from == to {
+        format!("t = {from:.3}")
+    } else {
+        format!("[{from:.3}, {to:.3}]")
+    }
+}
+
+/// The active constraints at `point`.
+///
+/// The multipliers solve the optimality conditions `dJ + G^T lambda = 0` in the least-squares sense
+/// of a projection: they are those of the step of steepest descent that the constraints stop.
+pub fn active_constraints(problem: &Problem, point: &Point) -> Vec<ActiveGroup> {
+    let constraints = &problem.constraints;
+    let near: Vec<Vec<usize>> = (constraints.groups.iter())
+        .map(|group| near_rows(group, point))
+        .collect();
+    let near_cones: Vec<Vec<usize>> = (constraints.cones.iter())
+        .map(|group| near_cones(group, point))
+        .collect();
+    if near.iter().chain(&near_cones).all(Vec::is_empty) {
+        return Vec::new();
+    }
+    let multipliers = multipliers(problem, point);
+    let gain_that_counts =
+        (PUSH * point.evaluation.cost).max(ROUNDING * problem.misfit_of_silence());
+    let counts = |scale: f64, multiplier: f64| 0.01 * scale * multiplier > gain_that_counts;
+    let groups = constraints.groups.iter().zip(near).enumerate();
+    let rows = groups.map(|(g, (group, rows))| {
+        let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.rows[g][i].abs());
+        let pushed = |&i: &usize| counts(group.scale(i, &point.parameters), multiplier(i));
+        let pushed: Vec<usize> = rows.iter().copied().filter(pushed).collect();
+        ActiveGroup {
+            name: group.name.clone(),
+            rows: rows.len(),
+            spans: spans(&group.times, &rows),
+            pushed: spans(&group.times, &pushed),
+            multiplier: rows.iter().map(|&i| multiplier(i)).sum(),
+        }
+    });
+    let groups = constraints.cones.iter().zip(near_cones).enumerate();
+    let cones = groups.map(|(g, (group, cones))| {
+        let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.cones[g][i].abs());
+        let pushed = |&i: &usize| counts(bound(&group.cones[i], point), multiplier(i));
+        let pushed: Vec<usize> = cones.iter().copied().filter(pushed).collect();
+        let times: Vec<[f64; 2]> = group.times.iter().map(|t| [*t, *t]).collect();
+        ActiveGroup {
+            name: group.name.clone(),
+            rows: cones.len(),
+            spans: spans(&times, &cones),
+            pushed: spans(&times, &pushed),
+            multiplier: cones.iter().map(|&i| multiplier(i)).sum(),
+        }
+    });
+    rows.chain(cones).filter(|active| active.rows > 0).collect()
+}
+
+/// The size of a cone's bound at the point.
+fn bound(cone: &Cone, point: &Point) -> f64 {
+    let values = cone.rows.multiply(&point.parameters);
+    values
+        .first()
+        .map_or(0.0, |v| (v - cone.rows.right()[0]).abs())
+}
+
+fn near_cones(group: &ConeGroup, point: &Point) -> Vec<usize> {
+    let is_near = |i: &usize| group.cones[*i].violation(&point.parameters) >= -NEAR;
+    (0..group.cones.len()).filter(is_near).collect()
+}
+
+fn near_rows(group: &RowGroup, point: &Point) -> Vec<usize> {
+    let is_near = |&i: &usize| group.relative_violation(i, &point.parameters) >= -NEAR;
+    (0..group.rows.len()).filter(is_near).collect()
+}
+
+/// Joins the time spans of rows that follow each other.
+fn spans(times: &[[f64; 2]], rows: &[usize]) -> Vec<[f64; 2]> {
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    let mut last = None;
+    for &i in rows {
+        let [from, to] = times[i];
+        match joined.last_mut() {
+            Some(span) if last.is_some_and(|last| last + 1 == i) && from >= span[0] => {
+                span[1] = span[1].max(to);
+            }
+            _ => joined.push([from, to]),
+        }
+        last = Some(i);
+    }
+    joined
+}
+
+/// Multipliers of J by group and row, and by group and cone.
+struct Multipliers {
+    rows: Vec<Vec<f64>>,
+    cones: Vec<Vec<f64>>,
+}
+
+/// The multipliers at `point`; `None` if the quadratic program fails.
+fn multipliers(problem: &Problem, point: &Point) -> Option<Multipliers> {
+    if problem.constraints.are_simple() {
+        return Some(simple_multipliers(problem, point));
+    }
+    let metric = point.relative_metric(problem);
+    let gradient = &point.gradient.euclidean;
+    // Scaled so that the largest entry of the right-hand side is near 1.
+    let steepest = gradient
+        .iter()
+        .zip(&metric)
+        .map(|(g, m)| (g / m.sqrt()).abs());
+    let scale = steepest.fold(f64::MIN_POSITIVE.sqrt(), f64::max);
+    let mut sub = Subproblem::new(metric.len());
+    for (j, (m, g)) in metric.iter().zip(gradient).enumerate() {
+        let root = m.sqrt();
+        sub.residuals.push([(j, root)], -g / (root * scale));
+    }
+    let places = sub.constrain(&problem.constraints, &point.parameters);
+    let solution = sub.solve();
+    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
+    solved.then(|| {
+        let mut rows = solution.by_group(&places);
+        rows.iter_mut().flatten().for_each(|m| *m *= scale);
+        let mut each = solution.cone_multipliers.iter().map(|m| m * scale);
+        let groups = problem.constraints.cones.iter();
+        let cones = groups.map(|g| each.by_ref().take(g.cones.len()).collect());
+        Multipliers {
+            rows,
+            cones: cones.collect(),
+        }
+    })
+}
+
+/// [`multipliers`] where every row bounds one parameter: then J falls into each parameter's bounds by
+/// itself, and the nearest bound that it falls into, if it is near, takes all of the derivative.
+fn simple_multipliers(problem: &Problem, point: &Point) -> Multipliers {
+    let groups = &problem.constraints.groups;
+    let gradient = &point.gradient.euclidean;
+    // How far each parameter's nearest bound lies in the direction in which J falls, and its row.
+    let mut stops: Vec<Option<(f64, [usize; 2], f64)>> = vec![None; gradient.len()];
+    for (g, group) in groups.iter().enumerate() {
+        for i in 0..group.rows.len() {
+            let Some((j, a)) = group.single(i) else {
+                continue;
+            };
+            let [lower, upper] = group.bounds(i);
+            let value = a * point.parameters[j];
+            let room = match (gradient[j] < 0.0) == (a > 0.0) {
+                true => upper - value,
+                false => value - lower,
+            };
+            let is_near = room <= NEAR * group.scale(i, &point.parameters);
+            let room = room / a.abs();
+            if is_near && stops[j].is_none_or(|(nearest, ..)| room < nearest) {
+                stops[j] = Some((room, [g, i], a));
+            }
+        }
+    }
+    let mut rows: Vec<Vec<f64>> = groups.iter().map(|g| vec![0.0; g.rows.len()]).collect();
+    for (stop, slope) in stops.iter().zip(gradient) {
+        if let Some((_, [g, i], a)) = *stop {
+            rows[g][i] = -slope / a;
+        }
+    }
+    Multipliers {
+        rows,
+        cones: Vec::new(),
+    }
+}

@@ -1,0 +1,222 @@
+//! Counted and timed evaluations: all solves of a search.
+
+use super::counts::{ADJOINT, FORWARD, QP, TANGENT};
+use super::iterate::Point;
+use super::linearization::{Linearization, halfway, in_halves};
+use super::settings::{FitSettings, Solver};
+use super::timings::{Timings, timed};
+use crate::objective::{Evaluation, Gradient, GradientKind};
+use crate::problem::Problem;
+use crate::record::{Channel, Loss};
+use crate::simulate::{Breakdown, Purpose, Trajectory};
+use std::sync::OnceLock;
+
+/// The problem behind argmin's counters: the one door through which solvers evaluate.
+pub(crate) struct Work<'a, 'p> {
+    problem: &'a mut argmin::core::Problem<&'p Problem>,
+    kind: GradientKind,
+    purpose: Purpose,
+    /// Where the record is cut in two, so that iterates need tangent solves and no adjoint.
+    halfway: Option<usize>,
+    /// Most iterations of one quadratic program.
+    pub program_iterations: u32,
+    /// What the work took.
+    pub timings: Timings,
+}
+
+impl<'a, 'p> Work<'a, 'p> {
+    pub fn new(
+        problem: &'a mut argmin::core::Problem<&'p Problem>,
+        settings: &FitSettings,
+    ) -> Self {
+        let needs_jacobians =
+            settings.solver == Solver::GaussNewton && settings.gradient == GradientKind::Discrete;
+        let halfway = problem
+            .problem
+            .filter(|_| needs_jacobians)
+            .and_then(|p| halfway(p));
+        let has_paper_order = settings.solver == Solver::SteepestDescent
+            || settings.gradient == GradientKind::Continuous;
+        Self {
+            problem,
+            halfway,
+            kind: settings.gradient,
+            purpose: match has_paper_order {
+                true => Purpose::Reproduction,
+                false => Purpose::Estimation,
+            },
+            program_iterations: settings.stopping.program_iterations,
+            timings: Timings::default(),
+        }
+    }
+
+    /// The problem itself, for what costs no solve.
+    pub fn problem(&self) -> &'p Problem {
+        self.problem
+            .problem
+            .expect("the executor holds the problem")
+    }
+
+    /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
+    /// the `fingerprint`. `None` if there is no such point.
+    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Point> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        (problem.evaluate_for(self.purpose, &parameters, &mut evaluation)).ok()?;
+        let point = self.completed(parameters, evaluation, &mut Timings::default());
+        if point.fingerprint() == fingerprint || self.halfway.is_none() {
+            return Some(point).filter(|point| point.fingerprint() == fingerprint);
+        }
+        // After a short step the gradient was computed by an adjoint solve.
+        let Point {
+            parameters,
+            evaluation,
+            ..
+        } = point;
+        let gradient = problem.gradient(&parameters, &evaluation, self.kind);
+        let point = Point::new(parameters, evaluation, gradient);
+        (point.fingerprint() == fingerprint).then_some(point)
+    }
+
+    /// The motions at a point that was there before, computed again without counting.
+    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, Breakdown> {
+        let problem = self.problem();
+        let mut evaluation = problem.workspace();
+        problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
+        Ok(evaluation.trajectories)
+    }
+
+    /// One forward solve into `evaluation`.
+    pub fn evaluate_into(
+        &mut self,
+        parameters: &[f64],
+        evaluation: &mut Evaluation,
+    ) -> Result<(), Breakdown> {
+        self.count(FORWARD, 1);
+        let (problem, purpose) = (self.problem(), self.purpose);
+        timed(&mut self.timings.forward, || {
+            problem.evaluate_for(purpose, parameters, evaluation)
+        })
+    }
+
+    /// Several forward solves at once.
+    pub fn forwards<T>(&mut self, solves: u64, solve: impl FnOnce() -> T) -> T {
+        self.count(FORWARD, solves);
+        timed(&mut self.timings.forward, solve)
+    }
+
+    /// One adjoint solve at an evaluated point.
+    pub fn gradient(&mut self, parameters: &[f64], evaluation: &Evaluation) -> Gradient {
+        self.count(ADJOINT, 1);
+        let (problem, kind) = (self.problem(), self.kind);
+        timed(&mut self.timings.adjoint, || {
+            problem.gradient(parameters, evaluation, kind)
+        })
+    }
+
+    /// Counts the tangent solves of a linearisation, where those of its point have not been counted.
+    pub fn count_linearisation(&mut self, solves: u64) {
+        if self.halfway.is_none() {
+            self.count_tangents(solves);
+        }
+    }
+
+    /// Counts tangent solves.
+    pub fn count_tangents(&mut self, solves: u64) {
+        self.count(TANGENT, solves);
+    }
+
+    /// One quadratic program.
+    pub fn program<T>(&mut self, solve: impl FnOnce() -> T) -> T {
+        self.count(QP, 1);
+        timed(&mut self.timings.qp, solve)
+    }
+
+    /// Linear algebra between the solves.
+    pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        timed(&mut self.timings.linear_algebra, work)
+    }
+
+    /// The linearisation that a step from `point` uses.
+    pub fn linearization(&mut self, point: &Point) -> Linearization {
+        match point.linearization() {
+            Linearization::Fresh if self.halfway.is_some() => self.linearise_again(point),
+            known => known.clone(),
+        }
+    }
+
+    /// The linearisation at `point` itself, without counting.
+    pub fn linearise_again(&mut self, point: &Point) -> Linearization {
+        Linearization::at(self.problem(), &point.evaluation, &mut self.timings)
+    }
+
+    /// [`Work::complete`] after a short step from `before`: its `linearization` is taken for that of the new point where
+    /// that can be done.
+    pub fn complete_nearby(
+        &mut self,
+        before: &Point,
+        linearization: &Linearization,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+    ) -> Point {
+        let problem = self.problem();
+        let is_squares = |c: &Channel| c.loss() == Loss::Squares;
+        if linearization.reduced().is_none()
+            || problem.is_regularised()
+            || !problem.channels().all(is_squares)
+        {
+            return self.complete(parameters, evaluation);
+        }
+        let gradient = self.gradient(&parameters, &evaluation);
+        match linearization.nearby(&before.parameters, &evaluation, &gradient) {
+            Some(reused) => {
+                Point::new(parameters, evaluation, gradient).with_cached(OnceLock::new(), reused)
+            }
+            None => self.complete(parameters, evaluation),
+        }
+    }
+
+    /// The point that an evaluation belongs to, completed by its gradient.
+    pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Point {
+        let mut timings = Timings::default();
+        let point = self.completed(parameters, evaluation, &mut timings);
+        self.timings += timings;
+        if self.halfway.is_some() {
+            self.count_tangents(point.parameters.len() as u64);
+        }
+        if point.linearization().reduced().is_none() {
+            self.count(ADJOINT, 1);
+        }
+        point
+    }
+
+    /// [`Work::complete`] without counting: by the linearised halves of a long record, otherwise by an adjoint solve.
+    fn completed(
+        &self,
+        parameters: Vec<f64>,
+        evaluation: Evaluation,
+        timings: &mut Timings,
+    ) -> Point {
+        let problem = self.problem();
+        if let Some(halfway) = self.halfway {
+            let (reduced, sizes) = timed(&mut timings.tangent, || {
+                let sizes = || problem.natural_sizes(&evaluation);
+                in_halves(problem, &evaluation, halfway, sizes)
+            });
+            if let Some(misfit) = reduced.misfit_gradient() {
+                let gradient = problem.gradient_of_misfit(&parameters, misfit);
+                let halves = Linearization::Halves(reduced);
+                let point = Point::new(parameters, evaluation, gradient);
+                return point.with_cached(sizes.into(), halves);
+            }
+        }
+        let gradient = timed(&mut timings.adjoint, || {
+            problem.gradient(&parameters, &evaluation, self.kind)
+        });
+        Point::new(parameters, evaluation, gradient)
+    }
+
+    fn count(&mut self, key: &'static str, solves: u64) {
+        *self.problem.counts.entry(key).or_insert(0) += solves;
+    }
+}

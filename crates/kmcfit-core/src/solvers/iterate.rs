@@ -1,0 +1,108 @@
+//! An iterate: parameters with cost, gradient and what follows from them.
+
+use super::linearization::Linearization;
+use crate::objective::{Evaluation, Gradient};
+use crate::problem::Problem;
+use std::sync::OnceLock;
+
+/// Parameters with everything known about them.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// Parameters of all functions.
+    pub parameters: Vec<f64>,
+    /// Cost, device and motions.
+    pub evaluation: Evaluation,
+    /// Gradient of the cost.
+    pub gradient: Gradient,
+    cached: Cached,
+}
+
+impl Point {
+    pub(crate) fn new(parameters: Vec<f64>, evaluation: Evaluation, gradient: Gradient) -> Self {
+        Self {
+            parameters,
+            evaluation,
+            gradient,
+            cached: Cached::default(),
+        }
+    }
+
+    /// With the natural sizes and the linearisation there.
+    pub(super) fn with_cached(
+        self,
+        sizes: OnceLock<Vec<f64>>,
+        linearization: Linearization,
+    ) -> Self {
+        let cached = Cached {
+            sizes,
+            linearization,
+        };
+        Self { cached, ..self }
+    }
+
+    /// Takes the Jacobian computed at the parameters `at` nearby for that of this iterate; whether it can be.
+    pub(super) fn reuse_linearization(&mut self, problem: &Problem, at: Vec<f64>) -> bool {
+        let reused = Linearization::reused(problem, at, &self.evaluation, &self.gradient);
+        let is_usable = reused.is_some();
+        self.cached.linearization = reused.unwrap_or_default();
+        is_usable
+    }
+
+    /// The linearisation that a step from here uses.
+    pub(super) fn linearization(&self) -> &Linearization {
+        &self.cached.linearization
+    }
+
+    /// [`Problem::natural_sizes`] here.
+    fn natural_sizes(&self, problem: &Problem) -> &[f64] {
+        (self.cached.sizes).get_or_init(|| problem.natural_sizes(&self.evaluation))
+    }
+
+    /// [`Functions::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
+    /// whole grid.
+    pub(crate) fn relative_metric(&self, problem: &Problem) -> Vec<f64> {
+        let duration = problem.oscillator.grid.duration();
+        (problem.functions).relative_metric(self.natural_sizes(problem), duration)
+    }
+
+    /// [`Problem::relative_change`] from here to the parameters `after`.
+    pub(crate) fn relative_change(&self, problem: &Problem, after: &[f64]) -> f64 {
+        self.distance(problem, &self.parameters, after)
+    }
+
+    /// [`Problem::relative_change`] between two lists of parameters, by the sizes here.
+    pub(crate) fn distance(&self, problem: &Problem, from: &[f64], to: &[f64]) -> f64 {
+        problem.change_in_sizes(self.natural_sizes(problem), from, to)
+    }
+    /// A number that two points share if cost and gradient have the same bits, and hardly otherwise.
+    pub fn fingerprint(&self) -> u64 {
+        let Self {
+            evaluation,
+            gradient,
+            ..
+        } = self;
+        let gradients = gradient.euclidean.iter().chain(&gradient.l2);
+        let numbers = [&evaluation.cost, &gradient.norm_squared].into_iter();
+        // FNV-1a by words.
+        let hash = numbers
+            .chain(gradients)
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, x| {
+                (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3)
+            });
+        hash ^ (hash >> 32)
+    }
+}
+
+/// Values that follow from parameters, evaluation and gradient.
+#[derive(Clone, Default)]
+struct Cached {
+    sizes: OnceLock<Vec<f64>>,
+    linearization: Linearization,
+}
+
+impl std::fmt::Debug for Cached {
+    /// Nothing: which values are computed already is no part of an iterate.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("…")
+    }
+}

@@ -1,0 +1,203 @@
+//! Predictions and cost, linearised at an iterate: the subproblem of a Gauss–Newton step.
+
+mod halves;
+mod penalties;
+mod reduced;
+mod residuals;
+mod structured;
+#[cfg(test)]
+mod tests;
+
+pub(super) use halves::{halfway, in_halves};
+pub(crate) use penalties::add_priors;
+pub(super) use penalties::{add_penalties, add_variations};
+pub(super) use reduced::Reduced;
+pub(crate) use reduced::weighted_jacobian;
+
+use super::timings::{Timings, timed};
+use crate::objective::{Evaluation, Gradient};
+use crate::problem::Problem;
+use crate::qp::Subproblem;
+use crate::record::Loss;
+use penalties::add_soft;
+use reduced::of_whole_jacobian;
+
+/// Up to so many parameters the Jacobian is formed by one tangent solve each.
+pub const FEW_PARAMETERS: usize = 64;
+/// State of the linearised predictions at an iterate.
+#[derive(Clone, Default)]
+pub(crate) enum Linearization {
+    /// Computed at the iterate, when a step from there is made.
+    #[default]
+    Fresh,
+    /// Computed at the iterate together with its gradient, in two halves of a long record.
+    Halves(Reduced),
+    /// Computed at the parameters `at` nearby; the gradient is that of the iterate.
+    Reused {
+        /// Where the Jacobian was computed.
+        at: Vec<f64>,
+        /// The readings with that Jacobian, and residuals and gradient of the iterate.
+        reduced: Reduced,
+    },
+}
+
+impl Linearization {
+    /// That at the evaluated point itself.
+    pub fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
+        Self::Halves(reduce(problem, evaluation, timings))
+    }
+
+    /// The Jacobian computed at the parameters `at`, for an evaluated point nearby. `None` where it cannot be that of the
+    /// point.
+    pub fn reused(
+        problem: &Problem,
+        at: Vec<f64>,
+        evaluation: &Evaluation,
+        gradient: &Gradient,
+    ) -> Option<Self> {
+        let there = problem.evaluate(&at).ok()?;
+        let reduced = reduce(problem, &there, &mut Timings::default());
+        let reduced = reduced.nearby(evaluation.misfit, &gradient.euclidean)?;
+        Some(Self::Reused { at, reduced })
+    }
+
+    /// This one for a point near `from`, its own; `None` where it cannot be that of the point.
+    pub fn nearby(
+        &self,
+        from: &[f64],
+        evaluation: &Evaluation,
+        gradient: &Gradient,
+    ) -> Option<Self> {
+        let at = self.computed_at().unwrap_or(from).to_vec();
+        let reduced = self.reduced()?;
+        let reduced = reduced.nearby(evaluation.misfit, &gradient.euclidean)?;
+        Some(Self::Reused { at, reduced })
+    }
+
+    /// The linearised readings, if they are computed.
+    pub fn reduced(&self) -> Option<&Reduced> {
+        match self {
+            Self::Fresh => None,
+            Self::Halves(reduced) | Self::Reused { reduced, .. } => Some(reduced),
+        }
+    }
+
+    /// Where the Jacobian was computed, if not at the iterate.
+    pub fn computed_at(&self) -> Option<&[f64]> {
+        match self {
+            Self::Reused { at, .. } => Some(at),
+            Self::Fresh | Self::Halves(_) => None,
+        }
+    }
+}
+
+/// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
+pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
+    match problem.parameters() {
+        few @ ..=FEW_PARAMETERS => few as u64,
+        _ => 1,
+    }
+}
+
+/// The readings linearised and reduced at an evaluated point, a long record in halves.
+fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Reduced {
+    match halfway(problem) {
+        Some(halfway) => timed(&mut timings.tangent, || {
+            in_halves(problem, evaluation, halfway, || ()).0
+        }),
+        None => Reduced::piece_by_piece(problem, evaluation, timings),
+    }
+}
+
+/// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
+/// variables are the change of the parameters; with many of them the changes of the states follow,
+/// tied to them by equalities.
+pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    readings(problem, evaluation, None, &mut Timings::default())
+}
+
+/// [`linear_readings`], from the `known` ones if they are computed already, and the time that tangents and linear algebra
+/// took.
+fn readings(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    known: Option<&Reduced>,
+    timings: &mut Timings,
+) -> Subproblem {
+    if problem.parameters() <= FEW_PARAMETERS {
+        if Reduced::comes_in_pieces(problem) {
+            let mut own = None;
+            let reduced = known.unwrap_or_else(|| own.insert(reduce(problem, evaluation, timings)));
+            // Else in another order of operations.
+            if reduced.is_finite() {
+                return timed(&mut timings.linear_algebra, || reduced.subproblem());
+            }
+        }
+        return of_whole_jacobian(problem, evaluation, timings);
+    }
+    let steps = timed(&mut timings.tangent, || {
+        structured::steps(problem, evaluation)
+    });
+    timed(&mut timings.linear_algebra, || {
+        structured::subproblem(problem, evaluation, &steps)
+    })
+}
+
+/// The subproblem at an evaluated point without the proximal term: readings, penalties and constraints; and the number of
+/// residual rows that belong to the readings, which come first.
+pub(super) fn linearise(
+    problem: &Problem,
+    parameters: &[f64],
+    evaluation: &Evaluation,
+    linearization: &Linearization,
+    timings: &mut Timings,
+) -> (Subproblem, usize) {
+    let mut sub = readings(problem, evaluation, linearization.reduced(), timings);
+    let readings = sub.residuals.len();
+    timed(&mut timings.linear_algebra, || {
+        add_the_rest(problem, parameters, evaluation, &mut sub);
+    });
+    (sub, readings)
+}
+
+/// The subproblem in parameters and states about any states, also of no response.
+pub(super) fn linearise_about(
+    problem: &Problem,
+    parameters: &[f64],
+    evaluation: &Evaluation,
+) -> Subproblem {
+    let steps = structured::steps(problem, evaluation);
+    let mut sub = structured::subproblem(problem, evaluation, &steps);
+    add_the_rest(problem, parameters, evaluation, &mut sub);
+    sub
+}
+
+/// All that the cost and the constraints have beside the readings.
+fn add_the_rest(
+    problem: &Problem,
+    parameters: &[f64],
+    evaluation: &Evaluation,
+    sub: &mut Subproblem,
+) {
+    sub.constant = robust_surplus(problem, evaluation);
+    add_penalties(problem, parameters, sub);
+    add_variations(problem, parameters, sub);
+    add_priors(problem, parameters, sub);
+    add_soft(problem, parameters, sub);
+    sub.constrain(&problem.constraints, parameters);
+}
+
+/// The cost of the readings less the weighted squares that stand for it: none for least squares.
+pub(super) fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let mut surplus = 0.0;
+    for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+            if channel.loss() != Loss::Squares {
+                let residuals = channel.residuals(predicted).enumerate();
+                let squares: f64 = residuals.map(|(i, r)| channel.weight(i, r) * r * r).sum();
+                surplus += channel.cost(predicted) - squares;
+            }
+        }
+    }
+    surplus
+}

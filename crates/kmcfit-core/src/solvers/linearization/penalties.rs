@@ -1,0 +1,67 @@
+//! Terms of the cost beside the readings, as rows of a subproblem.
+
+use crate::problem::Problem;
+use crate::qp::Subproblem;
+
+/// `(x + delta - mean) / sigma` of the scalars' priors as residual rows.
+pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+    let functions = &problem.functions;
+    for (index, scalar) in functions.scalar_range().zip(functions.scalars()) {
+        if let Some(prior) = scalar.prior {
+            let row = [(index, 1.0 / prior.sigma)];
+            sub.residuals
+                .push(row, (prior.mean - parameters[index]) / prior.sigma);
+        }
+    }
+}
+
+/// `sqrt(weight) (L (theta + delta) - target)` as residual rows.
+pub(in crate::solvers) fn add_penalties(
+    problem: &Problem,
+    parameters: &[f64],
+    sub: &mut Subproblem,
+) {
+    for penalty in &problem.penalties {
+        let range = problem.functions.ranges()[penalty.function].clone();
+        let root = penalty.weight.sqrt();
+        let residuals = penalty.residuals(&parameters[range.clone()]);
+        for (i, r) in residuals.iter().enumerate() {
+            let row = penalty
+                .rows
+                .row(i)
+                .map(|(j, a)| (range.start + j, root * a));
+            sub.residuals.push(row, -root * r);
+        }
+    }
+}
+
+/// `weight |D (theta + delta)|` as absolute values.
+pub(in crate::solvers) fn add_variations(
+    problem: &Problem,
+    parameters: &[f64],
+    sub: &mut Subproblem,
+) {
+    for variation in &problem.variations {
+        let range = problem.functions.ranges()[variation.function].clone();
+        let changes = variation.changes(&parameters[range.clone()], variation.count());
+        for (i, change) in changes.iter().enumerate() {
+            let row = variation.rows.row(i).map(|(j, a)| (range.start + j, a));
+            sub.absolute.push(row, -change);
+            sub.absolute_weights.push(variation.weight);
+        }
+    }
+}
+
+/// The rows of soft constraints that are violated at `parameters`, as residuals.
+pub(super) fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+    for group in &problem.soft {
+        let root = group.row_weight().sqrt();
+        for i in 0..group.rows.len() {
+            let excess = group.excess(i, parameters);
+            if excess != 0.0 {
+                let row = group.rows.row(i).map(|(j, a)| (j, root * a));
+                sub.residuals.push(row, -root * excess);
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The readings linearised by tangent solves and reduced to a triangle, for functions with few parameters.
+
+use super::residuals::Residuals;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::qp::Subproblem;
+use crate::simd::LANES;
+use crate::simd::tall_qr::Triangle;
+use crate::solvers::timings::{Timings, timed};
+use nalgebra::{DMatrix, DVector};
+use std::time::{Duration, Instant};
+
+/// Up to so many columns the reduction of a piece of rows takes as long as a look at the clock.
+pub(super) const NARROW: usize = LANES;
+
+/// The readings, linearised and reduced to as many rows as there are parameters:
+/// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
+#[derive(Clone)]
+pub(crate) struct Reduced {
+    pub(super) triangle: Triangle,
+    /// The parameter of each column.
+    pub(super) order: Vec<usize>,
+}
+
+impl Reduced {
+    /// Whether a problem's Jacobian can be reduced piece by piece as it comes ([`Problem::each_piece`]), and
+    /// is worth it.
+    pub fn comes_in_pieces(problem: &Problem) -> bool {
+        problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
+    }
+
+    /// At an evaluated point, in one pass.
+    pub(super) fn piece_by_piece(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        timings: &mut Timings,
+    ) -> Self {
+        let clock = Instant::now();
+        let order = problem.places();
+        let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
+        let mut triangle = Triangle::new(order.len());
+        let mut reducing = Duration::ZERO;
+        problem.each_piece(evaluation, &order, |mut piece| {
+            let rows = piece.first..piece.first + piece.count;
+            let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
+            let mut add = || triangle.add_weighted(&mut piece, roots, right);
+            match order.len() > NARROW {
+                true => timed(&mut reducing, add),
+                false => add(),
+            }
+            piece
+        });
+        timings.linear_algebra += reducing;
+        timings.tangent += clock.elapsed().saturating_sub(reducing);
+        Self { triangle, order }
+    }
+
+    /// The same Jacobian at a point nearby, where the misfit, a sum of squares, and its gradient are known; `None` if it
+    /// cannot be the Jacobian there.
+    pub fn nearby(&self, misfit: f64, gradient: &[f64]) -> Option<Self> {
+        let products: Vec<f64> = self.order.iter().map(|j| 0.5 * gradient[*j]).collect();
+        let triangle = self.triangle.clone().beside(&products, misfit)?;
+        let order = self.order.clone();
+        Some(Self { triangle, order })
+    }
+
+    /// The step to the minimum, less the sign, in the order of the columns.
+    #[cfg(test)]
+    pub fn solution(&self) -> Option<Vec<f64>> {
+        self.triangle.solve(1e-14)
+    }
+
+    /// Whether all numbers are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        self.triangle.is_finite()
+    }
+
+    /// The subproblem in `delta theta`, with what no step can change as a row of its own.
+    pub(super) fn subproblem(&self) -> Subproblem {
+        let mut sub = empty(self.order.len());
+        for (entries, b) in self.triangle.rows() {
+            let entries = entries.map(|(place, r)| (self.order[place], r));
+            sub.residuals.push(entries, -b);
+        }
+        sub.residuals.push([], self.triangle.rest());
+        sub
+    }
+
+    /// The gradient of the misfit; `None` where a number has left its range.
+    pub fn misfit_gradient(&self) -> Option<Vec<f64>> {
+        let mut gradient = vec![0.0; self.order.len()];
+        for (product, j) in self.triangle.products().into_iter().zip(&self.order) {
+            gradient[*j] = 2.0 * product;
+        }
+        let is_finite = self.triangle.is_finite() && gradient.iter().all(|g| g.is_finite());
+        is_finite.then_some(gradient)
+    }
+}
+
+/// A subproblem whose variables are eliminated all at once.
+fn empty(variables: usize) -> Subproblem {
+    let mut sub = Subproblem::new(variables);
+    sub.stations = vec![0; variables];
+    sub
+}
+
+/// The subproblem in `delta theta` at an evaluated point, from the whole Jacobian: one tangent solve for each parameter.
+pub(super) fn of_whole_jacobian(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    timings: &mut Timings,
+) -> Subproblem {
+    let residuals = Residuals::at(problem, evaluation);
+    let jacobian = timed(&mut timings.tangent, || {
+        problem.predictions_jacobian(evaluation)
+    });
+    timed(&mut timings.linear_algebra, || {
+        let Residuals { roots, weighted } = &residuals;
+        if jacobian.nrows() > jacobian.ncols() {
+            let (triangle, order) = Triangle::of(&jacobian, roots, weighted);
+            return Reduced { triangle, order }.subproblem();
+        }
+        let mut sub = empty(jacobian.ncols());
+        for ((row, root), r) in jacobian.row_iter().zip(roots).zip(weighted) {
+            let entries = row.iter().map(|a| root * a).enumerate();
+            sub.residuals.push(entries.filter(|(_, a)| *a != 0.0), -r);
+        }
+        // So that the readings' rows end alike.
+        sub.residuals.push([], 0.0);
+        sub
+    })
+}
+
+/// `sqrt(w) dz/dtheta` (readings x parameters) and `sqrt(w) r`, for the predictions `z` of all
+/// channels.
+pub fn weighted_jacobian(
+    problem: &Problem,
+    evaluation: &Evaluation,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
+    let mut jacobian = problem.predictions_jacobian(evaluation);
+    for mut column in jacobian.column_iter_mut() {
+        for (a, root) in column.iter_mut().zip(&roots) {
+            *a *= root;
+        }
+    }
+    (jacobian, DVector::from_vec(weighted))
+}

@@ -1,0 +1,92 @@
+//! Weighted residuals of the readings.
+
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::Channel;
+use std::ops::Range;
+
+/// How the residuals of the readings of all channels are weighed.
+pub(super) struct Residuals {
+    /// `sqrt(w)`.
+    pub roots: Vec<f64>,
+    /// `sqrt(w) r`.
+    pub weighted: Vec<f64>,
+}
+
+impl Residuals {
+    /// At an evaluated point.
+    pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
+        let mut all = Self::with_capacity(problem.reading_count());
+        for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
+            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
+                all.push(channel, predicted, 0..channel.len());
+            }
+        }
+        all
+    }
+
+    pub fn with_capacity(readings: usize) -> Self {
+        Self {
+            roots: Vec::with_capacity(readings),
+            weighted: Vec::with_capacity(readings),
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.roots.clear();
+        self.weighted.clear();
+    }
+
+    /// Adds some readings of a channel.
+    pub fn push(&mut self, channel: &Channel, predicted: &[f64], readings: Range<usize>) {
+        let Self { roots, weighted } = self;
+        let first = roots.len();
+        let residuals = || channel.residuals_of(predicted, readings.clone());
+        match channel.uniform_weights() {
+            Some([inner, ends]) => {
+                roots.resize(first + readings.len(), inner.sqrt());
+                for end in [0, channel.len() - 1] {
+                    if readings.contains(&end) {
+                        roots[first + end - readings.start] = ends.sqrt();
+                    }
+                }
+            }
+            None => {
+                let each = readings.clone().zip(residuals());
+                roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
+            }
+        }
+        let pairs = residuals().zip(&roots[first..]);
+        weighted.extend(pairs.map(|(r, root)| root * r));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Weighting;
+    use crate::system::Grid;
+
+    /// The squares of the weighted residuals are the cost, in which the readings at both ends count half; some readings
+    /// at a time are the same.
+    #[test]
+    fn weighted_residuals() {
+        let grid = Grid::new(0.0, 1.0, 11).expect("a grid");
+        let spacing = grid.step();
+        let readings = (0..11).map(|i| f64::from(i).sin()).collect();
+        let weighting = Weighting::Integral { spacing };
+        let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+        let predicted: Vec<f64> = (0..11).map(|i| 2.0 - f64::from(i)).collect();
+        let mut whole = Residuals::with_capacity(11);
+        whole.push(&channel, &predicted, 0..11);
+        let squares: f64 = whole.weighted.iter().map(|r| r * r).sum();
+        let cost = channel.cost(&predicted);
+        assert!((squares - cost).abs() <= 1e-14 * cost, "{squares} {cost}");
+        let mut parts = Residuals::with_capacity(11);
+        for readings in [0..1, 1..6, 6..10, 10..11] {
+            parts.push(&channel, &predicted, readings);
+        }
+        assert_eq!(parts.weighted, whole.weighted);
+        assert_eq!(parts.roots, whole.roots);
+    }
+}

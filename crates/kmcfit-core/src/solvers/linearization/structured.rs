@@ -1,0 +1,212 @@
+//! The Gauss–Newton subproblem with the states as unknowns: sparse, and of a size linear in the number
+//! of nodes, for functions with many parameters.
+
+use crate::constraints::Rows;
+use crate::objective::{Evaluation, View};
+use crate::problem::Problem;
+use crate::qp::Subproblem;
+use crate::record::{Channel, ChannelKind, Experiment};
+use crate::signal::SecondOrder;
+use crate::simulate::reference::step_jacobians;
+use crate::simulate::{StepJacobian, Trajectory};
+
+/// Entries of a linearised step to make room for: three states, three functions at both ends.
+const ENTRIES: usize = 9;
+
+/// Every step of every experiment, linearised.
+pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
+    let each = (0..problem.experiments.len()).map(|e| {
+        let view = problem.view(evaluation, e);
+        step_jacobians(view.oscillator, view.device, view.excitation, view.motion)
+    });
+    each.collect()
+}
+
+/// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
+/// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
+///
+/// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
+/// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
+/// vanish where the states are a motion. `steps` are those of [`steps`].
+pub fn subproblem(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    steps: &[Vec<StepJacobian>],
+) -> Subproblem {
+    let parameters = problem.parameters();
+    let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
+    let mut sub = Subproblem::new(parameters + states);
+    sub.stations = problem.functions.first_nodes();
+    for experiment in &problem.experiments {
+        let nodes = 1..experiment.nodes as u32;
+        sub.stations.extend(nodes.flat_map(|i| [i, i]));
+    }
+    let mut base = parameters;
+    for (e, steps) in steps.iter().enumerate() {
+        let experiment = &problem.experiments[e];
+        let view = problem.view(evaluation, e);
+        let columns = Columns {
+            problem,
+            experiment,
+            base,
+        };
+        columns.add_steps(steps, view.motion, &mut sub.equalities);
+        for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
+            columns.add_readings(channel, predicted, view, &mut sub);
+        }
+        base += 2 * (experiment.nodes - 1);
+    }
+    sub
+}
+
+/// Where the unknowns of one experiment stand.
+struct Columns<'a> {
+    problem: &'a Problem,
+    experiment: &'a Experiment,
+    base: usize,
+}
+
+impl Columns<'_> {
+    /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
+    /// first state that is known.
+    fn state(&self, i: usize, q: usize) -> Option<usize> {
+        match i {
+            0 => Some(self.scalar(self.experiment.sought[q]?)),
+            _ => Some(self.base + 2 * (i - 1) + q),
+        }
+    }
+
+    fn scalar(&self, index: usize) -> usize {
+        self.problem.functions.scalar_range().start + index
+    }
+
+    fn add_steps(&self, steps: &[StepJacobian], states: &Trajectory, equalities: &mut Rows) {
+        let mut entries = Vec::new();
+        equalities.reserve(2 * steps.len(), 2 * steps.len() * ENTRIES);
+        for (i, step) in steps.iter().enumerate() {
+            let ends = [step.end.displacement, step.end.velocity];
+            let next = [states.displacement[i + 1], states.velocity[i + 1]];
+            for q in 0..2 {
+                entries.clear();
+                entries.extend(self.state(i + 1, q).map(|j| (j, 1.0)));
+                for s in 0..2 {
+                    entries.extend(self.state(i, s).map(|j| (j, -step.state[s][q])));
+                }
+                self.add_function_slopes(
+                    i,
+                    &|f, side| -[&step.left, &step.right][side][f][q],
+                    &mut entries,
+                );
+                equalities.push(entries.iter().copied(), ends[q] - next[q]);
+            }
+        }
+    }
+
+    /// What the functions' values at both ends of step `i` do, by `slope(function, side)`.
+    fn add_function_slopes(
+        &self,
+        i: usize,
+        slope: &dyn Fn(usize, usize) -> f64,
+        entries: &mut Vec<(usize, f64)>,
+    ) {
+        let functions = &self.problem.functions;
+        for (place, &f) in functions
+            .assembly(self.experiment.device)
+            .iter()
+            .enumerate()
+        {
+            let (function, range) = (functions.get(f), &functions.ranges()[f]);
+            for side in 0..2 {
+                let slope = slope(place, side);
+                if slope != 0.0 {
+                    let add = |(j, b): (usize, f64)| entries.push((range.start + j, slope * b));
+                    function.design.row(i + side).for_each(add);
+                }
+            }
+        }
+    }
+
+    fn add_readings(&self, channel: &Channel, predicted: &[f64], view: View, sub: &mut Subproblem) {
+        let [gain, ..] = channel.sensor().values(view.scalars);
+        // A displacement at a node by a known sensor is the state itself.
+        let known = channel.sensor().indices().iter().all(Option::is_none);
+        let plain = known && channel.kind() == ChannelKind::Displacement;
+        let row = |i: usize, entries: &mut Vec<(usize, f64)>| {
+            let place = channel.places()[i];
+            if let Some(node) = plain.then(|| place.as_node()).flatten() {
+                entries.extend(self.state(node, 0).map(|index| (index, gain)));
+                return;
+            }
+            let sensed = channel.sensed(view, i);
+            for (j, slope) in sensed.states.iter().enumerate() {
+                if *slope != 0.0 {
+                    let index = self.state(place.step + j / 2, j % 2);
+                    entries.extend(index.map(|index| (index, gain * slope)));
+                }
+            }
+            let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
+            self.add_function_slopes(place.step, &slope, entries);
+            let factors = [sensed.value, 1.0, channel.age(i)];
+            for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
+                entries.extend(index.map(|index| (self.scalar(index), factor)));
+            }
+        };
+        let residuals = channel.residuals(predicted).enumerate();
+        if channel.filter().is_empty() {
+            let mut entries = Vec::new();
+            for (i, r) in residuals {
+                entries.clear();
+                row(i, &mut entries);
+                let root = channel.weight(i, r).sqrt();
+                let row = entries.iter().map(|(j, a)| (*j, root * a));
+                sub.residuals.push(row, -root * r);
+            }
+        } else {
+            let rows = (0..channel.len()).map(|i| {
+                let mut entries = Vec::new();
+                row(i, &mut entries);
+                entries
+            });
+            let filtered = add_filter(channel.filter(), rows.collect(), sub);
+            for ((i, r), index) in residuals.zip(filtered) {
+                let root = channel.weight(i, r).sqrt();
+                sub.residuals.push([(index, root)], -root * r);
+            }
+        }
+    }
+}
+
+/// Adds the filtered changes of the predictions as unknowns: every section is a recurrence, run
+/// forward over the record for all sections and then backward, from rest. Returns the index of each
+/// filtered prediction. Recurrences that run both ways leave the variables no order in which each
+/// follows from those before.
+fn add_filter(
+    filter: &[SecondOrder],
+    rows: Vec<Vec<(usize, f64)>>,
+    sub: &mut Subproblem,
+) -> Vec<usize> {
+    let mut signal = rows;
+    let mut indices = Vec::new();
+    sub.stations.clear();
+    for backward in [false, true] {
+        if backward {
+            signal.reverse();
+        }
+        for section in filter {
+            indices = sub.add_variables(signal.len());
+            for i in 0..signal.len() {
+                let mut entries = vec![(indices[i], 1.0)];
+                for (lag, b) in section.b.iter().enumerate().filter(|(lag, _)| *lag <= i) {
+                    entries.extend(signal[i - lag].iter().map(|(j, a)| (*j, -b * a)));
+                }
+                for (lag, a) in section.a.iter().enumerate().filter(|(lag, _)| *lag < i) {
+                    entries.push((indices[i - lag - 1], *a));
+                }
+                sub.equalities.push(entries, 0.0);
+            }
+            signal = indices.iter().map(|j| vec![(*j, 1.0)]).collect();
+        }
+    }
+    indices.reverse();
+    indices
+}

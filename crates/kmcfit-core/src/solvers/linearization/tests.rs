@@ -1,0 +1,214 @@
+use super::halves::Half;
+use super::*;
+use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
+use crate::objective::GradientKind;
+use crate::record::{Channel, ChannelKind, Experiment, Weighting};
+use crate::solvers::checkpoint::{Bits, Memory};
+use crate::solvers::counts::Counts;
+use crate::solvers::evaluator::Work;
+use crate::solvers::methods::{GaussNewton, Step, StepRule};
+use crate::solvers::settings::FitSettings;
+use crate::solvers::{Fit, fit, fit_from};
+use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
+use crate::threads;
+
+fn fitted(problem: &Problem) -> Fit {
+    let settings = FitSettings::default();
+    fit(problem, &problem.start(), &settings, &mut |_| {}).expect("a motion")
+}
+
+/// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
+/// every one and velocities between them; its velocity at the start is sought as well. The stiffness has so many knots,
+/// or is a constant.
+fn long_problem(knots: Option<u32>) -> Problem {
+    let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
+    let nodes = grid.nodes();
+    let constant = |quantity, start| CoefficientFunction::constant(quantity, start, nodes);
+    let stiffness = match knots {
+        None => constant(Quantity::Stiffness, 2.2),
+        Some(knots) => {
+            let spacing = grid.duration() / f64::from(knots - 1);
+            let knots: Vec<f64> = (0..knots).map(|i| f64::from(i) * spacing).collect();
+            let start = knots.iter().map(|t| 2.2 + 1e-3 * t).collect();
+            let basis = Basis::PiecewiseLinear { knots };
+            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, start)
+        }
+    };
+    let list = vec![
+        constant(Quantity::Mass, 1.1),
+        constant(Quantity::Damping, 0.3),
+        stiffness,
+    ];
+    let speed = Scalar {
+        name: "speed".into(),
+        unit: "m/s".into(),
+        start: 0.1,
+        size: 1.0,
+        prior: None,
+    };
+    let functions = Functions::new(list, nodes, grid.step()).expect("functions");
+    let times = grid.times();
+    let force: Vec<f64> = (times.iter())
+        .map(|t| (0.9 * t).sin() + (1.7 * t).cos())
+        .collect();
+    let read = |t: &f64| (0.9 * t).cos() - (1.7 * t).sin();
+    let channel = |kind, times: Vec<f64>| {
+        let values = times.iter().map(read).collect();
+        let weighting = Weighting::Sigma(0.1);
+        Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+    };
+    let sevenths = times.iter().step_by(7).copied().collect();
+    let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
+    let between = between.filter(|t| *t < grid.duration()).collect();
+    let record = Experiment {
+        sought: [None, Some(0)],
+        ..Experiment::free("driven", State::default(), nodes)
+            .with_excitation(Excitation::force_at_nodes(&force))
+            .with_channel(channel(ChannelKind::Displacement, sevenths))
+            .with_channel(channel(ChannelKind::Velocity, between))
+            .with_channel(channel(ChannelKind::Acceleration, times.clone()))
+    };
+    let oscillator = Oscillator {
+        grid,
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let functions = functions.with_scalars(vec![speed]);
+    Problem::new(oscillator, functions, vec![record])
+}
+
+/// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
+/// leave one lane or none for the state in the middle.
+#[test]
+fn halves_of_a_long_record() {
+    for (knots, parameters) in [(None, 4), (Some(4), 7), (Some(5), 8)] {
+        let problem = long_problem(knots);
+        assert_eq!(problem.parameters(), parameters);
+        let theta = problem.start();
+        let halfway = halfway(&problem).expect("it is long");
+        let evaluation = problem.evaluate(&theta).expect("a motion");
+        let second = Half::second(&problem, &evaluation, halfway);
+        let joined = Half::first(&problem, &evaluation, halfway).join(&second);
+        let whole = Reduced::piece_by_piece(&problem, &evaluation, &mut Timings::default());
+        let solution = |reduced: &Reduced| reduced.solution().expect("independent columns");
+        for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
+            let off = (joined - whole).abs();
+            assert!(off <= 1e-10 * whole.abs(), "{joined} {whole}");
+        }
+        let found = joined.misfit_gradient().expect("finite numbers");
+        let expected = problem.gradient(&theta, &evaluation, GradientKind::Discrete);
+        for (found, expected) in found.iter().zip(&expected.euclidean) {
+            let off = (found - expected).abs();
+            assert!(off <= 1e-10 * expected.abs(), "{found} {expected}");
+        }
+    }
+}
+
+/// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
+/// adjoint, and the linearised readings ask for no further step.
+#[test]
+fn after_short_steps_the_jacobian_stays() {
+    let mut problem = long_problem(None);
+    let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
+    let motion = problem.evaluate(&truth).expect("a motion");
+    let channels = problem.experiments[0].channels.iter_mut();
+    for (channel, predicted) in channels.zip(&motion.predictions[0]) {
+        let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
+        *channel = channel.clone().with_simulated(predicted, &noise);
+    }
+    let settings = FitSettings::default();
+    let fit = fit_from(&problem, &problem.start(), &settings).expect("a motion");
+    let points = fit.history.len() as u64 + 1;
+    let parameters = problem.parameters() as u64;
+    let Counts {
+        adjoint, tangent, ..
+    } = fit.counts;
+    assert!(0 < adjoint && adjoint < points);
+    assert_eq!(tangent, (points - adjoint) * parameters);
+    let theta = &fit.best.parameters;
+    // Of two ways to the gradient one may have been gone at the end: both have the rounding of the one at the start.
+    let at_start = problem.evaluate(&problem.start()).expect("a motion");
+    let at_start = problem.gradient(&problem.start(), &at_start, GradientKind::Discrete);
+    let expected = problem.gradient(theta, &fit.best.evaluation, GradientKind::Discrete);
+    let gradients = fit.best.gradient.euclidean.iter().zip(&expected.euclidean);
+    for ((found, expected), size) in gradients.zip(&at_start.euclidean) {
+        assert!(
+            (found - expected).abs() <= 1e-11 * size.abs(),
+            "{found} {expected} {size}"
+        );
+    }
+    let mut timings = Timings::default();
+    let reduced = reduce(&problem, &fit.best.evaluation, &mut timings);
+    let step = reduced.solution().expect("independent columns");
+    let order = problem.places();
+    for (step, j) in step.iter().zip(order) {
+        assert!(
+            step.abs() <= 1e-9 * theta[j].abs(),
+            "{step} of {}",
+            theta[j]
+        );
+    }
+}
+
+/// A step that the Jacobian of another point leads astray is made again with the one of its own.
+#[test]
+fn a_jacobian_that_leads_astray_is_made_anew() {
+    let problem = long_problem(None);
+    let settings = FitSettings::default();
+    let start = problem.start();
+    let stepped = |elsewhere: Option<&[f64]>| {
+        let mut counted = argmin::core::Problem::new(&problem);
+        let mut work = Work::new(&mut counted, &settings);
+        let evaluation = problem.evaluate(&start).expect("a motion");
+        let mut point = work.complete(start.clone(), evaluation);
+        let mut method = GaussNewton::default();
+        let memory = Memory::GaussNewton {
+            numbers: Bits(vec![1e-10]),
+            made_at: elsewhere.map(|at| Bits(at.to_vec())),
+        };
+        assert!(method.recall(memory, &problem, &mut point));
+        let Step::Moved { point, .. } = method.step(&mut work, &point) else {
+            panic!("no step");
+        };
+        (point.parameters, Counts::of(&counted))
+    };
+    let (expected, before) = stepped(None);
+    let elsewhere = [2.0, 1.0, 3.0, 1.0].iter().zip(&start);
+    let elsewhere: Vec<f64> = elsewhere.map(|(factor, p)| factor * p).collect();
+    let (found, after) = stepped(Some(&elsewhere));
+    assert_eq!(found, expected);
+    assert_eq!(after.tangent, before.tangent + problem.parameters() as u64);
+}
+
+/// On one thread and on two the same, to the last bit.
+#[test]
+fn a_long_record_on_two_threads() {
+    let problem = long_problem(None);
+    let alone = threads::sharing(|| fitted(&problem));
+    let together = fitted(&problem);
+    assert!(together.history == alone.history && !together.history.is_empty());
+    assert_eq!(together.counts, alone.counts);
+    assert_eq!(together.best.parameters, alone.best.parameters);
+}
+
+/// By the continuous gradient, too, which needs an adjoint.
+#[test]
+fn a_long_record_by_the_continuous_gradient() {
+    let mut problem = long_problem(None);
+    let grid = problem.oscillator.grid;
+    let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
+    let spacing = grid.step();
+    let weighting = Weighting::Integral { spacing };
+    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    problem.experiments[0].channels = vec![channel];
+    assert!(problem.supports_continuous() && halfway(&problem).is_some());
+    let mut settings = FitSettings {
+        gradient: GradientKind::Continuous,
+        ..FitSettings::default()
+    };
+    settings.stopping.iterations = 3;
+    let run = || fit(&problem, &problem.start(), &settings, &mut |_| {}).expect("a motion");
+    let (alone, together) = (threads::sharing(run), run());
+    assert!(together.history == alone.history && !together.history.is_empty());
+    assert_eq!(together.counts, alone.counts);
+}

@@ -1,0 +1,351 @@
+//! The equation error as a method of its own: one convex problem, solved once.
+
+use super::measured::{Measured, Measurements};
+use super::{Minimum, Purpose, add_rows, device, minimise};
+use crate::objective::{Evaluation, Gradient};
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::record::Experiment;
+use crate::solvers::counts::Counts;
+use crate::solvers::fit::Fit;
+use crate::solvers::history::{Row, ratio};
+use crate::solvers::iterate::Point;
+use crate::solvers::linearization::{add_penalties, add_variations};
+use crate::solvers::optimality::{Optimality, judged};
+use crate::solvers::reason::{Reason, Unsuited};
+use crate::solvers::termination::{Outcome, Status};
+use crate::solvers::timings::{Timings, timed};
+use crate::system::Device;
+use std::time::Instant;
+
+/// A function that is smaller than its start by this factor is solved for again, up to so many times.
+const FAR: f64 = 1e4;
+const AGAIN: usize = 3;
+/// Relative rounding of a term of the equation of motion: of derivatives of smoothed readings, and of parameters that are known to
+/// the accuracy of a factorisation.
+const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
+
+/// Minimises over the readings of all experiments
+///
+/// ```text
+/// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
+/// ```
+///
+/// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
+/// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
+/// the equation of motion says of the readings there. Scalars keep their values at the start.
+pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&Row)) -> Fit {
+    let clock = Instant::now();
+    let mut timings = Timings::default();
+    let measurements = timed(&mut timings.start, || {
+        Measurements::with_scalars(problem, problem.scalars(start))
+    });
+    let measurements = match measurements {
+        Ok(measurements) => measurements,
+        Err(reason) => return failed(problem, start, reason),
+    };
+    let cost = Cost {
+        problem,
+        measurements: &measurements,
+    };
+    let first = cost.point(start.to_vec());
+    let mut counts = Counts::default();
+    let mut optimality = None;
+    let (outcome, found) = match cost.minimise(start, &mut timings) {
+        Ok((minimum, programs)) => {
+            counts.qp = programs;
+            let point = cost.point(minimum.parameters.clone());
+            let device = &point.evaluation.device;
+            let has_mass = device.mass.iter().all(|m| *m > 0.0);
+            let reason = reason(problem, &minimum, has_mass);
+            let status = match minimum.program {
+                Some(ConicStatus::Almost) => Status::Stalled,
+                _ if !has_mass => Status::Infeasible,
+                _ => Status::Converged,
+            };
+            let mut outcome = Outcome::new(status, reason);
+            if problem.parameters() > 0 {
+                optimality = cost.optimality(&point, &minimum, &mut timings);
+                if status == Status::Converged {
+                    outcome = judged(outcome, optimality.as_ref());
+                }
+            }
+            (outcome, Some(point))
+        }
+        Err(status) => {
+            counts.qp = 1;
+            let word = match status {
+                ConicStatus::Infeasible => Status::Infeasible,
+                _ => Status::Stalled,
+            };
+            (Outcome::new(word, Reason::Program(status)), None)
+        }
+    };
+    let history: Vec<Row> = (found.iter())
+        .map(|best| row(problem, &first, best))
+        .collect();
+    history.iter().for_each(observe);
+    Fit {
+        initial_cost: first.evaluation.cost,
+        started_from: first.evaluation.cost,
+        initial_norm_squared: first.gradient.norm_squared,
+        best: found.unwrap_or(first),
+        history,
+        snapshots: Vec::new(),
+        outcome,
+        counts,
+        timings,
+        elapsed: clock.elapsed(),
+        rungs: Vec::new(),
+        optimality,
+    }
+}
+
+fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
+    if problem.functions.iter().all(|f| f.parameters() == 0) {
+        return Reason::NoParameters;
+    }
+    Reason::EquationError {
+        program: minimum.program,
+        has_mass,
+    }
+}
+
+/// The only row of the history.
+fn row(problem: &Problem, first: &Point, best: &Point) -> Row {
+    Row {
+        iteration: 1,
+        cost: best.evaluation.cost,
+        cost_ratio: ratio(best.evaluation.cost, first.evaluation.cost),
+        gradient_norm_squared_ratio: ratio(
+            first.gradient.norm_squared,
+            first.gradient.norm_squared,
+        ),
+        step: 1.0,
+        relative_change: first.relative_change(problem, &best.parameters),
+    }
+}
+
+/// The end of a fit whose readings tell no motion: the start, without a cost.
+fn failed(problem: &Problem, start: &[f64], reason: Unsuited) -> Fit {
+    let mut evaluation = problem.workspace();
+    evaluation.device = problem.functions.device(start);
+    for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
+        for (predicted, channel) in readings.iter_mut().zip(&experiment.channels) {
+            *predicted = vec![f64::NAN; channel.len()];
+        }
+    }
+    Fit {
+        best: Point::new(
+            start.to_vec(),
+            evaluation,
+            Gradient {
+                euclidean: vec![f64::NAN; start.len()],
+                l2: vec![f64::NAN; start.len()],
+                norm_squared: f64::NAN,
+            },
+        ),
+        initial_cost: f64::NAN,
+        started_from: f64::NAN,
+        initial_norm_squared: f64::NAN,
+        history: Vec::new(),
+        snapshots: Vec::new(),
+        outcome: Outcome::new(Status::Failed, Reason::Unsuited(reason)),
+        counts: Counts::default(),
+        timings: Timings::default(),
+        elapsed: std::time::Duration::ZERO,
+        rungs: Vec::new(),
+        optimality: None,
+    }
+}
+
+/// J of the equation error.
+struct Cost<'a> {
+    problem: &'a Problem,
+    measurements: &'a Measurements,
+}
+
+impl<'a> Cost<'a> {
+    fn experiments(&self) -> impl Iterator<Item = (&'a Experiment, &'a Measured)> {
+        let all = self.problem.experiments.iter();
+        let pairs = all.zip(&self.measurements.experiments);
+        pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
+    }
+
+    /// The minimum; where it is far below the start in the size of a function, once more from there: what is solved for
+    /// is the step, and beside a step of 1e12 the digits of a 1 are rounding.
+    /// Also how many quadratic programs that took.
+    fn minimise(
+        &self,
+        start: &[f64],
+        timings: &mut Timings,
+    ) -> Result<(Minimum, u64), ConicStatus> {
+        let mut minimum = self.minimise_from(start, timings)?;
+        let mut programs = u64::from(minimum.program.is_some());
+        let mut from = self.measurements.sizes(self.problem, start);
+        for _ in 0..AGAIN {
+            let sizes = self.measurements.sizes(self.problem, &minimum.parameters);
+            let far = |(from, size): (&f64, &f64)| *from > FAR * size;
+            if !from.iter().zip(&sizes).any(far) {
+                break;
+            }
+            let Ok(next) = self.minimise_from(&minimum.parameters, timings) else {
+                break;
+            };
+            programs += u64::from(next.program.is_some());
+            minimum = next;
+            from = sizes;
+        }
+        Ok((minimum, programs))
+    }
+
+    /// The first-order condition at `point`, the `minimum`: the problem is convex, so solving it again from there tells by how
+    /// much its cost is above the minimum; of J and of the pull towards where the step began, which decides what
+    /// the equation leaves open. `None` if it cannot be solved again.
+    fn optimality(
+        &self,
+        point: &Point,
+        minimum: &Minimum,
+        timings: &mut Timings,
+    ) -> Option<Optimality> {
+        let problem = self.problem;
+        // Not counted, so not timed as a program either: it is no part of the fit.
+        let mut own = Timings::default();
+        let again = self.minimise_from(&point.parameters, &mut own);
+        timings.linear_algebra += own.sum();
+        let again = again.ok()?;
+        let here = point.evaluation.cost;
+        let cost = |theta: &[f64]| self.point(theta.to_vec()).evaluation.cost + minimum.pull(theta);
+        let gap = cost(&point.parameters) - cost(&again.parameters);
+        let gap = (gap - self.rounding(point)).max(0.0);
+        let worst = problem.constraints.largest_violation(&point.parameters);
+        Some(Optimality {
+            stationarity: gap / Optimality::reference(problem, here),
+            step: point.relative_change(problem, &again.parameters),
+            feasibility: worst.map_or(0.0, |v| v.relative),
+            complementarity: again.kkt.map_or(0.0, |kkt| kkt.complementarity),
+            tolerance: Optimality::LEAST,
+        })
+    }
+
+    /// The rounding of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With twice the
+    /// parameters its error is the sum of those that they stand in.
+    fn rounding(&self, point: &Point) -> f64 {
+        let twice: Vec<f64> = point.parameters.iter().map(|p| 2.0 * p).collect();
+        let terms = self.point(twice).evaluation.misfit;
+        let rounding = TERM_ROUNDING * terms.sqrt();
+        2.0 * rounding * point.evaluation.cost.sqrt() + rounding * rounding
+    }
+
+    fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+        let problem = self.problem;
+        let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
+        let sizes = self.measurements.sizes(problem, start);
+        let excess = |theta: &[f64]| self.excess(theta);
+        let optimum = Purpose::Optimum;
+        minimise(problem, sub, start, &sizes, optimum, &excess, timings)
+    }
+
+    /// The squares of J in steps from `start`, without the constraints.
+    fn assembled(&self, start: &[f64]) -> Subproblem {
+        let problem = self.problem;
+        let mut sub = Subproblem::new(problem.parameters());
+        sub.stations = problem.functions.first_nodes();
+        for (experiment, measured) in self.experiments() {
+            let root = measured.weight.sqrt();
+            add_rows(problem, experiment, measured, root, start, &mut sub);
+        }
+        add_penalties(problem, start, &mut sub);
+        add_variations(problem, start, &mut sub);
+        self.add_soft(start, &mut sub);
+        sub
+    }
+
+    /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`
+    /// at the price `weight excess^2`.
+    fn add_soft(&self, start: &[f64], sub: &mut Subproblem) {
+        for group in &self.problem.soft {
+            let excess = sub.add_variables(group.rows.len());
+            let root = group.row_weight().sqrt();
+            for (i, &e) in excess.iter().enumerate() {
+                sub.residuals.push([(e, root)], 0.0);
+                let value: f64 = group.rows.row(i).map(|(j, a)| a * start[j]).sum();
+                let [lower, upper] = group.bounds(i).map(|bound| bound - value);
+                let row = group.rows.row(i).chain([(e, -1.0)]);
+                sub.bound(row, lower, upper);
+            }
+        }
+    }
+
+    fn excess(&self, theta: &[f64]) -> Vec<f64> {
+        let groups = self.problem.soft.iter();
+        groups
+            .flat_map(|group| (0..group.rows.len()).map(|i| group.excess(i, theta)))
+            .collect()
+    }
+
+    /// Everything about the parameters `theta`.
+    fn point(&self, theta: Vec<f64>) -> Point {
+        let problem = self.problem;
+        let mut evaluation = problem.workspace();
+        problem
+            .functions
+            .device_into(&theta, 0, &mut evaluation.device);
+        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+            problem.functions.device_into(&theta, i + 1, own);
+        }
+        evaluation.scalars.copy_from_slice(problem.scalars(&theta));
+        evaluation.misfit = self
+            .experiments()
+            .map(|(experiment, measured)| {
+                let device = device(problem, experiment, &theta);
+                measured.misfit(&measured.errors(problem, &device))
+            })
+            .sum();
+        evaluation.regularisation = problem.regularisation(&theta);
+        evaluation.cost = evaluation.misfit + evaluation.regularisation;
+        self.say_motions(&mut evaluation);
+        let gradient = self.gradient(&theta);
+        Point::new(theta, evaluation, gradient)
+    }
+
+    /// The measured motions, and what the model says of the readings there.
+    fn say_motions(&self, evaluation: &mut Evaluation) {
+        let problem = self.problem;
+        for (e, measured) in self.measurements.experiments.iter().enumerate() {
+            let Some(measured) = measured else { continue };
+            let experiment = &problem.experiments[e];
+            evaluation.trajectories[e] =
+                measured.trajectory(&problem.oscillator.grid, experiment.nodes);
+            let view = problem.view(evaluation, e);
+            let channels = experiment.channels.iter();
+            let predictions = channels.map(|channel| measured.predict(problem, channel, view));
+            evaluation.predictions[e] = predictions.collect();
+        }
+    }
+
+    fn gradient(&self, theta: &[f64]) -> Gradient {
+        let problem = self.problem;
+        let mut euclidean = problem.penalty_gradient(theta);
+        for (experiment, measured) in self.experiments() {
+            let device = device(problem, experiment, theta);
+            let errors = measured.errors(problem, &device);
+            let mut nodal: Device = problem.functions.empty_device();
+            for (f, values) in nodal.functions_mut().enumerate() {
+                for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
+                    let push = 2.0 * measured.weight * error * measured.response(problem, f, i);
+                    values[place.step] += push * (1.0 - place.fraction);
+                    values[place.step + 1] += push * place.fraction;
+                }
+            }
+            let functions = &problem.functions;
+            functions.add_transpose(&nodal, experiment.device, &mut euclidean);
+        }
+        let l2 = problem.functions.gram_solve(&euclidean);
+        Gradient {
+            norm_squared: problem.functions.norm_squared(&l2),
+            euclidean,
+            l2,
+        }
+    }
+}

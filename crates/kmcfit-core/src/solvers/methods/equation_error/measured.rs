@@ -1,0 +1,490 @@
+//! What the readings themselves say of a motion: its state and what drives it, without a simulation.
+
+use crate::functions::Functions;
+use crate::objective::View;
+use crate::problem::Problem;
+use crate::record::{Channel, ChannelKind, Experiment, Loss};
+use crate::signal::zero_phase;
+use crate::simulate::Trajectory;
+use crate::solvers::reason::{MissingMeasurement, Unsuited};
+use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
+use crate::system::{Device, Grid, Place, Stepwise};
+
+/// Dominant periods at either end that are left out where a force or the base is known to drive the
+/// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
+/// a period, are the largest errors there are. Without a known drive the unknown one is larger.
+const SETTLING: f64 = 2.0;
+/// Most of a record that may be left out at either end.
+const MOST_LEFT_OUT: usize = 4;
+
+/// The state of an experiment at some times, and what drives it there.
+pub(super) struct Measured {
+    pub places: Vec<Place>,
+    /// Index of the first time among the readings of the channel, where it is one channel's.
+    first: usize,
+    /// Displacement, m.
+    pub y: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Acceleration `y''`, m/s^2.
+    pub a: Vec<f64>,
+    /// Force, N.
+    pub force: Vec<f64>,
+    /// Acceleration `b''` of the base, m/s^2.
+    pub base: Vec<f64>,
+    /// Weight of each time in the integral of the error, s.
+    pub weight: f64,
+    /// Dominant frequency, rad/s.
+    pub frequency: f64,
+    /// Where all of this has passed the filter of a band: its corner, rad/s.
+    pub corner: Option<f64>,
+}
+
+impl Measured {
+    /// From the channels of an experiment, with the sensors at the values `scalars`.
+    ///
+    /// # Errors
+    /// What is missing.
+    fn of(
+        problem: &Problem,
+        experiment: &Experiment,
+        scalars: &[f64],
+    ) -> Result<Self, MissingMeasurement> {
+        if experiment
+            .channels
+            .iter()
+            .any(|c| c.loss() != Loss::Squares)
+        {
+            return Err(MissingMeasurement::QuadraticLoss);
+        }
+        let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
+        if experiment.channels.iter().any(sought) {
+            return Err(MissingMeasurement::KnownSensors);
+        }
+        if let [channel] = experiment.channels.as_slice()
+            && channel.kind() == ChannelKind::Acceleration
+            && let Some(spacing) = equal_spacing(channel.times())
+        {
+            return Self::in_band(experiment, channel, spacing, scalars)
+                .ok_or(MissingMeasurement::Oscillation);
+        }
+        let anchored = |c: &Channel| c.kind() == ChannelKind::Displacement && c.filter().is_empty();
+        if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
+            return Err(MissingMeasurement::FilteredDrive);
+        }
+        let motion = Kinematics::of(problem, experiment, scalars);
+        let motion = motion.ok_or(MissingMeasurement::Readings)?;
+        let measured = Self::at_nodes(problem, experiment, &motion);
+        let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
+        moves.then_some(measured).ok_or(MissingMeasurement::Motion)
+    }
+
+    /// From accelerations alone: motion, force and base through the same filter.
+    fn in_band(
+        experiment: &Experiment,
+        channel: &Channel,
+        spacing: f64,
+        scalars: &[f64],
+    ) -> Option<Self> {
+        let (values, _) = unsensed(channel, scalars);
+        let band = Band::of(&values, spacing)?;
+        let excitation = experiment.excitation.as_ref();
+        let around = (0..channel.len()).map(|i| channel.around_reading(excitation, i));
+        let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();
+        let sensed = |part: Vec<f64>| match channel.filter() {
+            [] => part,
+            filter => zero_phase(filter, &part),
+        };
+        let (force, base) = (sensed(force), sensed(base));
+        let [motion, force, base] = band
+            .motions(&[&values, &force, &base])?
+            .try_into()
+            .expect("one for each");
+        let skipped = match experiment.is_free() {
+            true => 1,
+            false => {
+                let periods = SETTLING * std::f64::consts::TAU / band.frequency;
+                let readings = (periods / spacing).ceil() as usize;
+                readings.clamp(1, channel.len() / MOST_LEFT_OUT)
+            }
+        };
+        let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
+        Some(Self {
+            places: channel.places()[skipped..channel.len() - skipped].to_vec(),
+            first: skipped,
+            y: kept(motion.y),
+            v: kept(motion.v),
+            a: kept(motion.a),
+            force: kept(force.a),
+            base: kept(base.a),
+            weight: spacing,
+            frequency: band.frequency,
+            corner: Some(band.corner()),
+        })
+    }
+
+    /// At the nodes at which a motion is known.
+    pub fn at_nodes(problem: &Problem, experiment: &Experiment, motion: &Kinematics) -> Self {
+        let excitation = experiment.excitation.as_ref();
+        let parts = [
+            excitation.and_then(|e| e.force.as_ref()),
+            excitation.and_then(|e| e.base.as_ref()),
+        ];
+        let [force, base] = parts.map(|part| {
+            let nodes = part.map(Stepwise::at_nodes);
+            let at = |node: &usize| nodes.as_ref().map_or(0.0, |f| f[*node]);
+            motion.nodes.iter().map(at).collect::<Vec<f64>>()
+        });
+        let stride = motion.nodes.windows(2).map(|w| w[1] - w[0]).min();
+        let place = |node: &usize| Place::node(*node, experiment.nodes);
+        Self {
+            places: motion.nodes.iter().map(place).collect(),
+            first: 0,
+            y: motion.y.clone(),
+            v: motion.v.clone(),
+            a: motion.a.clone(),
+            force,
+            base,
+            weight: stride.unwrap_or(1) as f64 * problem.oscillator.grid.step(),
+            frequency: rms(&motion.v) / rms(&motion.y),
+            corner: None,
+        }
+    }
+
+    /// What function `f` of a device multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
+    pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
+        match f {
+            0 => self.a[i] + self.base[i],
+            term => problem.oscillator.terms[term - 1].phi(self.y[i], self.v[i]),
+        }
+    }
+
+    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
+    pub fn errors(&self, problem: &Problem, device: &Device) -> Vec<f64> {
+        let error = |(i, place): (usize, &Place)| {
+            let forces = device.functions().enumerate();
+            let force =
+                |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
+            forces
+                .map(force)
+                .fold(-self.force[i], |sum, force| sum + force)
+        };
+        self.places.iter().enumerate().map(error).collect()
+    }
+
+    /// `integral error^2 dt`.
+    pub fn misfit(&self, errors: &[f64]) -> f64 {
+        self.weight * errors.iter().map(|e| e * e).sum::<f64>()
+    }
+
+    /// The motion on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
+    /// where nothing was measured.
+    pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
+        let mut motion = Trajectory::zeros(nodes);
+        let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
+        let last = self.places.len() - 1;
+        let mut i = 0;
+        for node in 0..nodes {
+            let x = node as f64;
+            while i < last && at(i + 1) <= x {
+                i += 1;
+            }
+            let since = (x - at(i)) * grid.step();
+            let (y, v) = match i < last && since > 0.0 {
+                true => self.between(i, since, (at(i + 1) - at(i)) * grid.step()),
+                false => self.swung_on(i, since),
+            };
+            motion.displacement[node] = y;
+            motion.velocity[node] = v;
+        }
+        motion
+    }
+
+    fn swung_on(&self, i: usize, since: f64) -> (f64, f64) {
+        let (y, v, w) = (self.y[i], self.v[i], self.frequency);
+        let (sine, cosine) = (w * since).sin_cos();
+        (y * cosine + v / w * sine, v * cosine - w * y * sine)
+    }
+
+    /// Cubic Hermite polynomials through displacement and velocity, and velocity and acceleration.
+    fn between(&self, i: usize, since: f64, span: f64) -> (f64, f64) {
+        let x = since / span;
+        let cubic = |p: &[f64], d: &[f64]| {
+            let (x2, x3) = (x * x, x * x * x);
+            (1.0 - 3.0 * x2 + 2.0 * x3) * p[i]
+                + span * (x - 2.0 * x2 + x3) * d[i]
+                + (3.0 * x2 - 2.0 * x3) * p[i + 1]
+                + span * (x3 - x2) * d[i + 1]
+        };
+        (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
+    }
+
+    /// What the model says of the readings at this state.
+    ///
+    /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
+    /// the filter took from the reading, so that model less reading is minus the equation's error
+    /// over the mass; the readings at the ends, which are left out, stand for themselves.
+    pub fn predict(&self, problem: &Problem, channel: &Channel, view: View) -> Vec<f64> {
+        if self.corner.is_none() {
+            return channel.predict(view);
+        }
+        let [gain, ..] = channel.sensor().values(view.scalars);
+        let mut predicted = channel.observed().to_vec();
+        for (i, error) in self.errors(problem, view.device).iter().enumerate() {
+            predicted[self.first + i] -= gain * error / blend(&view.device.mass, self.places[i]);
+        }
+        predicted
+    }
+}
+
+/// The value at a place of a function that is linear between nodes.
+fn blend(values: &[f64], place: Place) -> f64 {
+    let [left, right] = [values[place.step], values[place.step + 1]];
+    match place.fraction {
+        0.0 => left,
+        1.0 => right,
+        x => left * (1.0 - x) + right * x,
+    }
+}
+
+/// The spacing of times that are equally spaced.
+fn equal_spacing(times: &[f64]) -> Option<f64> {
+    let steps = times.len().checked_sub(1).filter(|steps| *steps > 0)?;
+    let spacing = (times[steps] - times[0]) / steps as f64;
+    let in_place = |(i, t): (usize, &f64)| {
+        let distance = (t - times[0] - i as f64 * spacing).abs();
+        distance <= Place::SAME_TIME * spacing
+    };
+    times.iter().enumerate().all(in_place).then_some(spacing)
+}
+
+/// The motions of all experiments as their readings tell them.
+///
+/// From one channel of equally spaced accelerations the motion is integrated in a band around its
+/// dominant frequency, and force and base pass the same filter. From any other channels a smooth
+/// curve through all of them is differentiated, as for the start from the data.
+pub struct Measurements {
+    /// `None` for an experiment without readings.
+    pub(super) experiments: Vec<Option<Measured>>,
+}
+
+impl Measurements {
+    /// From the readings of a problem, with the scalars at their start.
+    ///
+    /// # Errors
+    /// The first experiment whose readings do not tell a motion.
+    pub fn of(problem: &Problem) -> Result<Self, Unsuited> {
+        Self::with_scalars(problem, problem.scalars(&problem.start()))
+    }
+
+    pub(super) fn with_scalars(problem: &Problem, scalars: &[f64]) -> Result<Self, Unsuited> {
+        let one = |(index, experiment): (usize, &Experiment)| {
+            if experiment.channels.is_empty() {
+                return Ok(None);
+            }
+            let measured = Measured::of(problem, experiment, scalars);
+            measured.map(Some).map_err(|reason| Unsuited {
+                experiment: index,
+                name: experiment.name.clone(),
+                reason,
+            })
+        };
+        let experiments = problem.experiments.iter().enumerate().map(one);
+        Ok(Self {
+            experiments: experiments.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
+    /// only forces proportional to the motion do without.
+    pub fn remarks(&self, problem: &Problem) -> Vec<String> {
+        let terms = problem.oscillator.terms.iter();
+        if terms.clone().all(|term| term.is_linear()) {
+            return Vec::new();
+        }
+        let in_bands = problem.experiments.iter().zip(&self.experiments);
+        let one = |(experiment, measured): (&Experiment, &Option<Measured>)| {
+            let corner = measured.as_ref()?.corner? / std::f64::consts::TAU;
+            Some(format!(
+                "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that are \
+                 not proportional to the motion are seen with an error, and a constant offset is not \
+                 seen",
+                experiment.name
+            ))
+        };
+        in_bands.filter_map(one).collect()
+    }
+
+    /// The weight of a penalty on derivative `order` of function `index` of the list with which the
+    /// smoother's time constant is one dominant period T where the motion has its mean amplitude:
+    /// `mean(phi^2) T^(2 order)`, summed over the experiments that have the function. T is the mean
+    /// of theirs.
+    ///
+    /// Where nothing else changes, `integral (phi p - g)^2 + weight p'^2 dt` smooths `p` by
+    /// `exp(-|t|/T)/(2T)`.
+    pub fn period_weight(&self, problem: &Problem, index: usize, order: usize) -> f64 {
+        let mut squares = 0.0;
+        let mut periods = Vec::new();
+        for (f, measured) in self.with_function(problem, index) {
+            squares += measured.mean_square(problem, f);
+            periods.push(std::f64::consts::TAU / measured.frequency);
+        }
+        let period = periods.iter().sum::<f64>() / periods.len().max(1) as f64;
+        squares * period.powi(2 * order as i32)
+    }
+
+    /// The largest value at `start` of each function of the list.
+    pub(super) fn own_sizes(problem: &Problem, start: &[f64]) -> Vec<f64> {
+        let values = problem.functions.values(start);
+        let largest = |f: &Vec<f64>| f.iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        values.iter().map(largest).collect()
+    }
+
+    /// The larger of a function's own largest value at `start` and of the value at which its force
+    /// would be as large as the mass's, for each function of the list.
+    pub(super) fn sizes(&self, problem: &Problem, start: &[f64]) -> Vec<f64> {
+        let sizes = Self::own_sizes(problem, start);
+        let own = |index: usize| sizes[index];
+        let natural = |index: usize| {
+            let [mut inertia, mut response] = [0.0, 0.0];
+            for (f, measured) in self.with_function(problem, index) {
+                let mass = mass_of(&problem.functions, index).map_or(1.0, own);
+                inertia += mass * mass * measured.mean_square(problem, 0);
+                response += measured.mean_square(problem, f);
+            }
+            match response > 0.0 {
+                true => f64::sqrt(inertia / response),
+                false => 0.0,
+            }
+        };
+        (0..sizes.len())
+            .map(|index| own(index).max(natural(index)))
+            .collect()
+    }
+
+    /// The experiments that have function `index` of the list, and which of their device it is.
+    fn with_function<'a>(
+        &'a self,
+        problem: &'a Problem,
+        index: usize,
+    ) -> impl Iterator<Item = (usize, &'a Measured)> {
+        let all = problem.experiments.iter().zip(&self.experiments);
+        all.filter_map(move |(experiment, measured)| {
+            let assembly = problem.functions.assembly(experiment.device);
+            let f = assembly.iter().position(|f| *f == index)?;
+            Some((f, measured.as_ref()?))
+        })
+    }
+}
+
+/// The mass of the first device that has function `index` of the list.
+fn mass_of(functions: &Functions, index: usize) -> Option<usize> {
+    let mut devices = functions.assemblies().iter();
+    let device = devices.find(|assembly| assembly.contains(&index))?;
+    device.first().copied()
+}
+
+impl Measured {
+    /// Mean of the squared response of function `f` of the device.
+    fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
+        let n = self.places.len();
+        let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
+        squares.sum::<f64>() / n.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP: f64 = 0.25;
+    const NODES: usize = 24;
+
+    fn grid() -> Grid {
+        Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
+    }
+
+    /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
+    fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
+        let between = |step| Place {
+            step,
+            fraction: 0.5,
+        };
+        let node = |i| Place::node(i, NODES);
+        let places = vec![node(3), node(5), between(6), between(9), node(12), node(18)];
+        let time = |p: &Place| (p.step as f64 + p.fraction) * STEP;
+        let all: Vec<[f64; 3]> = places.iter().map(|p| state(time(p))).collect();
+        let part = |j: usize| all.iter().map(|state| state[j]).collect::<Vec<f64>>();
+        Measured {
+            first: 0,
+            y: part(0),
+            v: part(1),
+            a: part(2),
+            force: vec![0.0; all.len()],
+            base: vec![0.0; all.len()],
+            weight: STEP,
+            frequency,
+            corner: None,
+            places,
+        }
+    }
+
+    /// The largest distance of a motion from what `state` tells of displacement and velocity.
+    fn distance(
+        motion: &Trajectory,
+        nodes: impl Iterator<Item = usize>,
+        state: impl Fn(f64) -> [f64; 3],
+    ) -> f64 {
+        let one = |i: usize| {
+            let [y, v, _] = state(i as f64 * STEP);
+            let [of_y, of_v] = [motion.displacement[i] - y, motion.velocity[i] - v];
+            of_y.abs() + of_v.abs()
+        };
+        // What is no number is the largest.
+        nodes.map(one).max_by(f64::total_cmp).unwrap()
+    }
+
+    /// Polynomials of degree 3 through values and slopes give back one, at the places and between.
+    #[test]
+    fn a_cubic_motion_is_exact_between_its_readings() {
+        let cubic = |t: f64| {
+            [
+                0.3 + t - 2.0 * t * t + 0.7 * t * t * t,
+                1.0 - 4.0 * t + 2.1 * t * t,
+                4.2 * t - 4.0,
+            ]
+        };
+        let motion = measured(1.0, cubic).trajectory(&grid(), NODES);
+        let off = distance(&motion, 3..=18, cubic);
+        assert!(off < 1e-12, "{off}");
+    }
+
+    #[test]
+    fn a_harmonic_motion_swings_on_beyond_its_readings() {
+        let w = 1.7;
+        let harmonic = |t: f64| {
+            let (sine, cosine) = (w * t + 0.4).sin_cos();
+            [2.0 * cosine, -2.0 * w * sine, -2.0 * w * w * cosine]
+        };
+        let motion = measured(w, harmonic).trajectory(&grid(), NODES);
+        let off = distance(&motion, (0..=3).chain(18..NODES), harmonic);
+        assert!(off < 1e-12, "{off}");
+    }
+
+    /// Whether times are equally spaced is no matter of how long a second is.
+    #[test]
+    fn equal_spacing_knows_no_unit() {
+        for spacing in [1e-6, 1.0, 1e6] {
+            let times = |off: f64| -> Vec<f64> {
+                let late = |i: usize| if i == 3 { off } else { 0.0 };
+                (0..8)
+                    .map(|i| spacing * (7.0 + i as f64 + late(i)))
+                    .collect()
+            };
+            let found = equal_spacing(&times(0.1 * Place::SAME_TIME)).expect("equal");
+            assert!((found / spacing - 1.0).abs() < 1e-12);
+            assert_eq!(equal_spacing(&times(0.1)), None, "{spacing}");
+        }
+        assert_eq!(equal_spacing(&[1.0]), None);
+    }
+}

@@ -1,0 +1,213 @@
+//! Gauss–Newton steps with a proximal term, under constraints.
+//!
+//! Each iteration minimises the linearised cost plus `damping * J * sum_f 1/T integral (delta p_f /
+//! size of p_f)^2 dt` under the linearised constraints. The plain step, one sparse factorisation, is
+//! taken where it stays in the set; where it leaves a set of simple bounds, the clipped step is
+//! taken if it is nearly as good as the plain one, which no step in the set can beat, or else the plain
+//! step with those bounds held that it meets; only otherwise a quadratic program is solved.
+
+mod proposal;
+
+use super::{Step, StepRule, no_step};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::solvers::checkpoint::{Bits, Memory};
+use crate::solvers::evaluator::Work;
+use crate::solvers::iterate::Point;
+use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
+use crate::solvers::optimality::Optimality;
+use crate::solvers::reason::Reason;
+use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
+
+/// First weight of the proximal term, relative to J.
+const FIRST_DAMPING: f64 = 1e-2;
+/// Smallest weight: less is lost in the factorisation's own shift.
+const LEAST_DAMPING: f64 = 1e-10;
+/// Largest weight: a step so short changes no digit of the cost.
+const MOST_DAMPING: f64 = 1e14;
+/// A step is taken if it brings this share of the predicted decrease.
+const ACCEPTED: f64 = 0.05;
+/// Above this share the damping falls, below the next it rises.
+const GOOD: f64 = 0.7;
+const POOR: f64 = 0.3;
+/// A predicted decrease below this share of J0 is rounding: J0 is a sum of squares, so this is the
+/// square of the precision of its terms.
+const NO_DECREASE: f64 = 1e-30;
+
+/// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
+const NEARBY: f64 = 1e-2;
+/// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
+/// one sooner. A step with the old one leaves about that share of the error, which one with its own would square.
+const AS_PREDICTED: f64 = 0.1;
+
+/// The method and its damping.
+pub struct GaussNewton {
+    damping: f64,
+    first_cost: Option<f64>,
+    /// Storage for the next trial.
+    spare: Option<Evaluation>,
+}
+
+impl Default for GaussNewton {
+    fn default() -> Self {
+        Self {
+            damping: FIRST_DAMPING,
+            first_cost: None,
+            spare: None,
+        }
+    }
+}
+
+impl StepRule for GaussNewton {
+    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+        let problem = work.problem();
+        let first_cost = *self.first_cost.get_or_insert(point.evaluation.cost);
+        if point.evaluation.cost <= NO_DECREASE * first_cost {
+            return Step::Minimum(Reason::ZeroCost);
+        }
+        let mut linearization = work.linearization(point);
+        work.count_linearisation(linearisation_tangents(problem));
+        let mut sub = subproblem(work, point, &linearization);
+        // Diagonal of the proximal term.
+        let scales = point.relative_metric(problem);
+        let mut evaluation = self.spare.take().unwrap_or_else(|| problem.workspace());
+        let mut trouble = None;
+        let before = self.damping;
+        while self.damping <= MOST_DAMPING {
+            let weight = self.damping * point.evaluation.cost;
+            for (d, s) in sub.proximal.iter_mut().zip(&scales) {
+                *d = weight * s;
+            }
+            let proposal = match propose(work, &sub, point) {
+                Answer::Step(proposal) => proposal,
+                Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
+                    return Step::Minimum(Reason::NegligibleResiduals);
+                }
+                Answer::Unsolved(status) => {
+                    trouble = Some(status);
+                    self.damping *= 10.0;
+                    continue;
+                }
+            };
+            let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
+            let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
+            let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
+            if trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
+                // What is left of the step by damping away the programs that stalled.
+                break;
+            }
+            if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
+                self.learn(gain);
+                if trouble.is_none() && proposal.uncertainty > 0.0 {
+                    trouble = Some(ConicStatus::Almost);
+                }
+                if trouble.is_some() {
+                    // The next programs are others: they get the chance to be solved with less.
+                    self.damping = before;
+                }
+                let is_nearby = (gain - 1.0).abs() <= AS_PREDICTED
+                    && distance(problem, point, &linearization, &proposal) <= NEARBY;
+                let to = proposal.parameters;
+                let moved = match is_nearby {
+                    true => work.complete_nearby(point, &linearization, to, evaluation),
+                    false => work.complete(to, evaluation),
+                };
+                return Step::Moved {
+                    point: Box::new(moved),
+                    length: 1.0,
+                    limited: trouble.is_some(),
+                };
+            }
+            if linearization.computed_at().is_some() {
+                // The Jacobian of another point may be to blame.
+                work.count_tangents(linearisation_tangents(problem));
+                linearization = work.linearise_again(point);
+                sub = subproblem(work, point, &linearization);
+                continue;
+            }
+            if trouble.is_none()
+                && let Some(reason) = at_minimum(problem, point, &proposal)
+            {
+                return Step::Minimum(reason);
+            }
+            if proposal.uncertainty > 0.0 {
+                // A shorter step promises less for being short.
+                trouble = trouble.or(Some(ConicStatus::Almost));
+            }
+            self.damping *= 8.0;
+        }
+        self.damping = FIRST_DAMPING;
+        match trouble {
+            Some(status) => no_step(problem, point, status),
+            None => Step::Stuck(Reason::NoLowerGaussNewtonStep),
+        }
+    }
+
+    fn recycle(&mut self, evaluation: Evaluation) {
+        self.spare = Some(evaluation);
+    }
+
+    fn memory(&self, point: &Point) -> Memory {
+        let numbers = std::iter::once(self.damping).chain(self.first_cost);
+        let made_at = point.linearization().computed_at();
+        Memory::GaussNewton {
+            numbers: Bits(numbers.collect()),
+            made_at: made_at.map(|at| Bits(at.to_vec())),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, problem: &Problem, point: &mut Point) -> bool {
+        let Memory::GaussNewton { numbers, made_at } = memory else {
+            return false;
+        };
+        let (damping, first_cost) = match *numbers.0.as_slice() {
+            [damping] => (damping, None),
+            [damping, first_cost] => (damping, Some(first_cost)),
+            _ => return false,
+        };
+        if let Some(Bits(at)) = made_at {
+            let is_whole = at.len() == problem.parameters();
+            if !is_whole || !point.reuse_linearization(problem, at) {
+                return false;
+            }
+        }
+        (self.damping, self.first_cost) = (damping, first_cost);
+        true
+    }
+}
+
+impl GaussNewton {
+    fn learn(&mut self, gain: f64) {
+        if gain > GOOD {
+            self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
+        } else if gain < POOR {
+            self.damping *= 3.0;
+        }
+    }
+}
+
+/// The subproblem at a point, without the proximal term.
+fn subproblem(work: &mut Work, point: &Point, linearization: &Linearization) -> Subproblem {
+    let (parameters, evaluation) = (&point.parameters, &point.evaluation);
+    let problem = work.problem();
+    linearise(
+        problem,
+        parameters,
+        evaluation,
+        linearization,
+        &mut work.timings,
+    )
+    .0
+}
+
+/// How far a proposal is from where the Jacobian was computed, relative to the sizes of the functions at the point.
+fn distance(
+    problem: &Problem,
+    point: &Point,
+    linearization: &Linearization,
+    proposal: &Proposal,
+) -> f64 {
+    let from = linearization.computed_at().unwrap_or(&point.parameters);
+    point.distance(problem, from, &proposal.parameters)
+}

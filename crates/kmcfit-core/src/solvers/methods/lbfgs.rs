@@ -1,0 +1,442 @@
+//! Limited-memory BFGS in the L2 inner product.
+//!
+//! The search runs in coordinates `x`: the logarithm of the mass where its parameters can carry
+//! one, the parameters themselves elsewhere, or what they are of a [`unit`] where their numbers are
+//! very large or small. A step in `ln m` cannot take the mass through zero,
+//! where plain L-BFGS ends. All inner products are those of functions of time, `x^T G x'`, so the
+//! path hardly depends on the number of nodes. Pairs that have lost curvature are left out; after
+//! a failed line search the memory is dropped once and the search goes on along the gradient.
+//!
+//! argmin runs the loop and counts the solves; its own L-BFGS is not used, as it has no guard
+//! against lost curvature, no step limit, and asks for cost and gradient separately.
+
+use super::line_search::{Line, weak_wolfe};
+use super::{Step, StepRule};
+use crate::functions::{Functions, Quantity};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::simd::sum::dot;
+use crate::simd::sum::largest;
+use crate::simd::{self, Elementwise};
+use crate::solvers::checkpoint::{Bits, Memory};
+use crate::solvers::evaluator::Work;
+use crate::solvers::iterate::Point;
+use crate::solvers::reason::Reason;
+use std::collections::VecDeque;
+
+/// Pairs with `<s, z>` below this fraction of `|s| |z|` carry rounding, not curvature.
+const LOST_CURVATURE: f64 = 1e-10;
+/// Largest change of `ln m` at the first trial of a step: a factor of e.
+const LONGEST_LOG_STEP: f64 = 1.0;
+
+/// Functions whose start is within these need no other unit.
+const ORDINARY: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+/// The method and its memory.
+pub struct Lbfgs {
+    memory: usize,
+    pairs: VecDeque<Pair>,
+    /// The point that the last step led to.
+    here: Option<Here>,
+}
+
+/// A vector of coordinates `x` and its dual `G x`: inner products are sums of products of the two.
+struct Vector {
+    primal: Vec<f64>,
+    dual: Vec<f64>,
+}
+
+/// A step `s` and the change `z` of the gradient along it.
+struct Pair {
+    s: Vector,
+    z: Vector,
+    curvature: f64,
+}
+
+/// What is known of a point in coordinates.
+struct Here {
+    parameters: Vec<f64>,
+    logarithmic: Vec<bool>,
+    x: Vec<f64>,
+    gradient: Vector,
+}
+
+impl Vector {
+    /// `x^T G x'`.
+    fn inner(&self, primal: &[f64]) -> f64 {
+        dot(&self.dual, primal)
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        Self {
+            primal: difference(&self.primal, &other.primal),
+            dual: difference(&self.dual, &other.dual),
+        }
+    }
+}
+
+impl Lbfgs {
+    pub fn new(memory: usize) -> Self {
+        Self {
+            memory,
+            pairs: VecDeque::with_capacity(memory),
+            here: None,
+        }
+    }
+
+    fn attempt(&mut self, work: &mut Work, at: &Coordinates, point: &Point) -> Option<Step> {
+        let Here { x, gradient, .. } = self.here(at, point);
+        let direction = work.algebra(|| self.direction(&gradient.primal));
+        let slope = gradient.inner(&direction);
+        if slope.is_nan() || slope >= 0.0 {
+            return None;
+        }
+        let first = if self.pairs.is_empty() {
+            // The step at which the linear model of J reaches zero.
+            -point.evaluation.cost / slope
+        } else {
+            1.0
+        };
+        let mut trials = Trials {
+            at,
+            x,
+            direction: &direction,
+            spare: Some(work.problem().workspace()),
+            candidate: None,
+            accepted: None,
+            work,
+        };
+        let longest = LONGEST_LOG_STEP / at.largest_log_change(&direction);
+        weak_wolfe(
+            &mut trials,
+            point.evaluation.cost,
+            slope,
+            first.min(longest),
+        )?;
+        let Accepted {
+            length,
+            x: next_x,
+            point: next,
+            gradient: next_gradient,
+        } = trials.accepted?;
+        let x = trials.x;
+        work.algebra(|| {
+            let s = difference(&next_x, &x);
+            let dual = at.functions.gram_multiply(&s);
+            self.remember(Vector { primal: s, dual }, next_gradient.minus(&gradient));
+        });
+        self.here = Some(Here {
+            parameters: next.parameters.clone(),
+            logarithmic: at.logarithmic.clone(),
+            x: next_x,
+            gradient: next_gradient,
+        });
+        Some(Step::Moved {
+            point: Box::new(next),
+            length,
+            limited: false,
+        })
+    }
+
+    /// The point in coordinates, as the last step left it if it is still the same.
+    fn here(&mut self, at: &Coordinates, point: &Point) -> Here {
+        let same =
+            |here: &Here| here.parameters == point.parameters && here.logarithmic == at.logarithmic;
+        match self.here.take().filter(same) {
+            Some(here) => here,
+            None => Here {
+                parameters: point.parameters.clone(),
+                logarithmic: at.logarithmic.clone(),
+                x: at.forth(&point.parameters),
+                gradient: at.gradient(point),
+            },
+        }
+    }
+
+    fn remember(&mut self, s: Vector, z: Vector) {
+        let curvature = s.inner(&z.primal);
+        let scale = (s.inner(&s.primal) * z.inner(&z.primal)).sqrt();
+        if curvature > LOST_CURVATURE * scale {
+            if self.pairs.len() == self.memory {
+                self.pairs.pop_front();
+            }
+            self.pairs.push_back(Pair { s, z, curvature });
+        }
+    }
+
+    /// The two-loop recursion, `-H g`.
+    fn direction(&self, gradient: &[f64]) -> Vec<f64> {
+        let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
+        let mut weights = Vec::with_capacity(self.pairs.len());
+        for pair in self.pairs.iter().rev() {
+            let weight = pair.s.inner(&q) / pair.curvature;
+            add_scaled(&mut q, -weight, &pair.z.primal);
+            weights.push(weight);
+        }
+        if let Some(last) = self.pairs.back() {
+            let scale = last.curvature / last.z.inner(&last.z.primal);
+            q.iter_mut().for_each(|q| *q *= scale);
+        }
+        for (pair, weight) in self.pairs.iter().zip(weights.into_iter().rev()) {
+            let back = pair.z.inner(&q) / pair.curvature;
+            add_scaled(&mut q, weight - back, &pair.s.primal);
+        }
+        q
+    }
+}
+
+impl StepRule for Lbfgs {
+    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+        let at = Coordinates::new(work.problem(), &point.parameters);
+        if let Some(step) = self.attempt(work, &at, point) {
+            return step;
+        }
+        if !self.pairs.is_empty() {
+            self.pairs.clear();
+            if let Some(step) = self.attempt(work, &at, point) {
+                return step;
+            }
+        }
+        Step::Stuck(Reason::NoLowerLineStep)
+    }
+
+    fn memory(&self, _: &Point) -> Memory {
+        let here = self.here.as_ref();
+        let pair = |p: &Pair| {
+            let [s, z] = [&p.s, &p.z].map(|v| Bits(v.primal.clone()));
+            [s, z, Bits(p.z.dual.clone()), Bits(vec![p.curvature])]
+        };
+        Memory::Lbfgs {
+            x: Bits(here.map_or(Vec::new(), |here| here.x.clone())),
+            logarithmic: here.map_or(Vec::new(), |here| here.logarithmic.clone()),
+            pairs: self.pairs.iter().map(pair).collect(),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, problem: &Problem, point: &mut Point) -> bool {
+        let Memory::Lbfgs {
+            x,
+            logarithmic,
+            pairs,
+        } = memory
+        else {
+            return false;
+        };
+        let len = point.parameters.len();
+        let pair = |[s, z, dual, curvature]: [Bits; 4]| {
+            let whole = [&s, &z, &dual].iter().all(|v| v.0.len() == len);
+            let [curvature] = *curvature.0.as_slice() else {
+                return None;
+            };
+            whole.then(|| Pair {
+                s: Vector {
+                    dual: problem.functions.gram_multiply(&s.0),
+                    primal: s.0,
+                },
+                z: Vector {
+                    primal: z.0,
+                    dual: dual.0,
+                },
+                curvature,
+            })
+        };
+        let pairs: Option<VecDeque<Pair>> = pairs.into_iter().map(pair).collect();
+        let Some(pairs) = pairs.filter(|pairs| pairs.len() <= self.memory) else {
+            return false;
+        };
+        // After a step there is always the point that it led to.
+        if [x.0.len(), logarithmic.len()] != [len; 2] {
+            return false;
+        }
+        let at = Coordinates {
+            functions: &problem.functions,
+            units: units(&problem.functions),
+            logarithmic,
+        };
+        self.here = Some(Here {
+            parameters: point.parameters.clone(),
+            x: x.0,
+            gradient: at.gradient(point),
+            logarithmic: at.logarithmic,
+        });
+        self.pairs = pairs;
+        true
+    }
+}
+
+/// Which coordinates are logarithms, the units of the others, and the inner product of all.
+struct Coordinates<'p> {
+    functions: &'p Functions,
+    units: Vec<f64>,
+    logarithmic: Vec<bool>,
+}
+
+/// The unit of every parameter.
+fn units(functions: &Functions) -> Vec<f64> {
+    let mut units = vec![1.0; functions.parameters()];
+    for (function, range) in functions.iter().zip(functions.ranges()) {
+        units[range.clone()].fill(unit(largest(&function.start)));
+    }
+    units
+}
+
+/// The power of two nearest to a function's start, where a number of that size beside ordinary ones
+/// would leave the first steps without any change of it, or with nothing else; otherwise one.
+fn unit(size: f64) -> f64 {
+    let ordinary = size == 0.0 || ORDINARY.contains(&size) || !size.is_finite();
+    if ordinary {
+        1.0
+    } else {
+        size.log2().round().exp2()
+    }
+}
+
+impl<'p> Coordinates<'p> {
+    fn new(problem: &'p Problem, parameters: &[f64]) -> Self {
+        let functions = &problem.functions;
+        let mut logarithmic = vec![false; parameters.len()];
+        for (function, range) in functions.iter().zip(functions.ranges()) {
+            let all_positive = parameters[range.clone()].iter().all(|p| *p > 0.0);
+            if function.quantity == Quantity::Mass && function.positive_parameters && all_positive {
+                logarithmic[range.clone()].fill(true);
+            }
+        }
+        Self {
+            functions,
+            units: units(functions),
+            logarithmic,
+        }
+    }
+
+    /// For each parameter whether it is a logarithm, and its unit.
+    fn kinds(&self) -> impl Iterator<Item = (bool, f64)> {
+        self.logarithmic
+            .iter()
+            .copied()
+            .zip(self.units.iter().copied())
+    }
+
+    fn forth(&self, parameters: &[f64]) -> Vec<f64> {
+        let pairs = parameters.iter().zip(self.kinds());
+        pairs
+            .map(|(p, (log, unit))| if log { p.ln() } else { p / unit })
+            .collect()
+    }
+
+    fn back(&self, x: &[f64]) -> Vec<f64> {
+        let pairs = x.iter().zip(self.kinds());
+        pairs
+            .map(|(x, (log, unit))| if log { x.exp() } else { x * unit })
+            .collect()
+    }
+
+    /// The gradient in these coordinates: L2, and Euclidean as its dual.
+    fn gradient(&self, point: &Point) -> Vector {
+        let dual: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
+            .zip(self.kinds())
+            .map(|((g, p), (log, unit))| if log { g * p } else { g * unit })
+            .collect();
+        Vector {
+            primal: self.functions.gram_solve(&dual),
+            dual,
+        }
+    }
+
+    fn largest_log_change(&self, direction: &[f64]) -> f64 {
+        let logs = direction
+            .iter()
+            .zip(&self.logarithmic)
+            .filter(|(_, log)| **log);
+        logs.fold(0.0f64, |most, (d, _)| most.max(d.abs()))
+    }
+}
+
+/// Trial points along one direction.
+struct Trials<'a, 'w, 'q, 'p> {
+    work: &'a mut Work<'w, 'q>,
+    at: &'a Coordinates<'p>,
+    x: Vec<f64>,
+    direction: &'a [f64],
+    spare: Option<Evaluation>,
+    candidate: Option<Candidate>,
+    /// The lowest trial that lowered the cost enough.
+    accepted: Option<Accepted>,
+}
+
+/// A trial with its cost alone.
+struct Candidate {
+    length: f64,
+    x: Vec<f64>,
+    parameters: Vec<f64>,
+    evaluation: Evaluation,
+}
+
+/// A trial with its gradient.
+struct Accepted {
+    length: f64,
+    x: Vec<f64>,
+    point: Point,
+    gradient: Vector,
+}
+
+impl Line for Trials<'_, '_, '_, '_> {
+    fn cost(&mut self, length: f64) -> Option<f64> {
+        let mut x = self.x.clone();
+        add_scaled(&mut x, length, self.direction);
+        let parameters = self.at.back(&x);
+        let mut evaluation = match (self.spare.take(), self.candidate.take()) {
+            (Some(spare), _) => spare,
+            (None, Some(used)) => used.evaluation,
+            (None, None) => self.work.problem().workspace(),
+        };
+        match self.work.evaluate_into(&parameters, &mut evaluation) {
+            Ok(()) => {
+                let cost = evaluation.cost;
+                self.candidate = Some(Candidate {
+                    length,
+                    x,
+                    parameters,
+                    evaluation,
+                });
+                Some(cost)
+            }
+            Err(_) => {
+                self.spare = Some(evaluation);
+                None
+            }
+        }
+    }
+
+    fn slope(&mut self) -> f64 {
+        let Some(candidate) = self.candidate.take() else {
+            return f64::NAN;
+        };
+        let point = self
+            .work
+            .complete(candidate.parameters, candidate.evaluation);
+        let gradient = self.at.gradient(&point);
+        let slope = gradient.inner(self.direction);
+        let lowest = self.accepted.as_ref().map(|a| a.point.evaluation.cost);
+        if lowest.is_none_or(|lowest| point.evaluation.cost < lowest) {
+            self.accepted = Some(Accepted {
+                length: candidate.length,
+                x: candidate.x,
+                point,
+                gradient,
+            });
+        }
+        slope
+    }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn add_scaled(a: &mut [f64], factor: f64, b: &[f64]) {
+    simd::run(Elementwise(|| {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a += factor * b;
+        }
+    }));
+}

@@ -1,0 +1,162 @@
+//! Spectral projected gradient: a gradient step, projected onto the constraints, then a line search
+//! towards the projection.
+//!
+//! After E. G. Birgin, J. M. Martinez, M. Raydan, *Nonmonotone spectral projected gradient methods on
+//! convex sets*, SIAM J. Optim. 10 (2000), with a monotone line search, so that the best point is
+//! always the last. Metric and projection are those of functions, `sum_f 1/T integral (delta p_f /
+//! size_f)^2 dt`, with the sizes at the start of the search.
+
+use super::{Step, StepRule, no_step};
+use crate::constraints::TOLERANCE;
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, project_within};
+use crate::solvers::checkpoint::{Bits, Memory};
+use crate::solvers::evaluator::Work;
+use crate::solvers::iterate::Point;
+use crate::solvers::reason::Reason;
+
+/// Sufficient decrease along the feasible direction.
+const DECREASE: f64 = 1e-4;
+/// Halvings of the step before the search gives up.
+const HALVINGS: u32 = 40;
+/// Bounds on the spectral step relative to the first one.
+const STEP_RANGE: [f64; 2] = [1e-10, 1e10];
+
+/// The method: the metric of the search, and the last step and change of gradient.
+#[derive(Default)]
+pub struct ProjectedGradient {
+    metric: Vec<f64>,
+    first_length: f64,
+    length: f64,
+}
+
+impl StepRule for ProjectedGradient {
+    fn step(&mut self, work: &mut Work, point: &Point) -> Step {
+        if self.metric.is_empty() {
+            self.prepare(work, point);
+        }
+        let target = match self.target(work, point) {
+            Ok(target) => target,
+            Err(status) => return no_step(work.problem(), point, status),
+        };
+        let direction = difference(&target, &point.parameters);
+        let slope = dot(&point.gradient.euclidean, &direction);
+        if slope.abs() <= f64::EPSILON * point.evaluation.cost {
+            return Step::Minimum(Reason::ZeroProjectedGradient);
+        }
+        // Also of no number: towards a projection the cost falls, and where it does not the projection is wrong.
+        if slope.is_nan() || slope > 0.0 {
+            return Step::Stuck(Reason::NoDescentToProjection);
+        }
+        let mut evaluation = work.problem().workspace();
+        let mut share = 1.0;
+        for _ in 0..HALVINGS {
+            let trial: Vec<f64> = (point.parameters.iter().zip(&direction))
+                .map(|(p, d)| p + share * d)
+                .collect();
+            let lower = work.evaluate_into(&trial, &mut evaluation).is_ok()
+                && evaluation.cost <= point.evaluation.cost + DECREASE * share * slope
+                && evaluation.cost < point.evaluation.cost;
+            if lower {
+                let next = work.complete(trial, evaluation);
+                self.learn(point, &next);
+                return Step::Moved {
+                    point: Box::new(next),
+                    length: share,
+                    limited: false,
+                };
+            }
+            share *= 0.5;
+        }
+        Step::Stuck(Reason::NoLowerStepToProjection)
+    }
+
+    fn memory(&self, _: &Point) -> Memory {
+        Memory::ProjectedGradient {
+            metric: Bits(self.metric.clone()),
+            lengths: Bits(vec![self.first_length, self.length]),
+        }
+    }
+
+    fn recall(&mut self, memory: Memory, _: &Problem, point: &mut Point) -> bool {
+        let Memory::ProjectedGradient { metric, lengths } = memory else {
+            return false;
+        };
+        let [first_length, length] = *lengths.0.as_slice() else {
+            return false;
+        };
+        *self = Self {
+            metric: metric.0,
+            first_length,
+            length,
+        };
+        self.metric.len() == point.parameters.len()
+    }
+}
+
+impl ProjectedGradient {
+    fn prepare(&mut self, work: &Work, point: &Point) {
+        let problem = work.problem();
+        self.metric = point.relative_metric(problem);
+        // The step at which the linear model of J reaches zero.
+        let gradient = &point.gradient.euclidean;
+        let squared: f64 = gradient
+            .iter()
+            .zip(&self.metric)
+            .map(|(g, m)| g * g / m)
+            .sum();
+        self.first_length = point.evaluation.cost / squared.max(f64::MIN_POSITIVE);
+        self.length = self.first_length;
+    }
+
+    /// The projection of the gradient step.
+    fn target(&self, work: &mut Work, point: &Point) -> Result<Vec<f64>, ConicStatus> {
+        let constraints = &work.problem().constraints;
+        let steps = point.gradient.euclidean.iter().zip(&self.metric);
+        let mut target: Vec<f64> = (point.parameters.iter().zip(steps))
+            .map(|(p, (g, m))| p - self.length * g / m)
+            .collect();
+        if constraints.are_simple() {
+            // In a diagonal metric clipping is the projection.
+            constraints.clip(&mut target);
+            return Ok(target);
+        }
+        if constraints.hold(&target, 0.0) {
+            return Ok(target);
+        }
+        let iterations = work.program_iterations;
+        let projection =
+            work.program(|| project_within(iterations, constraints, &target, &self.metric));
+        match projection.status {
+            ConicStatus::Solved | ConicStatus::Almost
+                if constraints.hold(&projection.theta, TOLERANCE) =>
+            {
+                Ok(projection.theta)
+            }
+            ConicStatus::Solved | ConicStatus::Almost => Err(ConicStatus::Stalled),
+            status => Err(status),
+        }
+    }
+
+    /// The spectral step `|s|^2 / <s, z>` in the metric.
+    fn learn(&mut self, before: &Point, after: &Point) {
+        let s = difference(&after.parameters, &before.parameters);
+        let z = difference(&after.gradient.euclidean, &before.gradient.euclidean);
+        let squared: f64 = s.iter().zip(&self.metric).map(|(s, m)| m * s * s).sum();
+        let curvature = dot(&s, &z);
+        let [low, high] = STEP_RANGE.map(|factor| factor * self.first_length);
+        self.length = if curvature > 0.0 {
+            (squared / curvature).clamp(low, high)
+        } else {
+            high.min(10.0 * self.length)
+        };
+    }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,122 @@
+//! All trial steps of a point at once: the costs of batches of trials, eight in the lanes of a row, and the response of
+//! the lowest one only.
+
+use super::{Best, take, trial};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::Weighting;
+use crate::simd::{LANES, Row};
+use crate::simulate::fast::step_batch::{Layout, Ray, Trials, replay};
+use crate::simulate::{is_linear_midpoint, reference};
+use crate::solvers::evaluator::Work;
+use crate::solvers::iterate::Point;
+
+/// Storage of the trials of a point, in two batches of at most four rows.
+#[derive(Default)]
+pub(super) struct BatchedTrials([Trials; 2]);
+
+impl BatchedTrials {
+    /// The lowest trial, if it lowers the cost.
+    pub fn lowest(
+        &mut self,
+        work: &mut Work,
+        point: &Point,
+        ray: Ray,
+        lengths: &[f64],
+        spare: &mut Vec<Evaluation>,
+    ) -> Option<Best> {
+        let problem = work.problem();
+        work.forwards(lengths.len() as u64, || {
+            let (_, channel, _) = problem.one_full_record()?;
+            let layout = Layout::new(ray, lengths);
+            let costs = self.costs(ray, &layout);
+            let mut best = None;
+            for which in layout.lowest(&costs) {
+                let length = lengths[which];
+                let parameters = trial(point, length);
+                let mut evaluation = take(spare, problem);
+                let states = self.states(layout.place(which));
+                let has_motion = move_to(problem, &parameters, states, &mut evaluation);
+                evaluation.misfit = match has_motion {
+                    true => channel.cost(&evaluation.predictions[0][0]),
+                    false => f64::INFINITY,
+                };
+                evaluation.regularisation = 0.0;
+                evaluation.cost = evaluation.misfit;
+                let trial = Best {
+                    length,
+                    parameters,
+                    evaluation,
+                };
+                trial.or_lower(&mut best, point, spare);
+            }
+            best
+        })
+    }
+
+    /// The sums of squares of all rows.
+    fn costs(&mut self, ray: Ray, layout: &Layout) -> Vec<Row> {
+        let rows = layout.rows();
+        let middle = rows.div_ceil(2);
+        let [first, second] = &mut self.0;
+        first.run(ray, layout, 0..middle);
+        second.run(ray, layout, middle..rows);
+        [first.costs(), second.costs()].concat()
+    }
+
+    /// States of a trial along its response; not a number where there are none, which no response is made of.
+    fn states(&self, place: (usize, usize)) -> [Row; 2] {
+        let states = self.0.iter().find_map(|batch| batch.states(place));
+        states.unwrap_or([[f64::NAN; LANES]; 2])
+    }
+}
+
+/// Device, motion and predictions at `parameters`, from states of the motion; whether it has one.
+fn move_to(
+    problem: &Problem,
+    parameters: &[f64],
+    states: [Row; 2],
+    evaluation: &mut Evaluation,
+) -> bool {
+    (problem.functions).device_into(parameters, 0, &mut evaluation.device);
+    let (oscillator, device) = (&problem.oscillator, &evaluation.device);
+    let motion = &mut evaluation.trajectories[0];
+    let initial = problem.experiments[0].initial;
+    let is_whole = replay(device, initial, states, oscillator.grid.step(), motion);
+    if !is_whole && reference::forward_into(oscillator, device, initial, None, motion).is_err() {
+        return false;
+    }
+    evaluation.predictions[0][0].clone_from(&motion.displacement);
+    true
+}
+
+/// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
+/// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
+/// any other, and where the masses are not moderate.
+pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Point, lengths: &[f64]) -> Option<Ray<'a>> {
+    let (experiment, channel, _) = problem.one_full_record()?;
+    let oscillator = &problem.oscillator;
+    let nodes = experiment.nodes;
+    let is_integral = matches!(channel.weighting(), Weighting::Integral { .. });
+    let fits = is_integral
+        && is_linear_midpoint(oscillator)
+        && experiment.excitation.is_none()
+        && !problem.is_regularised()
+        && point.parameters.len() == 3 * nodes;
+    let parts = |values: &'a [f64]| {
+        let (mass, others) = values.split_at(nodes);
+        let (damping, stiffness) = others.split_at(nodes);
+        [mass, damping, stiffness]
+    };
+    let ray = fits.then(|| Ray {
+        functions: parts(&point.parameters),
+        direction: parts(&point.gradient.l2),
+        initial: experiment.initial,
+        readings: channel.observed(),
+        step: oscillator.grid.step(),
+    });
+    ray.filter(|ray| ray.is_moderate(lengths[0]))
+}
+
+#[cfg(test)]
+mod tests;

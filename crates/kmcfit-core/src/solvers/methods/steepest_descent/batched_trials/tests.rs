@@ -1,0 +1,110 @@
+use super::*;
+use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+use crate::objective::GradientKind;
+use crate::record::{Channel, Experiment};
+use crate::simulate::Purpose;
+use crate::solvers::methods::steepest_descent::lengths;
+use crate::solvers::{FitSettings, Solver};
+use crate::system::{Grid, Method, Oscillator, State, Term};
+
+const NODES: usize = 401;
+
+/// The paper's problem, smaller.
+fn problem() -> Problem {
+    let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
+    let oscillator = Oscillator {
+        grid,
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let nodal = |quantity, start: f64| {
+        CoefficientFunction::free(quantity, Basis::Nodal, &grid, vec![start; NODES])
+    };
+    let list = vec![
+        nodal(Quantity::Mass, 2.0),
+        nodal(Quantity::Damping, 1.0),
+        nodal(Quantity::Stiffness, 1.0),
+    ];
+    let functions = Functions::new(list, NODES, grid.step()).expect("functions");
+    let times = grid.times().into_iter();
+    let readings = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
+    let spacing = grid.step();
+    let weighting = Weighting::Integral { spacing };
+    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let initial = State {
+        displacement: 1.0,
+        velocity: 0.0,
+    };
+    let experiment = Experiment::free("decay", initial, NODES).with_channel(channel);
+    Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// A search of some steps.
+fn search(problem: &Problem, steps: usize) -> Vec<Point> {
+    let settings = FitSettings {
+        solver: Solver::SteepestDescent,
+        gradient: GradientKind::Continuous,
+        ..FitSettings::default()
+    };
+    let mut counted = argmin::core::Problem::new(problem);
+    let mut work = Work::new(&mut counted, &settings);
+    let mut evaluation = problem.workspace();
+    let evaluated = work.evaluate_into(&problem.start(), &mut evaluation);
+    evaluated.expect("a motion");
+    let mut points = vec![work.complete(problem.start(), evaluation)];
+    let (mut batched, mut spare) = (BatchedTrials::default(), Vec::new());
+    for _ in 0..steps {
+        let point = points.last().expect("a point");
+        let lengths = lengths(point);
+        let ray = ray(problem, point, &lengths).expect("the paper's problem");
+        let best = batched.lowest(&mut work, point, ray, &lengths, &mut spare);
+        let best = best.expect("a lower cost");
+        points.push(work.complete(best.parameters, best.evaluation));
+    }
+    points
+}
+
+/// Each step is the best of the trials that are evaluated one by one.
+#[test]
+fn steps_are_the_best_of_all_trials() {
+    let problem = problem();
+    let points = search(&problem, 12);
+    for (step, pair) in points.windows(2).enumerate() {
+        let (before, after) = (&pair[0], &pair[1]);
+        let mut lowest = (before.evaluation.cost, 0.0);
+        for length in lengths(before) {
+            let mut evaluation = problem.workspace();
+            let parameters = trial(before, length);
+            let evaluated =
+                problem.evaluate_for(Purpose::Reproduction, &parameters, &mut evaluation);
+            if evaluated.is_ok() && evaluation.cost < lowest.0 {
+                lowest = (evaluation.cost, length);
+            }
+        }
+        assert_eq!(after.evaluation.cost, lowest.0, "step {step}");
+        assert!(after.parameters == trial(before, lowest.1), "step {step}");
+    }
+}
+
+/// States that are not those of the motion lead to the motion all the same.
+#[test]
+fn a_motion_does_not_depend_on_its_states() {
+    let problem = problem();
+    let mut expected = problem.workspace();
+    let evaluated = problem.evaluate_for(Purpose::Reproduction, &problem.start(), &mut expected);
+    evaluated.expect("a motion");
+    let mut found = problem.workspace();
+    for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {
+        assert!(move_to(&problem, &problem.start(), states, &mut found));
+        assert!(found.device == expected.device && found.trajectories == expected.trajectories);
+        assert!(found.predictions == expected.predictions);
+    }
+    let mut without_mass = problem.start();
+    without_mass[7] = -1.0;
+    assert!(!move_to(
+        &problem,
+        &without_mass,
+        [[0.0; LANES]; 2],
+        &mut found
+    ));
+}

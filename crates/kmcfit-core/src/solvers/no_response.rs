@@ -1,0 +1,48 @@
+//! What is said of a problem without a device that satisfies both the constraints and the motion.
+//!
+//! The constraint set is convex, and whether it is empty is decided by a projection. Which of its
+//! points have a motion is not: only that the mass must be positive is a constraint of its own.
+
+use super::checkpoint::Watch;
+use super::executor::search;
+use super::fit::Fit;
+use super::reason::Reason;
+use super::settings::FitSettings;
+use super::termination::{Outcome, Status};
+use crate::constraints::TOLERANCE;
+use crate::problem::Problem;
+use crate::simulate::Breakdown;
+
+/// The end of a fit none of whose starts in the constraint set has a motion, the first for the reason
+/// `breakdown`: `infeasible`, with the start `given` before it was moved into the constraints as the
+/// only point with a motion that is known.
+///
+/// This is no proof that every device in the set is without motion; the reason says what was seen.
+///
+/// # Errors
+/// The `breakdown`, if `given` satisfies the constraints or has no motion either: then the start is
+/// to blame, and there is nothing to keep.
+pub fn without_motion(
+    problem: &Problem,
+    given: &[f64],
+    settings: &FitSettings,
+    breakdown: Breakdown,
+) -> Result<Fit, Breakdown> {
+    if problem.constraints.hold(given, TOLERANCE) {
+        return Err(breakdown);
+    }
+    let mut settings = settings.clone();
+    settings.stopping.iterations = 0;
+    let fit = search(
+        problem,
+        given,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )
+    .map_err(|_| breakdown)?;
+    Ok(Fit {
+        outcome: Outcome::new(Status::Infeasible, Reason::NoFeasibleResponse(breakdown)),
+        ..fit
+    })
+}

@@ -1,0 +1,184 @@
+//! Sigmas that are estimated from the residuals.
+
+use super::checkpoint::Watch;
+use super::executor::search;
+use super::fit::{Fit, measured};
+use super::history::Row;
+use super::settings::FitSettings;
+use super::start_strategy::climb;
+use super::termination::Status;
+use crate::problem::Problem;
+use crate::record::{Channel, Loss, Weighting};
+use crate::simulate::Breakdown;
+
+/// Most rounds of fit and estimate.
+const ROUNDS: usize = 20;
+/// Sigmas that change by less than this share are found: chi-square then changes by twice that.
+const SETTLED: f64 = 1e-6;
+/// From the median of the absolute residuals to the standard deviation of Gaussian noise.
+const MEDIAN_TO_SIGMA: f64 = 1.4826;
+
+/// [`fit`](super::fit), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
+/// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
+/// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
+/// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
+///
+/// With a robust loss sigma is that of the bulk of the readings, from the median of the absolute
+/// residuals.
+///
+/// # Errors
+/// As [`fit`](super::fit).
+pub fn fit_with_noise(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<(Problem, Fit), Breakdown> {
+    fit_with_noise_watched(problem, start, settings, &mut Watch::new(observe))
+}
+
+/// [`fit_with_noise`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what
+/// was kept.
+///
+/// # Errors
+/// As [`fit_with_noise`].
+pub fn fit_with_noise_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<(Problem, Fit), Breakdown> {
+    let mut problem = problem.clone();
+    let mut found = climb(&problem, start, settings, watch)?;
+    let estimates = problem
+        .channels()
+        .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
+    if !estimates {
+        let found = measured(&problem, found, settings);
+        return Ok((problem, found));
+    }
+    for _ in 0..ROUNDS {
+        let change = update(&mut problem, &found);
+        let ended = matches!(
+            found.outcome.status,
+            Status::Interrupted | Status::TimeLimit
+        );
+        let next = search(&problem, &found.best.parameters, settings, None, watch)?;
+        found = with_round(found, next, ended);
+        if ended || change < SETTLED {
+            break;
+        }
+    }
+    // All costs are told with the sigmas that were found.
+    if let Ok(evaluation) = problem.evaluate(start) {
+        found.initial_cost = evaluation.cost;
+    }
+    let found = measured(&problem, found, settings);
+    Ok((problem, found))
+}
+
+/// The fit `found`, gone on with by another round, `next`: the last place, with the work of both. Rounds
+/// that were `ended` from outside are not at their end, wherever the last one came to.
+fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
+    Fit {
+        counts: found.counts + next.counts,
+        timings: found.timings + next.timings,
+        elapsed: found.elapsed + next.elapsed,
+        rungs: found.rungs,
+        history: match next.history.is_empty() {
+            true => found.history,
+            false => next.history,
+        },
+        snapshots: found.snapshots,
+        outcome: match ended {
+            true => found.outcome,
+            false => next.outcome,
+        },
+        ..next
+    }
+}
+
+/// Puts the sigmas of the residuals into the problem; the largest relative change.
+fn update(problem: &mut Problem, found: &Fit) -> f64 {
+    let readings = problem.reading_count() as f64;
+    let share = (problem.parameters() as f64 / readings).min(0.5);
+    let mut largest = 0.0f64;
+    let experiments = problem.experiments.iter_mut();
+    for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
+        for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
+            let Weighting::Estimated { sigma: before } = *channel.weighting() else {
+                continue;
+            };
+            let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
+            // Readings that are fitted exactly still need a scale.
+            let sigma = sigma.max(f64::EPSILON * size(channel.observed()));
+            if sigma > 0.0 {
+                largest = largest.max((sigma / before).ln().abs());
+                *channel = channel
+                    .clone()
+                    .with_weighting(Weighting::Estimated { sigma });
+            }
+        }
+    }
+    largest
+}
+
+fn size(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
+    let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
+    match channel.loss() {
+        Loss::Squares => size(&residuals),
+        Loss::Huber { .. } | Loss::StudentT { .. } => {
+            residuals.iter_mut().for_each(|r| *r = r.abs());
+            residuals.sort_by(f64::total_cmp);
+            MEDIAN_TO_SIGMA * residuals[residuals.len() / 2]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::solvers::{Solver, Stopping, fit_from};
+    use crate::system::Grid;
+    use std::time::Duration;
+
+    /// Work and time of both, the motions of the first, and the place of the second.
+    #[test]
+    fn a_fit_with_another_round_has_the_work_of_both() {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("free decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let parts = [Part::fixed(1.0), Part::constant(0.5), Part::constant(2.0)];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let settings = FitSettings {
+            solver: Solver::SteepestDescent,
+            stopping: Stopping::exactly(2),
+            ..FitSettings::default()
+        };
+        let mut first = fit_from(&problem, &problem.start(), &settings).unwrap();
+        let next = fit_from(&problem, &first.best.parameters, &settings).unwrap();
+        first.timings.start = Duration::from_secs(3600);
+        first.elapsed = Duration::from_secs(7200);
+        assert_ne!(first.snapshots, next.snapshots);
+        assert!(!next.elapsed.is_zero() && next.timings.adjoint > Duration::ZERO);
+        for ended in [false, true] {
+            let whole = with_round(first.clone(), next.clone(), ended);
+            assert_eq!(whole.counts, first.counts + next.counts);
+            assert_eq!(whole.elapsed, first.elapsed + next.elapsed);
+            assert_eq!(
+                whole.timings.sum(),
+                first.timings.sum() + next.timings.sum()
+            );
+            assert_eq!(whole.snapshots, first.snapshots);
+            assert_eq!(whole.best.parameters, next.best.parameters);
+            assert_eq!(whole.initial_cost, next.initial_cost);
+        }
+    }
+}

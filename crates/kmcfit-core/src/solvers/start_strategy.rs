@@ -1,0 +1,431 @@
+//! The start strategy, which guards against local minima: if a fit from one starting point does not explain the record, the
+//! next one is tried.
+//!
+//! A response whose period is off by a few per cent fits worse than zero response, so descent from
+//! a wrong start ends in a minimum that means nothing. The order: for constants and a long record, its
+//! first steps; the start as given; the equation error; a horizon that grows from an eighth of the record to all of it; states
+//! and parameters together, from a response near the measurements.
+
+use super::checkpoint::Watch;
+use super::counts::Counts;
+use super::executor::{Prepared, search, search_prepared};
+use super::fit::{Fit, Rung, measured};
+use super::history::{Reference, Row};
+use super::settings::{FitSettings, Initial, Solver, StartStrategy};
+use super::starts::{
+    Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
+    truncated_steps,
+};
+use super::termination::Status;
+use super::timings::{Timings, timed};
+use crate::objective::GradientKind;
+use crate::problem::Problem;
+use crate::record::Channel;
+use crate::simulate::Breakdown;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// A fit explains the readings of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// goes near zero) to tens of per cent (a wrong period); a fit in between costs another attempt.
+const EXPLAINED: f64 = 1e-3;
+/// Most iterations of an attempt before the next is tried: Gauss-Newton from a good start takes some ten.
+const PROBING_ITERATIONS: u64 = 60;
+/// Fits `problem` from `start`; `observe` is called after every iteration.
+///
+/// Gauss–Newton tries starting points until a fit explains the record; the fit with the lowest cost
+/// is returned. The other solvers take the first one only, and the equation error needs none.
+///
+/// # Errors
+/// A [`Breakdown`] if no starting point has a response.
+pub fn fit(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    observe: &mut dyn FnMut(&Row),
+) -> Result<Fit, Breakdown> {
+    fit_watched(problem, start, settings, &mut Watch::new(observe))
+}
+
+/// [`fit`], and where `watch` has a [`Keeper`](super::Keeper), one that goes on from what was kept.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_watched(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
+    let fit = climb(problem, start, settings, watch)?;
+    Ok(measured(problem, fit, settings))
+}
+
+/// [`fit_watched`] without a measurement of its end.
+pub(super) fn climb(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
+    if settings.solver == Solver::EquationError {
+        return search(problem, start, settings, None, watch);
+    }
+    let mut attempts = Attempts::new(problem, start, settings, watch);
+    let lead = attempts.prepare();
+    for strategy in attempts.strategies() {
+        if attempts.attempt(strategy) {
+            break;
+        }
+    }
+    let fit = attempts.finish()?;
+    Ok(Fit {
+        elapsed: lead + fit.elapsed,
+        ..fit
+    })
+}
+
+/// Attempts from one starting point after the other.
+struct Attempts<'a, 'w> {
+    problem: &'a Problem,
+    start: &'a [f64],
+    settings: &'a FitSettings,
+    /// The settings of one attempt: a search stuck in a false valley creeps, so the others are tried before it goes on.
+    probing: FitSettings,
+    watch: &'a mut Watch<'w>,
+    /// Whether more than one starting point is tried.
+    has_several: bool,
+    truncated: Option<(StartStrategy, Prepared)>,
+    /// Cost and gradient at the start values, which all attempts are compared to.
+    reference: Option<Reference>,
+    /// Work before and between the searches.
+    counts: Counts,
+    timings: Timings,
+    best: Option<Fit>,
+    rungs: Vec<Rung>,
+    trouble: Option<Breakdown>,
+}
+
+impl<'a, 'w> Attempts<'a, 'w> {
+    fn new(
+        problem: &'a Problem,
+        start: &'a [f64],
+        settings: &'a FitSettings,
+        watch: &'a mut Watch<'w>,
+    ) -> Self {
+        let has_several = settings.solver == Solver::GaussNewton;
+        let mut probing = settings.clone();
+        if has_several && settings.stopping.has_test() {
+            probing.stopping.iterations = settings.stopping.iterations.min(PROBING_ITERATIONS);
+        }
+        Self {
+            problem,
+            start,
+            settings,
+            probing,
+            watch,
+            has_several,
+            truncated: None,
+            reference: None,
+            counts: Counts::default(),
+            timings: Timings::default(),
+            best: None,
+            rungs: Vec::new(),
+            trouble: None,
+        }
+    }
+
+    /// Cost and gradient at the start values, and a truncated start; the first attempt finds the former itself if it
+    /// starts there. Returns the time that it took, also before an interrupt.
+    fn prepare(&mut self) -> Duration {
+        let (problem, start, settings) = (self.problem, self.start, self.settings);
+        let is_discrete = settings.gradient == GradientKind::Discrete;
+        let can_truncate = self.has_several && is_discrete && settings.stopping.has_test();
+        let steps = can_truncate.then(|| truncated_steps(problem)).flatten();
+        let clock = Instant::now();
+        match (settings.initial, steps) {
+            (Initial::Functions, None) => Duration::ZERO,
+            (Initial::Functions, Some(steps)) => {
+                let found = truncated_start(problem, steps, start, settings, self.watch);
+                self.refer(found.referred);
+                self.counts += found.counts;
+                self.timings += found.timings;
+                let strategy = StartStrategy::Truncated { steps };
+                self.truncated = found.start.map(|start| (strategy, start));
+                clock.elapsed().max(found.elapsed)
+            }
+            (Initial::Data, _) => {
+                self.refer(reference(problem, start, settings));
+                clock.elapsed()
+            }
+        }
+    }
+
+    fn refer(&mut self, referred: Referred) {
+        self.counts.forward += 1;
+        self.counts.adjoint += u64::from(referred.reference.is_some());
+        self.timings += referred.timings;
+        self.reference = referred.reference;
+    }
+
+    /// The strategies in the order in which they are tried.
+    fn strategies(&self) -> Vec<StartStrategy> {
+        use StartStrategy::{Collocation, EquationError, GrowingHorizon, StartValues};
+        let first = match self.settings.initial {
+            Initial::Functions => [StartValues, EquationError],
+            Initial::Data => [EquationError, StartValues],
+        };
+        let truncated = self.truncated.iter().map(|(strategy, _)| *strategy);
+        let order = truncated.chain(first).chain([GrowingHorizon, Collocation]);
+        order.collect()
+    }
+
+    /// Searches from one starting point; whether it was the last attempt.
+    fn attempt(&mut self, strategy: StartStrategy) -> bool {
+        let clock = Instant::now();
+        self.watch.climb(strategy);
+        let prepared = self.starting_point(strategy);
+        let found = search_prepared(
+            self.problem,
+            prepared,
+            &self.probing,
+            self.reference,
+            self.watch,
+        );
+        match found {
+            Ok(mut fit) => {
+                // With the work that made the start, and what was done before it was continued.
+                fit.elapsed = fit.elapsed.max(clock.elapsed());
+                self.take(strategy, fit)
+            }
+            Err(breakdown) => {
+                self.rungs.push(Rung::failed(strategy, breakdown));
+                self.trouble.get_or_insert(breakdown);
+                !self.has_several
+            }
+        }
+    }
+
+    /// Takes the end of an attempt; whether it was the last one.
+    fn take(&mut self, strategy: StartStrategy, fit: Fit) -> bool {
+        self.rungs.push(Rung::of(strategy, &fit));
+        self.reference.get_or_insert(Reference {
+            cost: fit.initial_cost,
+            norm_squared: fit.initial_norm_squared,
+        });
+        let outcome = fit.outcome.clone();
+        let is_ended = matches!(outcome.status, Status::Interrupted | Status::TimeLimit);
+        let is_last = !self.has_several || is_ended || explains(self.problem, &fit);
+        let mut lower = better(self.best.take(), fit);
+        if outcome.status == Status::Interrupted {
+            // An earlier attempt may have come further, but not all were made.
+            lower.outcome = outcome;
+        }
+        self.best = Some(lower);
+        is_last
+    }
+
+    fn starting_point(&mut self, strategy: StartStrategy) -> Prepared {
+        let (problem, start) = (self.problem, self.start);
+        let data_start =
+            |timings: &mut Timings| timed(&mut timings.start, || data_start(problem, start));
+        let parameters = match strategy {
+            StartStrategy::Truncated { .. } => match self.truncated.take() {
+                Some((_, prepared)) => return prepared,
+                None => start.to_vec(),
+            },
+            StartStrategy::StartValues | StartStrategy::Continued => start.to_vec(),
+            StartStrategy::EquationError => data_start(&mut self.timings),
+            StartStrategy::GrowingHorizon => {
+                let from = data_start(&mut self.timings);
+                let (found, counts, timings) =
+                    growing_horizon_start(problem, from, &self.probing, self.watch);
+                self.counts += counts;
+                self.timings += timings;
+                found
+            }
+            StartStrategy::Collocation => {
+                let flag = self.settings.interrupt.as_ref();
+                let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+                let timings = &mut self.timings;
+                self.watch.piece(start.len(), &interrupted, || {
+                    let found = timed(&mut timings.start, || {
+                        collocation_start(problem, start, &interrupted)
+                    });
+                    found.unwrap_or_else(|| data_start(timings))
+                })
+            }
+        };
+        Prepared {
+            parameters,
+            evaluation: None,
+            spare: None,
+        }
+    }
+
+    /// The best fit, continued if it reached the iteration limit of an attempt, with all work.
+    fn finish(mut self) -> Result<Fit, Breakdown> {
+        let Some(mut fit) = self.best else {
+            return Err(self
+                .trouble
+                .expect("every attempt ends with a fit or a breakdown"));
+        };
+        let is_limited = self.has_several && self.settings.stopping.has_test();
+        if is_limited && fit.outcome.status == Status::MaxIterations {
+            let (problem, settings, reference) = (self.problem, self.settings, self.reference);
+            fit = continued(
+                problem,
+                fit,
+                settings,
+                reference,
+                &mut self.rungs,
+                self.watch,
+            )?;
+        }
+        Ok(Fit {
+            rungs: self.rungs,
+            counts: self.counts + fit.counts,
+            timings: self.timings + fit.timings,
+            ..fit
+        })
+    }
+}
+
+/// The fit that came furthest, given the iterations that it was not given as one rung of several.
+fn continued(
+    problem: &Problem,
+    fit: Fit,
+    settings: &FitSettings,
+    reference: Option<Reference>,
+    rungs: &mut Vec<Rung>,
+    watch: &mut Watch,
+) -> Result<Fit, Breakdown> {
+    let mut settings = settings.clone();
+    let taken = fit.history.len() as u64;
+    settings.stopping.iterations = settings.stopping.iterations.saturating_sub(taken);
+    if settings.stopping.iterations == 0 {
+        return Ok(fit);
+    }
+    let start = &fit.best.parameters;
+    watch.climb(StartStrategy::Continued);
+    let more = search(problem, start, &settings, reference, watch)?;
+    rungs.push(Rung::of(StartStrategy::Continued, &more));
+    let mut history = fit.history;
+    history.extend(more.history.into_iter().map(|row| Row {
+        iteration: row.iteration + taken,
+        ..row
+    }));
+    Ok(Fit {
+        history,
+        snapshots: fit.snapshots,
+        counts: fit.counts + more.counts,
+        timings: fit.timings + more.timings,
+        elapsed: fit.elapsed + more.elapsed,
+        ..more
+    })
+}
+
+/// The fit with the lower cost, with the work of both.
+fn better(best: Option<Fit>, fit: Fit) -> Fit {
+    let Some(best) = best else {
+        return fit;
+    };
+    let counts = best.counts + fit.counts;
+    let timings = best.timings + fit.timings;
+    let elapsed = best.elapsed + fit.elapsed;
+    let winner = if fit.best.evaluation.cost < best.best.evaluation.cost {
+        fit
+    } else {
+        best
+    };
+    Fit {
+        counts,
+        timings,
+        elapsed,
+        ..winner
+    }
+}
+
+/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
+fn explains(problem: &Problem, fit: &Fit) -> bool {
+    let evaluation = &fit.best.evaluation;
+    let noise = problem.largest_chi_square();
+    let predictions = evaluation.predictions.iter().flatten();
+    let mut channels = problem.channels().zip(predictions);
+    noise.is_some_and(|noise| evaluation.misfit <= noise)
+        || channels.all(|(channel, predicted)| {
+            let silence = channel.cost(&vec![0.0; channel.len()]);
+            let noise = channel.largest_chi_square();
+            let misfit = channel.cost(predicted);
+            misfit <= EXPLAINED * silence || noise.is_some_and(|noise| misfit <= noise)
+        })
+}
+
+impl Problem {
+    /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
+    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
+    pub fn largest_chi_square(&self) -> Option<f64> {
+        let known = self.channels().all(|c| c.weighting().is_sigma());
+        known.then(|| largest_chi_square(self.reading_count()))
+    }
+}
+
+impl Channel {
+    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
+    pub fn largest_chi_square(&self) -> Option<f64> {
+        let known = self.weighting().is_sigma();
+        known.then(|| largest_chi_square(self.len()))
+    }
+}
+
+fn largest_chi_square(readings: usize) -> f64 {
+    let n = readings as f64;
+    n + 2.0 * (2.0 * n).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::solvers::{Stopping, fit_from};
+    use crate::system::Grid;
+
+    /// Iterations, work and time of both parts, and the numbers of the iterations one after the other.
+    #[test]
+    fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("free decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &readings);
+        let parts = [Part::fixed(1.0), Part::constant(0.5), Part::constant(2.0)];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let settings = |iterations| FitSettings {
+            solver: Solver::SteepestDescent,
+            stopping: Stopping::exactly(iterations),
+            ..FitSettings::default()
+        };
+        let mut first = fit_from(&problem, &problem.start(), &settings(2)).unwrap();
+        let hours = Duration::from_secs(36_000);
+        first.timings.start = hours;
+        first.elapsed = hours;
+        let (before, cost) = (first.counts, first.best.evaluation.cost);
+        let snapshots = first.snapshots.clone();
+        assert!(!snapshots.is_empty());
+        let mut rungs = Vec::new();
+        let mut observe = |_: &Row| {};
+        let mut watch = Watch::new(&mut observe);
+        let whole = continued(&problem, first, &settings(5), None, &mut rungs, &mut watch).unwrap();
+        let numbers: Vec<u64> = whole.history.iter().map(|row| row.iteration).collect();
+        assert_eq!(numbers, [1, 2, 3, 4, 5]);
+        assert!(whole.best.evaluation.cost < cost);
+        assert_eq!(whole.snapshots, snapshots);
+        let [rung] = rungs.as_slice() else {
+            panic!("{rungs:?}");
+        };
+        assert_eq!((rung.iterations, rung.initial_cost), (3, cost));
+        // Every iteration of steepest descent has one gradient at least.
+        assert!(whole.counts.adjoint >= before.adjoint + 3);
+        assert!(whole.timings.start >= hours && whole.timings.adjoint > Duration::ZERO);
+        assert!(whole.elapsed > hours);
+    }
+}

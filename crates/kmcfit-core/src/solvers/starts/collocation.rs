@@ -1,0 +1,190 @@
+//! A start from states and parameters together: the motion near the readings and the functions are
+//! corrected at once, and the equation of motion holds only in the end.
+//!
+//! A motion that runs through the record cannot slip by a period, because it begins at the readings
+//! and not at a device. So this start knows no local minima of a wrong period however long the
+//! record is. The steps are linear in the functions: if the motion is right, one of them finds the
+//! functions from anywhere.
+
+use crate::constraints::TOLERANCE;
+use crate::objective::{Evaluation, View};
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, Subproblem};
+use crate::record::Channel;
+use crate::simulate::Trajectory;
+use crate::solvers::linearization::linearise_about;
+use crate::solvers::methods::equation_error::{from_motions, with_initial_states};
+use crate::solvers::state_estimation::{Kinematics, by_spline};
+use crate::system::State;
+
+/// Most corrections of the parameters.
+const ROUNDS: usize = 16;
+/// In so many of these at most, and until no function changes by more than [`NEAR`] of its size, the
+/// motion is that of the readings again, as the sensors are known by then: the functions may still be
+/// far off, and a motion that follows them would be led away.
+const ANCHORED: usize = 8;
+const NEAR: f64 = 1e-3;
+/// Corrections end when no function changes by more than this share of its size: the fit that follows
+/// needs a start, not an optimum.
+const SETTLED: f64 = 1e-6;
+/// A pull towards the last parameters, relative to the misfit of no motion at all: it decides what the
+/// readings leave open.
+const PULL: f64 = 1e-9;
+
+/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a motion.
+/// Ends early where `interrupted` says so.
+pub(in crate::solvers) fn collocation_start(
+    problem: &Problem,
+    start: &[f64],
+    interrupted: &dyn Fn() -> bool,
+) -> Option<Vec<f64>> {
+    let scalars = problem.scalars(start);
+    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+        .map(|e| by_spline(problem, e, scalars).map(|(near, _)| near))
+        .collect();
+    let mut theta = from_motions(problem, start, &motions)
+        .unwrap_or_else(|_| with_initial_states(problem, start, &motions));
+    let first = first_states(problem, &theta)?;
+    let mut states = first.clone();
+    let mut evaluation = problem.workspace();
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut anchored = true;
+    for round in 1..=ROUNDS {
+        look(problem, &theta, &states, &mut evaluation);
+        if interrupted() || !has_mass(&evaluation) {
+            break;
+        }
+        let mut sub = linearise_about(problem, &theta, &evaluation);
+        add_pull(problem, &evaluation, &mut sub);
+        let Some(z) = solve(&sub) else { break };
+        let mut moved: Vec<f64> = theta.iter().zip(&z).map(|(t, d)| t + d).collect();
+        problem.constraints.clip(&mut moved);
+        let change = problem.relative_change(&evaluation, &theta, &moved);
+        if !change.is_finite() {
+            break;
+        }
+        theta = moved;
+        anchored = anchored && round < ANCHORED && change > NEAR;
+        match anchored {
+            true => states = motion_of_readings(problem, &theta, &first)?,
+            false => correct(problem, &theta, &z, &mut states),
+        }
+        if let Ok(free) = problem.evaluate(&theta)
+            && best.as_ref().is_none_or(|(cost, _)| free.cost < *cost)
+        {
+            best = Some((free.cost, theta.clone()));
+        }
+        if change <= SETTLED && !anchored {
+            break;
+        }
+    }
+    best.map(|(_, theta)| theta)
+}
+
+/// The motion of each experiment near its readings; that of the parameters where there are too few.
+fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
+    let scalars = problem.scalars(theta);
+    let mut own = None;
+    let each = problem
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(e, experiment)| {
+            let mut motion = match by_spline(problem, experiment, scalars) {
+                Some((_, motion)) => motion,
+                None => {
+                    if own.is_none() {
+                        own = problem.evaluate(theta).ok();
+                    }
+                    own.as_ref()?.trajectories[e].clone()
+                }
+            };
+            begin(experiment.initial_state(scalars), &mut motion);
+            Some(motion)
+        });
+    each.collect()
+}
+
+/// [`first_states`] as sensors and initial states are now seen; `first` as they were seen at first.
+fn motion_of_readings(
+    problem: &Problem,
+    theta: &[f64],
+    first: &[Trajectory],
+) -> Option<Vec<Trajectory>> {
+    let perfect = |c: &Channel| c.sensor().indices().iter().all(Option::is_none);
+    if !problem.channels().all(perfect) {
+        return first_states(problem, theta);
+    }
+    let mut states = first.to_vec();
+    for (experiment, motion) in problem.experiments.iter().zip(&mut states) {
+        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    }
+    Some(states)
+}
+
+fn begin(initial: State, motion: &mut Trajectory) {
+    motion.displacement[0] = initial.displacement;
+    motion.velocity[0] = initial.velocity;
+}
+
+/// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
+fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
+    let functions = &problem.functions;
+    functions.device_into(theta, 0, &mut evaluation.device);
+    for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+        functions.device_into(theta, i + 1, own);
+    }
+    evaluation.scalars.copy_from_slice(problem.scalars(theta));
+    evaluation.trajectories.clone_from_slice(states);
+    let each = problem
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(e, experiment)| {
+            let view: View = problem.view(evaluation, e);
+            experiment
+                .channels
+                .iter()
+                .map(|c| c.predict(view))
+                .collect()
+        });
+    evaluation.predictions = each.collect();
+}
+
+/// Whether every device has a mass that an equation of motion can be solved for.
+fn has_mass(evaluation: &Evaluation) -> bool {
+    let mut devices = std::iter::once(&evaluation.device).chain(&evaluation.own_devices);
+    devices.all(|device| device.mass.iter().all(|m| *m > 0.0))
+}
+
+fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
+    let sizes = problem.natural_sizes(evaluation);
+    let duration = problem.oscillator.grid.duration();
+    let weight = PULL * problem.misfit_of_silence().max(f64::MIN_POSITIVE);
+    let metric = problem.functions.relative_metric(&sizes, duration);
+    for (d, m) in sub.proximal.iter_mut().zip(metric) {
+        *d = weight * m;
+    }
+}
+
+fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
+    if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, TOLERANCE)) {
+        return Some(z);
+    }
+    let solution = sub.solve();
+    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
+    solved.then_some(solution.z)
+}
+
+/// Adds the changes of the states, which follow the parameters in `z`.
+fn correct(problem: &Problem, theta: &[f64], z: &[f64], states: &mut [Trajectory]) {
+    let mut changes = z[theta.len()..].chunks_exact(2);
+    for (experiment, motion) in problem.experiments.iter().zip(states) {
+        for i in 1..experiment.nodes {
+            let Some(change) = changes.next() else { return };
+            motion.displacement[i] += change[0];
+            motion.velocity[i] += change[1];
+        }
+        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    }
+}

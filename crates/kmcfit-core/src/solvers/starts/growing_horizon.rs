@@ -1,0 +1,36 @@
+//! A start fitted to growing parts of the record.
+
+use crate::problem::Problem;
+use crate::solvers::checkpoint::Watch;
+use crate::solvers::counts::Counts;
+use crate::solvers::executor::search;
+use crate::solvers::settings::FitSettings;
+use crate::solvers::timings::Timings;
+
+/// Parts of the record that are fitted in turn, before all of it.
+const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
+/// Most iterations on each part.
+const HORIZON_ITERATIONS: u64 = 20;
+
+/// The parameters `from`, fitted to growing parts of the record; and the work that took.
+pub(in crate::solvers) fn growing_horizon_start(
+    problem: &Problem,
+    from: Vec<f64>,
+    settings: &FitSettings,
+    watch: &mut Watch,
+) -> (Vec<f64>, Counts, Timings) {
+    let (mut counts, mut timings) = (Counts::default(), Timings::default());
+    let mut parameters = from;
+    let mut short = settings.clone();
+    short.stopping.iterations = HORIZON_ITERATIONS;
+    for share in HORIZONS {
+        let part = problem.first_part(share);
+        let found = watch.unseen(|watch| search(&part, &parameters, &short, None, watch));
+        if let Ok(fit) = found {
+            counts += fit.counts;
+            timings += fit.timings;
+            parameters = fit.best.parameters;
+        }
+    }
+    (parameters, counts, timings)
+}

@@ -1,0 +1,48 @@
+//! Starting points, one strategy each.
+
+mod collocation;
+mod data;
+mod growing_horizon;
+mod infeasible_subset;
+mod projection;
+mod truncated;
+
+pub(super) use collocation::collocation_start;
+pub(super) use data::data_start;
+pub(super) use growing_horizon::growing_horizon_start;
+pub use projection::Start;
+pub(super) use truncated::{truncated_start, truncated_steps};
+
+use super::history::Reference;
+use super::settings::FitSettings;
+use super::timings::{Timings, timed};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+
+/// Cost and gradient at the start values.
+pub(super) struct Referred {
+    /// `None` if there is no response.
+    pub reference: Option<Reference>,
+    /// What the work took.
+    pub timings: Timings,
+    /// The storage that it used.
+    pub spare: Option<Evaluation>,
+}
+
+/// Evaluates a problem at the start values.
+pub(super) fn reference(problem: &Problem, start: &[f64], settings: &FitSettings) -> Referred {
+    let mut timings = Timings::default();
+    let spare = timed(&mut timings.forward, || problem.evaluate(start)).ok();
+    let reference = spare.as_ref().map(|evaluation| Reference {
+        norm_squared: timed(&mut timings.adjoint, || {
+            problem.gradient(start, evaluation, settings.gradient)
+        })
+        .norm_squared,
+        cost: evaluation.cost,
+    });
+    Referred {
+        reference,
+        timings,
+        spare,
+    }
+}

@@ -1,0 +1,132 @@
+//! A start that satisfies the constraints, or the constraints that contradict each other.
+
+use super::infeasible_subset::{conflict, feasibility};
+use crate::constraints::{Constraints, RowGroup, TOLERANCE};
+use crate::problem::Problem;
+use crate::qp::{ConicStatus, project};
+
+/// Smallest mass that counts as positive, as a share of the start's largest: a lighter device swings
+/// a thousand times in the time of one swing of the start, which no grid that suits the start resolves.
+const POSITIVE: f64 = 1e-6;
+
+/// What became of a start.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Start {
+    /// It satisfies the constraints as it is.
+    Kept(Vec<f64>),
+    /// It was moved to the nearest point that does.
+    Moved {
+        /// That point.
+        parameters: Vec<f64>,
+        /// Name of the constraint that was violated most.
+        constraint: String,
+    },
+    /// No point does: these constraints contradict each other, and would not without any one of
+    /// them.
+    Contradiction(Vec<String>),
+    /// No point does: a contradiction is among these constraints, but some of them may have no part
+    /// in it.
+    ContradictionAmong(Vec<String>),
+    /// The projection could not be solved.
+    Unsolved(ConicStatus),
+}
+
+impl Problem {
+    /// Moves `start` into the constraint set, in the L2 metric relative to the functions' sizes.
+    pub fn feasible_start(&self, start: &[f64]) -> Start {
+        let worst = match self.constraints.largest_violation(start) {
+            Some(violation) if violation.relative > 0.0 => violation,
+            _ => return Start::Kept(start.to_vec()),
+        };
+        let device = self.functions.device(start);
+        let sizes: Vec<f64> = (device.functions())
+            .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
+            .collect();
+        let metric = self
+            .functions
+            .relative_metric(&sizes, self.oscillator.grid.duration());
+        let mut moved = start.to_vec();
+        self.constraints.clip(&mut moved);
+        if !self.constraints.hold(&moved, 0.0) {
+            match self.inside(start, &metric) {
+                Ok(theta) => moved = theta,
+                Err(status) => return self.contradiction(start, &metric, status),
+            }
+        }
+        match self.constraints.hold(&moved, TOLERANCE) {
+            true => Start::Moved {
+                parameters: self.with_mass(start, &metric, moved),
+                constraint: worst.name,
+            },
+            // Clipping to contradictory bounds leaves a violation that no projection removes.
+            false => self.contradiction(start, &metric, ConicStatus::Stalled),
+        }
+    }
+
+    /// The projection of `start`. Where its program stalls, any point that it reached inside the set,
+    /// or the nearest one in another metric, is as good to start from.
+    fn inside(&self, start: &[f64], metric: &[f64]) -> Result<Vec<f64>, ConicStatus> {
+        let mut first = None;
+        for metric in [
+            metric,
+            &self.functions.gram_diagonal(),
+            &vec![1.0; start.len()],
+        ] {
+            let projection = project(&self.constraints, start, metric);
+            if self.constraints.hold(&projection.theta, TOLERANCE) {
+                return Ok(projection.theta);
+            }
+            let status = *first.get_or_insert(projection.status);
+            if status == ConicStatus::Infeasible {
+                break;
+            }
+        }
+        Err(first.unwrap_or(ConicStatus::Stalled))
+    }
+
+    /// `moved`, or where that has no positive mass the nearest point to `start` that has one, if there
+    /// is any in the constraint set.
+    fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
+        let positive = |theta: &[f64]| self.functions.device(theta).mass.iter().all(|m| *m > 0.0);
+        if positive(&moved) || !positive(start) {
+            return moved;
+        }
+        let constraints = self.constraints_with_mass(start);
+        let nearest = project(&constraints, start, metric);
+        match constraints.hold(&nearest.theta, TOLERANCE) && positive(&nearest.theta) {
+            true => nearest.theta,
+            false => moved,
+        }
+    }
+
+    /// What is known about constraints into which `start` could not be moved: its projection ended
+    /// with `status`.
+    fn contradiction(&self, start: &[f64], metric: &[f64], status: ConicStatus) -> Start {
+        let judge = |candidate: &Constraints| feasibility(candidate, start, metric);
+        match conflict(&self.constraints, &judge) {
+            Some(found) if found.minimal => Start::Contradiction(found.names),
+            Some(found) => Start::ContradictionAmong(found.names),
+            None => Start::Unsolved(status),
+        }
+    }
+
+    /// The constraints and a mass that is positive at every node; `start` tells what is small.
+    fn constraints_with_mass(&self, start: &[f64]) -> Constraints {
+        let device = self.functions.device(start);
+        let largest = device.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let least = POSITIVE * largest;
+        let mut group = RowGroup::new("mass > 0");
+        let parts = self.functions.iter().zip(self.functions.ranges());
+        if let Some((mass, range)) = parts.into_iter().next() {
+            for i in 0..self.oscillator.grid.nodes() {
+                let row = mass.design.row(i).map(|(j, b)| (range.start + j, b));
+                let time = self.oscillator.grid.time(i);
+                let bounds = [least - mass.offset[i], f64::INFINITY];
+                group.push(row, bounds, [time, time]);
+            }
+        }
+        let mut constraints = self.constraints.clone();
+        constraints.groups.push(group);
+        constraints
+    }
+}

@@ -1,0 +1,298 @@
+//! From channels of any kind at any times: one curve through all of them.
+//!
+//! The displacement at the nodes minimises the distance of its values and differences to the
+//! readings, plus third differences as far as the noise allows. Where no displacement was measured,
+//! the curve is held near zero below the band of the motion, `omega_0^4 |y|^2` beside `|y'' - a|^2`: so an
+//! acceleration is integrated twice with the response `omega^4 / (omega^4 + omega_0^4)` and without
+//! a phase.
+
+use super::stencil::weights;
+use super::{Kinematics, noise_level, rms, unsensed};
+use crate::problem::Problem;
+use crate::qp::Subproblem;
+use crate::record::{Channel, ChannelKind, Experiment, Weighting};
+use crate::signal::{Interpolation, Signal, Spectrum};
+use crate::simulate::Trajectory;
+use crate::system::{Place, State};
+use std::f64::consts::TAU;
+
+/// Points of a difference stencil: derivatives are of order 4 or better.
+const POINTS: usize = 6;
+/// Rounds of the search for the smoothing weight, and its decimal exponents.
+const ROUNDS: u32 = 12;
+const EXPONENTS: [f64; 2] = [-12.0, 12.0];
+/// How much more than without smoothing a smooth curve may miss the readings, where that is more than
+/// their noise.
+const ALLOWED: f64 = 1.05;
+/// How far below the dominant frequency the band ends in which readings are integrated: from readings
+/// full of noise to exact ones. What holds the curve near zero below the band takes a share of
+/// `band^(-2 p)` off the readings, with p the order of their derivative.
+const BAND: [f64; 2] = [6.0, 30.0];
+/// What lies lower than the dominant frequency loses a larger share: so many times as much is allowed.
+const SHARE: f64 = 2.0;
+/// Nodes further than so many median spacings from a reading lie in a gap.
+const GAP: f64 = 1.5;
+/// Dominant periods at the ends of an integrated record that are left out: there the integral still
+/// feels its beginning.
+const SETTLING: f64 = 0.5;
+
+/// A channel as it would be read by a perfect sensor that moves with the base.
+struct Plain<'a> {
+    channel: &'a Channel,
+    values: Vec<f64>,
+    noise: f64,
+}
+
+/// At all nodes that are near readings.
+pub fn kinematics(
+    problem: &Problem,
+    experiment: &Experiment,
+    scalars: &[f64],
+) -> Option<(Kinematics, Trajectory)> {
+    let grid = &problem.oscillator.grid;
+    let nodes = experiment.nodes;
+    if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
+        return None;
+    }
+    let channels: Vec<Plain> = (experiment.channels.iter())
+        .map(|channel| Plain::new(channel, scalars))
+        .collect();
+    let anchored = channels
+        .iter()
+        .any(|c| c.channel.kind() == ChannelKind::Displacement && c.channel.filter().is_empty());
+    let ridge = match anchored {
+        true => None,
+        false => Some(ridge(&channels)?),
+    };
+    let step = grid.step();
+    let y = curve(&channels, nodes, step, ridge)?;
+    let derivatives = |i: usize| {
+        let first = i.saturating_sub(POINTS / 2).min(nodes - POINTS);
+        differences(i as f64, first, step).map(|row| -> f64 {
+            let values = &y[first..first + POINTS];
+            row.iter().zip(values).map(|(w, y)| w * y).sum()
+        })
+    };
+    let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
+    let near = near_readings(&channels, nodes, grid.start(), step, settling);
+    let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
+    let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
+    let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
+    let main = channels.first()?;
+    let begins = channels
+        .iter()
+        .any(|c| c.channel.times()[0] - grid.start() <= GAP * c.spacing());
+    let initial = begins.then(|| State {
+        displacement: y[0],
+        velocity: v[0],
+    });
+    let at_chosen = |f: &[f64]| chosen.iter().map(|&i| f[i]).collect();
+    let near = (chosen.len() >= POINTS).then(|| Kinematics {
+        y: at_chosen(&y),
+        v: at_chosen(&v),
+        a: at_chosen(&a),
+        initial,
+        size: main.values.iter().fold(0.0f64, |m, x| m.max(x.abs())),
+        weight: weight_of(main.channel),
+        nodes: chosen.clone(),
+    })?;
+    let motion = Trajectory {
+        displacement: y.clone(),
+        velocity: v.clone(),
+    };
+    Some((near, motion))
+}
+
+/// A typical weight of a channel's readings.
+fn weight_of(channel: &Channel) -> f64 {
+    channel.weighting().weight(channel.len() / 2, channel.len())
+}
+
+impl<'a> Plain<'a> {
+    fn new(channel: &'a Channel, scalars: &[f64]) -> Self {
+        let (values, gain) = unsensed(channel, scalars);
+        let noise = match channel.weighting() {
+            Weighting::Sigma(sigma) => *sigma,
+            Weighting::Sigmas(sigmas) => rms(sigmas),
+            Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
+                noise_level(&values)
+            }
+        };
+        Self {
+            channel,
+            noise: (noise / gain.abs())
+                .max(1e-6 * rms(&values))
+                .max(f64::MIN_POSITIVE.sqrt()),
+            values,
+        }
+    }
+
+    /// Median spacing of the readings, s.
+    fn spacing(&self) -> f64 {
+        let mut spacings: Vec<f64> = (self.channel.times().windows(2))
+            .map(|w| w[1] - w[0])
+            .collect();
+        spacings.sort_by(f64::total_cmp);
+        spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// Of as many values at equal distances, linear between the readings.
+    fn spectrum(&self) -> Option<Spectrum> {
+        let times = self.channel.times();
+        let (first, last) = (times.first()?, times.last()?);
+        let spacing = (last - first) / times.len().checked_sub(1)? as f64;
+        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
+    }
+
+    fn order(&self) -> usize {
+        match self.channel.kind() {
+            ChannelKind::Displacement => 0,
+            ChannelKind::Velocity => 1,
+            ChannelKind::Acceleration => 2,
+        }
+    }
+}
+
+/// What holds an integrated curve near zero below the band.
+#[derive(Clone, Copy)]
+struct Ridge {
+    /// Weight of `y^2` beside the squared residuals of the highest derivative.
+    root: f64,
+    /// Dominant frequency, Hz.
+    frequency: f64,
+    /// What it takes off the readings, in units of their noise.
+    bias: f64,
+}
+
+fn ridge(channels: &[Plain]) -> Option<Ridge> {
+    let highest = channels.iter().max_by_key(|c| c.order())?;
+    let frequency = highest.spectrum()?.dominant();
+    let size = rms(&highest.values) / highest.noise;
+    let order = highest.order() as i32;
+    // As wide as the noise is small: so the share that is lost is no more than the noise.
+    let band = size.powf(0.5 / f64::from(order)).clamp(BAND[0], BAND[1]);
+    let root = (TAU * frequency / band).powi(order) / highest.noise;
+    (frequency > 0.0 && root.is_finite()).then(|| Ridge {
+        root,
+        frequency,
+        bias: SHARE * size * band.powi(-2 * order),
+    })
+}
+
+/// Difference weights of order 0, 1 and 2 at `x` (in steps) on the nodes from `first`.
+fn differences(x: f64, first: usize, step: f64) -> [Vec<f64>; 3] {
+    let nodes: Vec<f64> = (0..POINTS).map(|j| (first + j) as f64).collect();
+    let [value, mut slope, mut curvature] = weights(x, &nodes);
+    slope.iter_mut().for_each(|w| *w /= step);
+    curvature.iter_mut().for_each(|w| *w /= step * step);
+    [value, slope, curvature]
+}
+
+/// The displacement at the nodes.
+fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Option<Vec<f64>> {
+    let mut sub = Subproblem::new(nodes);
+    sub.stations = (0..nodes as u32).collect();
+    let mut count = 0.0;
+    for plain in channels {
+        for (i, (place, value)) in plain.channel.places().iter().zip(&plain.values).enumerate() {
+            let x = place.step as f64 + place.fraction;
+            let first = first_point(*place, nodes);
+            let weight = 1.0 / plain.noise_at(i);
+            let row = &differences(x, first, step)[plain.order()];
+            let row = row.iter().enumerate().map(|(j, w)| (first + j, weight * w));
+            sub.residuals
+                .push(row.filter(|(_, w)| *w != 0.0), weight * value);
+            count += 1.0;
+        }
+    }
+    let readings = sub.residuals.len();
+    if let Some(ridge) = ridge {
+        // As many readings as there are nodes would weigh as the readings do.
+        let share = (count / nodes as f64).sqrt();
+        for i in 0..nodes {
+            sub.residuals.push([(i, ridge.root * share)], 0.0);
+        }
+    }
+    let misfit = |candidate: &[f64]| -> f64 {
+        let fitted = sub.residuals.multiply(candidate);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+    };
+    let [mut low, mut high] = EXPONENTS;
+    // What holds an integrated curve near zero may cost more than the noise.
+    let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
+    let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
+    let enough = (ALLOWED * misfit(&best)).max(count * bias * bias);
+    for _ in 0..ROUNDS {
+        let middle = 0.5 * (low + high);
+        let candidate = smooth(&sub, nodes, 10f64.powf(middle))?;
+        if misfit(&candidate) <= enough {
+            low = middle;
+            best = candidate;
+        } else {
+            high = middle;
+        }
+    }
+    Some(best)
+}
+
+impl Plain<'_> {
+    fn noise_at(&self, i: usize) -> f64 {
+        let own = match self.channel.weighting() {
+            Weighting::Sigmas(sigmas) => sigmas[i] / rms(sigmas),
+            _ => 1.0,
+        };
+        self.noise * own
+    }
+}
+
+fn first_point(place: Place, nodes: usize) -> usize {
+    let nearest = place.step + usize::from(place.fraction > 0.5);
+    nearest.saturating_sub(POINTS / 2).min(nodes - POINTS)
+}
+
+/// With third differences in units of the curve's own size, so that the weight has none.
+fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
+    let mut sub = sub.clone();
+    let scale = (0..sub.residuals.len()).map(|i| sub.residuals.scale(i));
+    let root = weight.sqrt() * scale.fold(0.0f64, f64::max);
+    for i in 0..nodes - 3 {
+        let row = [
+            (i, -root),
+            (i + 1, 3.0 * root),
+            (i + 2, -3.0 * root),
+            (i + 3, root),
+        ];
+        sub.residuals.push(row, 0.0);
+    }
+    sub.solve_plain()
+}
+
+/// Which nodes have readings near by, of the channel with the most readings.
+fn near_readings(
+    channels: &[Plain],
+    nodes: usize,
+    start: f64,
+    step: f64,
+    settling: f64,
+) -> Vec<bool> {
+    let mut near = vec![false; nodes];
+    for plain in channels {
+        let times = plain.channel.times();
+        let reach = GAP * plain.spacing().max(step);
+        let (Some(first), Some(last)) = (times.first(), times.last()) else {
+            continue;
+        };
+        for (i, near) in near.iter_mut().enumerate() {
+            let t = start + i as f64 * step;
+            let after = times.partition_point(|x| *x < t);
+            let ahead = times.get(after).map_or(f64::INFINITY, |x| x - t);
+            let behind = after.checked_sub(1).map_or(f64::INFINITY, |j| t - times[j]);
+            let inside = t >= first + settling && t <= last - settling;
+            *near |= inside && ahead.min(behind) <= reach;
+        }
+    }
+    near
+}

@@ -1,0 +1,160 @@
+//! Termination of a fit: stopping tests, and how a fit ended.
+
+use super::history::Row;
+use super::reason::{Reason, Within};
+use crate::qp::Subproblem;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// How a fit ended, in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Status {
+    /// A stopping test of the model was met.
+    Converged,
+    /// Exactly the iterations asked for were run, and no test was asked for.
+    Completed,
+    /// The iterations ran out before a stopping test was met.
+    MaxIterations,
+    /// The wall-clock limit was reached.
+    TimeLimit,
+    /// No step lowers the cost although no stopping test is met.
+    Stalled,
+    /// Ended from outside.
+    Interrupted,
+    /// No device satisfies the constraints and the motion.
+    Infeasible,
+    /// The start cannot be evaluated.
+    Failed,
+}
+
+impl Status {
+    /// The word in `result.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Converged => "converged",
+            Status::Completed => "completed",
+            Status::MaxIterations => "max-iterations",
+            Status::TimeLimit => "time-limit",
+            Status::Stalled => "stalled",
+            Status::Interrupted => "interrupted",
+            Status::Infeasible => "infeasible",
+            Status::Failed => "failed",
+        }
+    }
+}
+
+/// How a fit ended, and why.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// In one word.
+    pub status: Status,
+    /// The reason, which is one sentence as text.
+    pub reason: Reason,
+}
+
+impl Outcome {
+    pub(crate) fn new(status: Status, reason: Reason) -> Self {
+        Self { status, reason }
+    }
+}
+
+/// Stopping tests. The iteration limit always holds; of the others those that are given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stopping {
+    /// Most iterations. Without any other test the run takes exactly so many and is `completed`.
+    pub iterations: u64,
+    /// Converged when `J / J0` is at most this (and `gradient_ratio` holds, if given).
+    pub cost_ratio: Option<f64>,
+    /// Converged when `G^2 / G0^2` is at most this (and `cost_ratio` holds, if given). `G^2` is taken
+    /// at the start of the iteration, as in the paper.
+    pub gradient_ratio: Option<f64>,
+    /// Converged when an iteration lowers `J` by at most this fraction and changes no function by
+    /// more than the square root of this, relative to its natural size; or when it changes none by
+    /// more than this.
+    pub tolerance: Option<f64>,
+    /// Converged when an iteration changes no function by more than this, relative to its natural
+    /// size ([`crate::problem::Problem::relative_change`]).
+    pub step: Option<f64>,
+    /// Wall-clock limit.
+    pub limit: Option<Duration>,
+    /// Most iterations of one quadratic program ([`Subproblem::ITERATIONS`] by default); one that needs
+    /// more has stalled.
+    pub program_iterations: u32,
+}
+
+impl Default for Stopping {
+    /// 1000 iterations or a tolerance of 1e-10.
+    fn default() -> Self {
+        Self {
+            tolerance: Some(1e-10),
+            ..Self::exactly(1000)
+        }
+    }
+}
+
+impl Stopping {
+    /// Exactly `iterations` iterations.
+    pub fn exactly(iterations: u64) -> Self {
+        Self {
+            iterations,
+            cost_ratio: None,
+            gradient_ratio: None,
+            tolerance: None,
+            step: None,
+            limit: None,
+            program_iterations: Subproblem::ITERATIONS,
+        }
+    }
+
+    /// Whether any convergence test is asked for.
+    pub fn has_test(&self) -> bool {
+        let tests = [
+            self.cost_ratio,
+            self.gradient_ratio,
+            self.tolerance,
+            self.step,
+        ];
+        tests.iter().any(Option::is_some)
+    }
+
+    /// The outcome that the latest iteration brings, if any. `previous_cost` is J before it; a small
+    /// step that was `limited` is no sign of convergence.
+    pub(crate) fn after(&self, row: &Row, previous_cost: f64, limited: bool) -> Option<Outcome> {
+        let small_step = || (!limited).then(|| self.small_step(row, previous_cost));
+        self.ratios_met(row)
+            .or_else(|| small_step().flatten())
+            .map(|reason| Outcome::new(Status::Converged, reason))
+            .or_else(|| self.out_of_iterations(row.iteration))
+    }
+
+    pub(crate) fn out_of_iterations(&self, iteration: u64) -> Option<Outcome> {
+        let exhausted = iteration >= self.iterations;
+        exhausted.then(|| match self.has_test() {
+            true => Outcome::new(Status::MaxIterations, Reason::IterationLimit(iteration)),
+            false => Outcome::new(Status::Completed, Reason::AllIterations(iteration)),
+        })
+    }
+
+    /// The ratios of cost and gradient of `row`, if they are within all limits that are given: what was asked
+    /// for, but no sign of a minimum.
+    pub(super) fn ratios_met(&self, row: &Row) -> Option<Reason> {
+        let test = |value: f64, limit: Option<f64>| limit.map(|limit| Within { value, limit });
+        let cost = test(row.cost_ratio, self.cost_ratio);
+        let gradient = test(row.gradient_norm_squared_ratio, self.gradient_ratio);
+        let is_met = |test: &Within| test.value <= test.limit;
+        let mut given = cost.iter().chain(&gradient).peekable();
+        (given.peek().is_some() && given.all(is_met)).then_some(Reason::Ratios { cost, gradient })
+    }
+
+    fn small_step(&self, row: &Row, previous_cost: f64) -> Option<Reason> {
+        let change = row.relative_change;
+        let decrease = (previous_cost - row.cost) / previous_cost.max(f64::MIN_POSITIVE);
+        let within = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value <= limit);
+        if within(self.step, change) || within(self.tolerance, change) {
+            return Some(Reason::SmallChange(change));
+        }
+        let is_flat =
+            within(self.tolerance, decrease) && within(self.tolerance.map(f64::sqrt), change);
+        is_flat.then_some(Reason::SmallDecrease { decrease, change })
+    }
+}

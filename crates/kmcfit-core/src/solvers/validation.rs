@@ -1,0 +1,63 @@
+//! Experiments that took no part in the fit.
+
+use super::checkpoint::Watch;
+use super::executor::search;
+use super::settings::{FitSettings, Solver};
+use super::state_estimation::states_from_readings;
+use crate::functions::{CoefficientFunction, Functions, Scalar};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::Experiment;
+use crate::simulate::Breakdown;
+
+/// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
+/// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own readings.
+/// Returns the problem of that experiment alone and the point found.
+///
+/// # Errors
+/// A [`Breakdown`] if there is no motion.
+pub fn predict_held_out(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    experiment: &Experiment,
+    scalars: &[Scalar],
+    settings: &FitSettings,
+) -> Result<(Problem, Evaluation), Breakdown> {
+    let grid = &problem.oscillator.grid;
+    let known = |(f, values): (&usize, &[f64])| {
+        CoefficientFunction::fixed(problem.functions.get(*f).quantity, values.to_vec())
+    };
+    let main = problem.functions.assembly(0);
+    let list = main.iter().zip(evaluation.device.functions()).map(known);
+    let functions = Functions::new(list.collect(), grid.nodes(), grid.step())
+        .expect("known functions have no basis that could be dependent")
+        .with_scalars(scalars.to_vec());
+    let mut alone = Experiment {
+        device: 0,
+        ..experiment.clone()
+    };
+    alone.name.clone_from(&experiment.name);
+    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone]);
+    let mut start = alone.start();
+    let first = states_from_readings(&alone).into_iter().next().flatten();
+    if let Some(state) = first {
+        let values = [state.displacement, state.velocity];
+        for (index, value) in alone.experiments[0].sought.into_iter().zip(values) {
+            if let Some(index) = index.filter(|i| scalars[*i].prior.is_none()) {
+                start[index] = value;
+            }
+        }
+    }
+    let settings = FitSettings {
+        solver: Solver::GaussNewton,
+        ..settings.clone()
+    };
+    let found = search(
+        &alone,
+        &start,
+        &settings,
+        None,
+        &mut Watch::new(&mut |_| {}),
+    )?;
+    Ok((alone, found.best.evaluation))
+}
