@@ -6,10 +6,16 @@ use crate::memory;
 use crate::near::nearest;
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
+use std::sync::LazyLock;
+use std::time::Instant;
+
+/// Origin of the clock.
+static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Provides the functions of the host.
 pub fn provide_host() {
     host::provide(Host {
+        clock: || START.elapsed(),
         has_memory: |bytes| memory::check(bytes).is_ok(),
         may_start_thread: || faults::check(Operation::Spawn),
     });

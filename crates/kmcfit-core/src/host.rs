@@ -1,12 +1,16 @@
-//! What the numerics take from their host, provided by the application: the memory limit and the permission to start a
-//! thread. A library user need not provide any of it.
+//! Services of the host, provided by the application: a clock, the memory limit and the permission to start a thread.
+//!
+//! Without them a fit has no time limit and its timings are zero, memory counts as available, and threads may start.
 
 use std::io;
 use std::sync::OnceLock;
+use std::time::Duration;
 
 /// Functions of the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Host {
+    /// Time since any fixed instant; never decreasing.
+    pub clock: fn() -> Duration,
     /// Whether so many more bytes can be allocated.
     pub has_memory: fn(u64) -> bool,
     /// Called before a thread is started; an error counts as the operating system's refusal.
@@ -31,4 +35,20 @@ pub(crate) fn has_memory(bytes: u64) -> bool {
 /// The host's refusal.
 pub(crate) fn may_start_thread() -> io::Result<()> {
     HOST.get().map_or(Ok(()), |host| (host.may_start_thread)())
+}
+
+/// An instant of the host's clock.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Instant(Duration);
+
+impl Instant {
+    /// The present; always the same where the host provides no clock.
+    pub fn now() -> Self {
+        Self(HOST.get().map_or(Duration::ZERO, |host| (host.clock)()))
+    }
+
+    /// Time since this instant.
+    pub fn elapsed(self) -> Duration {
+        Self::now().0.saturating_sub(self.0)
+    }
 }

@@ -97,64 +97,32 @@ mod study;
 mod system;
 mod threads;
 
-pub use solvers::fit;
+// The public API, by topic. A snapshot of it (`api.txt`) makes it grow only on purpose.
 
-/// Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API; outside semantic
-/// versioning.
+// Problems.
+pub use builder::{BuildError, Builder, Part, Record};
+pub use constraints::{Limit, Shape, Statement};
+pub use functions::{
+    Basis, CoefficientFunction, Functions, Penalty, Prior, Quantity, Scalar, Variation,
+};
+pub use problem::Problem;
+pub use record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+pub use signal::{Interpolation, Signal};
+pub use system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+// Simulation and cost.
+pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
+pub use simulate::{Breakdown, Cause, Engine, Purpose, Trajectory};
+// Fits.
+pub use solvers::{
+    Attempt, Counts, Fit, FitSettings, Initial, Optimality, Outcome, Reason, Solver, StartStrategy,
+    Status, Stopping, Timings, WeightPath, WeightRule, choose_weight, fit,
+};
+// Inference.
+pub use assessment::{FitAssessment, FitWarning, Unidentified};
+pub use identifiability::{BandSettings, Bands, count, verdicts};
+pub use study::{Profile, ProfileSettings, Target, profile};
+// Services of the host.
+pub use host::{Host, provide};
+
 #[doc(hidden)]
-pub mod internals {
-    pub mod assessment {
-        pub use crate::assessment::*;
-    }
-    pub mod builder {
-        pub use crate::builder::*;
-    }
-    pub mod constraints {
-        pub use crate::constraints::*;
-    }
-    pub mod diagnostics {
-        pub use crate::diagnostics::*;
-    }
-    pub mod functions {
-        pub use crate::functions::*;
-    }
-    pub mod host {
-        pub use crate::host::*;
-    }
-    pub mod identifiability {
-        pub use crate::identifiability::*;
-    }
-    pub mod objective {
-        pub use crate::objective::*;
-    }
-    pub mod problem {
-        pub use crate::problem::*;
-    }
-    pub mod qp {
-        pub use crate::qp::*;
-    }
-    pub mod record {
-        pub use crate::record::*;
-    }
-    pub mod signal {
-        pub use crate::signal::*;
-    }
-    pub mod simulate {
-        pub use crate::simulate::*;
-    }
-    pub mod simd {
-        pub use crate::simd::*;
-    }
-    pub mod solvers {
-        pub use crate::solvers::*;
-    }
-    pub mod study {
-        pub use crate::study::*;
-    }
-    pub mod system {
-        pub use crate::system::*;
-    }
-    pub mod threads {
-        pub use crate::threads::*;
-    }
-}
+pub mod internals;

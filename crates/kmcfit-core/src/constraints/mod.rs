@@ -11,4 +11,4 @@ mod violation;
 pub use build::{Impossible, Limit, Shape, Statement};
 pub use rows::Rows;
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
-pub use violation::{TOLERANCE, Violation};
+pub use violation::TOLERANCE;

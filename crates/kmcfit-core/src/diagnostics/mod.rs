@@ -20,6 +20,6 @@ pub(crate) use pattern::median_size;
 pub use pattern::{far_off, offset_and_drift};
 pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
-pub use residuals::{fit_percent, reduced_chi_square, rms};
+pub use residuals::{fit_percent, rms};
 pub use residuals::{spread, without_line};
 pub use whiteness::{FEWEST_READINGS, Reason, SIGNIFICANCE, Verdict, Whiteness, whiteness};

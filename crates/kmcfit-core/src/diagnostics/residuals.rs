@@ -37,27 +37,6 @@ pub fn rms(residuals: &[f64]) -> f64 {
     norm(finite()) / (finite().count() as f64).sqrt()
 }
 
-/// Chi-square per degree of freedom,
-///
-/// ```text
-/// sum of z_i^2 / (n - p)          z_i = (observed_i - model_i) / sigma_i
-/// ```
-///
-/// for `standardised` residuals `z` and `p` fitted `parameters`: a whole number for a plain fit, the
-/// effective number (the trace of the matrix from readings to model values) for a penalised one.
-/// About 1, give or take `sqrt(2 / (n - p))`, where the model is right and sigma is too; well above,
-/// the model misses something or sigma is too small; well below, sigma is too large.
-///
-/// `None` unless there are more readings than parameters.
-///
-/// Source: P. R. Bevington, D. K. Robinson, *Data Reduction and Error Analysis for the Physical
-/// Sciences*, 3rd ed., section 11.1.
-pub fn reduced_chi_square(standardised: &[f64], parameters: f64) -> Option<f64> {
-    let finite = || standardised.iter().filter(|z| z.is_finite());
-    let freedom = finite().count() as f64 - parameters;
-    (freedom > 0.0).then(|| finite().map(|z| z * z).sum::<f64>() / freedom)
-}
-
 /// The pairs in which both values are finite.
 fn pairs<'a>(
     observed: &'a [f64],
@@ -148,16 +127,6 @@ mod tests {
         assert_eq!(fit_percent(&[2.0, 2.0], &[2.0, 3.0]), f64::NEG_INFINITY);
         assert!(rms(&[]).is_nan());
         assert_eq!(rms(&[0.0, 0.0]), 0.0);
-    }
-
-    #[test]
-    fn chi_square_per_degree_of_freedom() {
-        near(reduced_chi_square(&[1.0, -2.0, 2.0], 1.0).unwrap(), 4.5);
-        near(
-            reduced_chi_square(&[1.0, f64::NAN, 2.0], 0.5).unwrap(),
-            5.0 / 1.5,
-        );
-        assert_eq!(reduced_chi_square(&[1.0, 2.0], 2.0), None);
     }
 
     #[test]

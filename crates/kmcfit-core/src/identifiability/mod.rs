@@ -30,11 +30,10 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
 }
 
-pub use anchors::{Anchors, anchors};
+pub use anchors::anchors;
 pub use bands::{Band, BandSettings, Bands, Side};
-pub use counting::{Count, Statement, Symmetry, count};
-pub use directions::Directions;
+pub use counting::{Symmetry, count};
 pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
-pub use gauge::{Gauge, GaugeDirection, MOSTLY, Named};
-pub use sensitivity::{RANK, Seen, Sensitivity, Spectrum};
-pub use verdict::{IDENTIFIED, Judgement, LEAST, MOST, Verdict, verdicts};
+pub use gauge::Gauge;
+pub use sensitivity::{Seen, Sensitivity, Spectrum};
+pub use verdict::{Judgement, Verdict, verdicts};

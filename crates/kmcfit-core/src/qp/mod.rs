@@ -19,6 +19,6 @@ mod subproblem;
 
 pub use candidate::Candidate;
 pub use kkt::Kkt;
-pub use projection::{Projection, RowPlace, project, project_within};
+pub use projection::{project, project_within};
 pub use solve::{ConicStatus, Solution};
 pub use subproblem::Subproblem;

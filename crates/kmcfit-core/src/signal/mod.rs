@@ -22,10 +22,7 @@ mod spline;
 
 pub use clipping::clipped;
 pub use decimate::{decimate, decimation_filter};
-pub use filter::{
-    SecondOrder, apply, band_pass, high_pass, low_pass, zero_phase, zero_phase_padded,
-    zero_phase_transpose,
-};
+pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
 pub use interpolate::{Interpolation, Signal};
 pub use onset::onset;
 pub use shape::{Shape, SweepLaw};

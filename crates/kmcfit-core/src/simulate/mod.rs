@@ -14,7 +14,7 @@ pub use breakdown::{Breakdown, Cause};
 pub use engine::{Engine, Purpose, continuous_adjoint};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use gradient::Slopes;
-pub use reference::{Sensed, StateChange, StepJacobian};
+pub use reference::{Sensed, StepJacobian};
 pub use trajectory::Trajectory;
 
 use crate::system::{Device, Excitation, Oscillator, State};

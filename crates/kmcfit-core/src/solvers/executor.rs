@@ -11,13 +11,14 @@ use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
+use crate::host::Instant;
 use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::simulate::{Breakdown, Cause};
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
 /// search goes on from there. `reference` is what the

@@ -8,9 +8,10 @@ use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
+use crate::host::Instant;
 use crate::problem::Problem;
 use crate::simulate::Breakdown;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A finished fit: the best point, how it was reached and how it ended.
 #[derive(Debug, Clone)]

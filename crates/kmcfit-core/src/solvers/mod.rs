@@ -29,12 +29,12 @@ mod weight_path;
 
 pub use active_set::{ActiveGroup, active_constraints};
 pub use checkpoint::{
-    CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, MethodState, Observer, SolverState,
+    CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, Observer, SolverState,
 };
 pub use counts::Counts;
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
-pub use history::{IterationRecord, SNAPSHOT_ITERATIONS, Snapshot};
+pub use history::IterationRecord;
 pub use iterate::Iterate;
 pub use linearization::FEW_PARAMETERS;
 pub(crate) use linearization::{add_priors, linear_readings, weighted_jacobian};
@@ -42,9 +42,9 @@ pub use methods::equation_error::{Measurements, equation_error};
 pub use no_response::without_motion;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
-pub use reason::{ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord, Within};
+pub use reason::Reason;
 pub use settings::{FitSettings, Initial, Solver, StartStrategy};
-pub use start_strategy::{fit, fit_watched};
+pub use start_strategy::fit;
 pub use starts::StartProjection;
 pub use state_estimation::states_from_readings;
 pub use termination::{Outcome, Status, Stopping};

@@ -18,12 +18,13 @@ use super::starts::{
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
+use crate::host::Instant;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::simulate::Breakdown;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A fit explains the readings of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another attempt.

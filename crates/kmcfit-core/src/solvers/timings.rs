@@ -1,8 +1,9 @@
 //! Where the time of a fit goes.
 
+use crate::host::Instant;
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Wall-clock time by what it was spent on. No time is in two of them; what is in none of them is
 /// bookkeeping.

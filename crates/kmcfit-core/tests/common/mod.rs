@@ -7,11 +7,14 @@ pub mod sensed;
 pub mod synthetic;
 
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::time::Instant;
 
 pub const DURATION: f64 = 25.0;
 pub const INITIAL: State = State {
@@ -57,6 +60,16 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Functions::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
+}
+
+/// Provides the clock of the process, without which timings are zero.
+pub fn provide_clock() {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    host::provide(Host {
+        clock: || START.elapsed(),
+        has_memory: |_| true,
+        may_start_thread: || Ok(()),
+    });
 }
 
 /// A file or folder of the repository.

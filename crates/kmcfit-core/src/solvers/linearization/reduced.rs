@@ -1,6 +1,7 @@
 //! The readings linearised by tangent solves and reduced to a triangle, for functions with few parameters.
 
 use super::residuals::Residuals;
+use crate::host::Instant;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
@@ -8,7 +9,7 @@ use crate::simd::LANES;
 use crate::simd::tall_qr::Triangle;
 use crate::solvers::timings::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Up to so many columns the reduction of a piece of rows takes as long as a look at the clock.
 pub(super) const NARROW: usize = LANES;

@@ -6,6 +6,7 @@
 
 use super::{Referred, reference};
 use crate::functions::{Basis, CoefficientFunction, Functions};
+use crate::host::Instant;
 use crate::problem::Problem;
 use crate::record::{Drive, Experiment, LONG};
 use crate::solvers::checkpoint::Observer;
@@ -16,7 +17,7 @@ use crate::solvers::settings::FitSettings;
 use crate::solvers::timings::Timings;
 use crate::system::{Excitation, Grid, Stepwise};
 use crate::threads;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
 /// the same step to the last bit.

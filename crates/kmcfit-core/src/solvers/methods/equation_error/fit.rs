@@ -2,6 +2,7 @@
 
 use super::measured::{Measured, Measurements};
 use super::{Minimum, Purpose, add_rows, device, minimise};
+use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
@@ -16,7 +17,6 @@ use crate::solvers::reason::{Reason, UnsupportedRecord};
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use crate::system::Device;
-use std::time::Instant;
 
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.
 const FAR: f64 = 1e4;

@@ -1,0 +1,95 @@
+//! Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API. No semantic versioning
+//! applies to them. A new item is added here on purpose, by name.
+
+pub mod assessment {
+    pub use crate::assessment::{
+        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, POOR, Plausibility,
+        ResidualPattern, StepCheck, Unidentified, constant_probability, diagnostics, outliers,
+        pattern, standard_error,
+    };
+}
+pub mod builder {
+    pub use crate::builder::{Builder, Part, Record};
+}
+pub mod constraints {
+    pub use crate::constraints::{
+        Cone, Constraints, Impossible, Limit, RowGroup, Rows, Shape, Statement, TOLERANCE,
+    };
+}
+pub mod diagnostics {
+    pub use crate::diagnostics::{
+        ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
+        offset_and_drift, rms, spread, without_line,
+    };
+}
+pub mod functions {
+    pub use crate::functions::{
+        Basis, CoefficientFunction, Design, Functions, Gram, Penalty, Prior, Quantity, Ratios,
+        Scalar, Value, Variation, basis,
+    };
+}
+pub mod host {
+    pub use crate::host::{Host, provide};
+}
+pub mod identifiability {
+    pub use crate::identifiability::{
+        Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
+        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, anchors, count, is_rounding,
+        is_unhindered, rank_experiments, verdicts,
+    };
+}
+pub mod objective {
+    pub use crate::objective::{Evaluation, GradientKind, View, state_sizes};
+}
+pub mod problem {
+    pub use crate::problem::Problem;
+}
+pub mod qp {
+    pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
+}
+pub mod record {
+    pub use crate::record::{
+        BaseMotion, Channel, ChannelKind, Drive, Experiment, Loss, Sensor, Waveform, Weighting,
+        integral_over,
+    };
+}
+pub mod signal {
+    pub use crate::signal::{
+        Interpolation, SecondOrder, Shape, Signal, Spectrum, SweepLaw, band_pass, clipped,
+        decimate, decimation_filter, even_spacing, high_pass, low_pass, median, median_spacing,
+        onset,
+    };
+}
+pub mod simd {
+    pub use crate::simd::{LIMIT, arithmetics, check_limit};
+}
+pub mod simulate {
+    pub use crate::simulate::{
+        Breakdown, Cause, Engine, Purpose, Trajectory, arithmetic, continuous_adjoint, reference,
+    };
+}
+pub mod solvers {
+    pub use crate::solvers::{
+        ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, FEW_PARAMETERS, Fit,
+        FitSettings, Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality,
+        PathPoint, Solver, SolverState, StartProjection, StartStrategy, Status, Stopping,
+        WeightPath, WeightRule, active_constraints, choose_weight, choose_weight_watched,
+        equation_error, fit, fit_from, fit_with_noise, fit_with_noise_watched, predict_held_out,
+        states_from_readings, timed, without_motion,
+    };
+}
+pub mod study {
+    pub use crate::study::{
+        Linear, Profile, ProfileSettings, Target, bootstrap, equivalent, multistart, prediction,
+        profile, profiles, pull_apart, variation,
+    };
+}
+pub mod system {
+    pub use crate::system::{
+        Device, DeviceTangent, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
+        Surroundings, Term, quadrature,
+    };
+}
+pub mod threads {
+    pub use crate::threads::spawn_scoped;
+}
