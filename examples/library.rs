@@ -1,7 +1,7 @@
 // A fit from Rust: the model file becomes a problem, the problem a device.
 
 use kmcfit::config::{ModelFile, Purpose, build};
-use kmcfit_core::internals::solvers::fit;
+use kmcfit_core::fit;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -4,9 +4,10 @@
 //! `cargo run --example make_records -- data`
 
 use kmcfit::results::write_whole;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
-    Surroundings, Term, Trajectory,
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -76,9 +77,17 @@ impl Run<'_> {
             };
             let place = Place::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
-            oscillator
-                .sense(kind, &device, Some(&excitation), &motion, place, around)
-                .value
+            let excitation = Some(&excitation);
+            reference::observe(
+                &oscillator,
+                kind,
+                &device,
+                excitation,
+                &motion,
+                place,
+                around,
+            )
+            .value
         });
         let acceleration = acceleration.collect();
         (

@@ -3,8 +3,8 @@
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{Builder, Part, Record};
 use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::system::Method;
 use std::error::Error;
 
 /// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.

@@ -4,9 +4,9 @@ use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{Builder, Part, Record};
 use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::functions::{Basis, Quantity};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::system::Method;
 use std::path::Path;
 
 /// The columns of a file in `data/`.

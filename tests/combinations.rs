@@ -1,8 +1,8 @@
 //! Every basis with every term, channel and method: a fit with a named outcome, or a refusal that says why.
 
 use kmcfit::config::{ModelFile, Purpose, build};
-use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::solvers::{Status, fit};
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -6,15 +6,16 @@ use insta::assert_snapshot;
 use kmcfit::config::{Model, ModelFile, Purpose, build};
 use kmcfit::report::{CostKind, cost_definition};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
-};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
-use kmcfit_core::internals::objective::{Channel, GradientKind, View, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::objective::{GradientKind, View};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
+};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -3,10 +3,10 @@
 mod common;
 
 use kmcfit::report::predict;
-use kmcfit_core::internals::dynamics::quadrature::trapezoid;
-use kmcfit_core::internals::dynamics::{Oscillator, State};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::system::quadrature::trapezoid;
+use kmcfit_core::internals::system::{Oscillator, State};
 use std::sync::OnceLock;
 
 /// Iteration, J/J0 after it, G^2/G0^2 before it: computed from the formulas of the paper in plain
@@ -177,7 +177,7 @@ fn the_paper_s_optimum_does_not_predict() {
         (-3.3, 1.0, 39.730, 126.9),
     ];
     let oscillator: Oscillator =
-        common::oscillator(2000, kmcfit_core::internals::dynamics::Method::Midpoint);
+        common::oscillator(2000, kmcfit_core::internals::system::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()
         .map(|&(displacement, velocity, ..)| State {

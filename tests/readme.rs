@@ -15,9 +15,9 @@ mod library {
 use common::pages::{Tour, blocks, blocks_in, fresh_clone, output, page};
 use common::repository;
 use kmcfit::config::{ModelFile, Purpose, build};
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::system::Method;
 use serde_json::Value;
 use std::fs;
 use std::sync::OnceLock;

@@ -1,11 +1,11 @@
 //! Records as model files bring them, from the YAML to the constants found.
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit_core::internals::dynamics::{
-    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
-};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
+};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use tempfile::TempDir;

@@ -2,14 +2,13 @@
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term,
-};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
 use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use std::fmt::Write;
 use std::path::Path;
 

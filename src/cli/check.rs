@@ -5,8 +5,8 @@ use crate::config::{Model, Purpose, build};
 use crate::report::figures::{self, GradientCurve};
 use crate::report::{CsvTable, render};
 use crate::results::{Claim, OutputFolder};
-use kmcfit_core::internals::dynamics::Breakdown;
 use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::simulate::Breakdown;
 use std::path::PathBuf;
 
 /// Read and validate a model, then test its gradient against differences.

@@ -5,7 +5,7 @@ use crate::faults::{self, Operation};
 use crate::memory;
 use crate::near::nearest;
 use kmcfit_core::internals::host::{self, Host};
-use kmcfit_core::internals::lanes::{LIMIT, arithmetics, check_limit};
+use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
 
 /// Provides the functions of the host.
 pub fn provide_host() {

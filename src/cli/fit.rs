@@ -10,11 +10,12 @@ use crate::report::{
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
-use kmcfit_core::internals::dynamics::{Breakdown, State};
+use kmcfit_core::internals::simulate::Breakdown;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
     choose_weight_watched, fit_with_noise_watched, without_motion,
 };
+use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

@@ -6,7 +6,7 @@ use crate::report::{
     CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
 use crate::results::{Claim, OutputFolder};
-use kmcfit_core::internals::dynamics::State;
+use kmcfit_core::internals::system::State;
 use std::path::PathBuf;
 
 /// Predict the free motion of a found device from other initial states.

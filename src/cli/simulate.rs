@@ -7,7 +7,7 @@ use crate::error::{InputError, Place};
 use crate::input::{one_of, quote, read_text};
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
-use kmcfit_core::internals::problem::Experiment;
+use kmcfit_core::internals::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

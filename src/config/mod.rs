@@ -10,6 +10,7 @@ mod complaint;
 mod expansion;
 mod failure;
 mod guard;
+pub mod key;
 pub mod keys;
 pub mod locate;
 mod model_file;

@@ -9,6 +9,7 @@ mod study;
 pub use experiment::*;
 pub use study::*;
 
+use crate::config::key::keys;
 use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -18,61 +19,55 @@ use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrLi
 use super::scalar::{Scalar, Start, Text, Weight};
 use super::scalar::{choice, deserialize_scalar, scalar_visits};
 
-/// A whole model file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map with the keys format, experiments, functions, fit, …"
-)]
-pub struct ModelSpec {
-    /// Version of the file format.
-    pub format: Format,
-    /// What reports call the run.
-    pub title: Option<Text>,
-    /// Measured (or to be simulated) motions; at least one.
-    pub experiments: Vec<ExperimentSpec>,
-    /// Time grid and stepper.
-    pub grid: Option<GridSpec>,
-    /// Mass, damping and stiffness over time.
-    pub functions: FunctionsSpec,
-    /// What the functions must satisfy, besides their own `min` and `max`.
-    pub constraints: Option<Vec<ConstraintSpec>>,
-    /// How to fit.
-    pub fit: Option<FitSpec>,
-    /// True functions, where they are known; used for reporting only.
-    pub truth: Option<TruthSpec>,
-    /// Initial states to predict the motion from.
-    pub predict: Option<Vec<StateSpec>>,
-    /// What `study` looks into.
-    pub study: Option<StudySpec>,
+keys! {
+    /// A model: records of one device, what is sought, and how.
+    pub struct ModelSpec = "model", expecting "a map with the keys format, experiments, functions, fit, …" {
+        /// Version of the file format.
+        format: Format, example "1";
+        /// What reports call the run.
+        title: Option<Text>, example "A decaying mass", default "the name of the file";
+        /// Measured (or to be simulated) motions of the same device, over the same time.
+        experiments: Vec<ExperimentSpec>, example "[{initial: {displacement: 3.3, velocity: 1.0}}]";
+        /// Time nodes and stepper.
+        grid: Option<GridSpec>, example "{nodes: 2000, method: midpoint}", default "one node per reading, rk4";
+        /// Mass, damping, stiffness and further terms over time.
+        functions: FunctionsSpec,
+            example "{mass: {fixed: 1.0}, damping: {basis: constant, start: 0.0}, stiffness: {basis: constant, start: 1.0}}";
+        /// What the functions must satisfy besides their own `min` and `max`; each map demands one thing.
+        constraints: Option<Vec<ConstraintSpec>>, example "[{function: mass, shape: non-increasing}]", default "none";
+        /// How to fit.
+        fit: Option<FitSpec>,
+            example "{method: gauss-newton, initial: data}",
+            default "Gauss-Newton from the start values";
+        /// The true functions, where they are known; for reports only.
+        truth: Option<TruthSpec>, example "{data: truth.csv}", default "unknown";
+        /// Other initial states to predict the motion from.
+        predict: Option<Vec<StateSpec>>, example "[{displacement: -3.3, velocity: 1.0}]", default "none";
+        /// What `kmcfit study` looks into besides what it always does.
+        study: Option<StudySpec>, example "{starts: 20, varies: true}";
+    }
 }
 
-/// A state of the oscillator.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {displacement: 3.3, velocity: 1.0}"
-)]
-pub struct StateSpec {
-    /// Displacement, in m.
-    pub displacement: Number,
-    /// Velocity, in m/s.
-    pub velocity: Number,
+keys! {
+    /// A state of the oscillator.
+    pub struct StateSpec = "state", expecting "a map such as {displacement: 3.3, velocity: 1.0}" {
+        /// Displacement.
+        displacement: Number, example "3.3", unit "m";
+        /// Velocity.
+        velocity: Number, example "1.0", unit "m/s";
+    }
 }
 
-/// Time grid and stepper.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {nodes: 2000, method: midpoint}"
-)]
-pub struct GridSpec {
-    /// Number of nodes N, or `auto`; the step is T/(N-1).
-    pub nodes: Option<Nodes>,
-    /// Stepper.
-    pub method: Option<StepMethod>,
-    /// Duration T, in s.
-    pub duration: Option<Number>,
+keys! {
+    /// Time nodes and stepper.
+    pub struct GridSpec = "grid", expecting "a map such as {nodes: 2000, method: midpoint}" {
+        /// Number of time nodes, the step is duration/(nodes - 1); or `auto`, from the frequencies in the readings.
+        nodes: Option<Nodes>, example "2000", default "one per reading";
+        /// How the motion is stepped through time.
+        method: Option<StepMethod>, example "midpoint", default "rk4";
+        /// Length of the time axis.
+        duration: Option<Number>, example "25.0", unit "s", default "that of the readings";
+    }
 }
 
 choice! {
@@ -85,79 +80,81 @@ choice! {
     }
 }
 
-/// The coefficient functions of the device.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map with the keys mass, damping, stiffness"
-)]
-pub struct FunctionsSpec {
-    /// Mass m(t), in kg.
-    pub mass: FunctionSpec,
-    /// Damping c(t), in N s/m.
-    pub damping: FunctionSpec,
-    /// Stiffness k(t), in N/m.
-    pub stiffness: FunctionSpec,
-    /// Cubic stiffness, in N/m^3: a force on y^3.
-    pub cubic_stiffness: Option<FunctionSpec>,
-    /// Quadratic damping, in N s^2/m^2: a force on |v| v.
-    pub quadratic_damping: Option<FunctionSpec>,
-    /// Coulomb friction, in N: a force on the sign of v, smoothed over `width`.
-    pub coulomb_friction: Option<FunctionSpec>,
-    /// Constant offset of the force, in N.
-    pub offset: Option<FunctionSpec>,
+keys! {
+    /// The functions of the device; mass, damping and stiffness must be there.
+    pub struct FunctionsSpec = "functions", expecting "a map with the keys mass, damping, stiffness" {
+        /// Mass m(t).
+        mass: FunctionSpec, example "{basis: nodal, start: 2.0}", unit "kg";
+        /// Damping c(t): a force on v.
+        damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
+        /// Stiffness k(t): a force on y.
+        stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
+        /// Cubic stiffness: a force on y^3.
+        cubic_stiffness: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N/m^3",
+            default "no such force";
+        /// Quadratic damping: a force on |v| v.
+        quadratic_damping: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N s^2/m^2",
+            default "no such force";
+        /// Coulomb friction: a force on v/sqrt(v^2 + width^2).
+        coulomb_friction: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.5, width: 0.01}",
+            unit "N",
+            default "no such force";
+        /// A constant push against the direction of y.
+        offset: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "no such force";
+    }
 }
 
-/// Functions that one experiment has for itself.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {damping: {basis: constant, start: 1.0}}"
-)]
-pub struct OwnFunctionsSpec {
-    /// Mass m(t), in kg.
-    pub mass: Option<FunctionSpec>,
-    /// Damping c(t), in N s/m.
-    pub damping: Option<FunctionSpec>,
-    /// Stiffness k(t), in N/m.
-    pub stiffness: Option<FunctionSpec>,
-    /// Cubic stiffness, in N/m^3.
-    pub cubic_stiffness: Option<FunctionSpec>,
-    /// Quadratic damping, in N s^2/m^2.
-    pub quadratic_damping: Option<FunctionSpec>,
-    /// Coulomb friction, in N.
-    pub coulomb_friction: Option<FunctionSpec>,
-    /// Constant offset of the force, in N.
-    pub offset: Option<FunctionSpec>,
+keys! {
+    /// Functions that one experiment does not share with the others.
+    pub struct OwnFunctionsSpec (Default) = "own_functions", expecting "a map such as {damping: {basis: constant, start: 1.0}}" {
+        /// Mass m(t) of this experiment.
+        mass: Option<FunctionSpec>, example "{basis: constant, start: 2.0}", unit "kg";
+        /// Damping c(t) of this experiment.
+        damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
+        /// Stiffness k(t) of this experiment.
+        stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
+        /// Cubic stiffness: a force on y^3.
+        cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
+        /// Quadratic damping: a force on |v| v.
+        quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
+        /// Coulomb friction: a force on v/sqrt(v^2 + width^2).
+        coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
+        /// A constant push against the direction of y.
+        offset: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
+    }
 }
 
-/// One coefficient function.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {basis: nodal, start: 2.0}"
-)]
-pub struct FunctionSpec {
-    /// Shape of the function.
-    pub basis: Option<Basis>,
-    /// Break points of a piecewise function or a spline, in s: how many, or a list.
-    pub knots: Option<Knots>,
-    /// Degree of a polynomial.
-    pub degree: Option<Count>,
-    /// Values to start the fit from.
-    pub start: Option<Start>,
-    /// Values that are known and not fitted.
-    pub fixed: Option<NumberOrColumn>,
-    /// Smallest value allowed.
-    pub min: Option<NumberOrColumn>,
-    /// Largest value allowed.
-    pub max: Option<NumberOrColumn>,
-    /// Penalties on squared derivatives.
-    pub smooth: Option<OneOrMany<SmoothSpec>>,
-    /// Penalty on the total variation.
-    pub variation: Option<VariationSpec>,
-    /// Speed over which the sign of Coulomb friction is smoothed, in m/s.
-    pub width: Option<Number>,
+keys! {
+    /// One function: sought, with a basis and a start, or fixed.
+    pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
+        /// Shape of the function over time, and so what its free values are.
+        basis: Option<Basis>, example "piecewise-linear";
+        /// Break points of a piecewise function or a spline: how many, equally spaced with both ends, or their times.
+        knots: Option<Knots>, example "11", unit "s, of times";
+        /// Degree of a polynomial.
+        degree: Option<Count>, example "2";
+        /// Where the search starts: one number, one value per node, cell or knot, the factors of a polynomial, or a
+        /// column of a file.
+        start: Option<Start>, example "2.0", unit "that of the function";
+        /// Known values, which are not fitted; in place of `basis`.
+        fixed: Option<NumberOrColumn>, example "1.0", unit "that of the function";
+        /// Smallest value allowed.
+        min: Option<NumberOrColumn>, example "0.05", unit "that of the function", default "none";
+        /// Largest value allowed.
+        max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
+        /// Penalty on squared derivatives, added to J; or a list of such.
+        smooth: Option<OneOrMany<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
+        /// Penalty on the total variation: a jump costs no more than a slow change.
+        variation: Option<VariationSpec>, example "{weight: 0.01}", default "none";
+        /// Of Coulomb friction: speed over which the sign of the velocity is smoothed, well below the speeds of the
+        /// motion.
+        width: Option<Number>, example "0.01", unit "m/s";
+    }
 }
 
 choice! {
@@ -178,27 +175,24 @@ choice! {
     }
 }
 
-/// A penalty `weight * integral (d^order p / dt^order)^2 dt`; with order 0 of `p - reference`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {order: 2, weight: 0.1}"
-)]
-pub struct SmoothSpec {
-    /// Which derivative: 0, 1 or 2.
-    pub order: Count,
-    /// Factor of the penalty, or the rule that chooses it.
-    pub weight: Weight,
-    /// What a penalty of order 0 pulls towards, in the unit of the function.
-    pub reference: Option<NumberOrColumn>,
+keys! {
+    /// A penalty: weight times the integral of the squared derivative.
+    pub struct SmoothSpec = "smooth", expecting "a map such as {order: 2, weight: 0.1}" {
+        /// Which derivative: 0 (distance from `reference`), 1 (slope) or 2 (curvature).
+        order: Count, example "2";
+        /// Factor of the penalty in J, or the rule that chooses it from the data.
+        weight: Weight, example "0.1", unit "of J per unit of the integral";
+        /// What a penalty of order 0 pulls towards.
+        reference: Option<NumberOrColumn>, example "1.0", unit "that of the function", default "0";
+    }
 }
 
-/// A penalty `weight * total variation of p`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a map such as {weight: 0.1}")]
-pub struct VariationSpec {
-    /// Factor of the penalty.
-    pub weight: Number,
+keys! {
+    /// A penalty: weight times the total variation.
+    pub struct VariationSpec = "variation", expecting "a map such as {weight: 0.1}" {
+        /// Factor of the penalty in J.
+        weight: Number, example "0.01", unit "of J per unit of the function";
+    }
 }
 
 choice! {
@@ -221,43 +215,40 @@ choice! {
     }
 }
 
-/// One constraint: which keys belong together is checked when the problem is built.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {function: mass, shape: non-increasing}"
-)]
-pub struct ConstraintSpec {
-    /// Which function it is about.
-    pub function: Option<FunctionName>,
-    /// Smallest value allowed.
-    pub min: Option<NumberOrColumn>,
-    /// Largest value allowed.
-    pub max: Option<NumberOrColumn>,
-    /// Smallest and largest slope, in the unit of the function per s.
-    pub slope: Option<RangeSpec>,
-    /// Monotone or curved in one direction.
-    pub shape: Option<OneOrList<ShapeName>>,
-    /// Times at which the value is held, in s.
-    pub at: Option<OneOrList<Number>>,
-    /// Values there, one for all times or one each.
-    pub value: Option<OneOrList<Number>>,
-    /// Mean over the record, in the unit of the function.
-    pub mean: Option<Number>,
-    /// Integral over the record, in the unit of the function times s.
-    pub integral: Option<Number>,
-    /// Two functions: the first is `ratio` times the second.
-    pub equal: Option<Vec<FunctionName>>,
-    /// Factor of the second function of `equal`; 1 unless given.
-    pub ratio: Option<Number>,
-    /// Whether the stored energy must never grow.
-    pub passive: Option<bool>,
-    /// Band of the natural frequency, in Hz.
-    pub frequency: Option<RangeSpec>,
-    /// Cap on the damping ratio.
-    pub damping_ratio: Option<RangeSpec>,
-    /// The price of breaking it: a weight. Without it the constraint holds.
-    pub soft: Option<Number>,
+keys! {
+    /// One demand on the functions.
+    pub struct ConstraintSpec (Default) = "constraint", expecting "a map such as {function: mass, shape: non-increasing}" {
+        /// Which function it is about.
+        function: Option<FunctionName>, example "mass";
+        /// Smallest value allowed, at all times.
+        min: Option<NumberOrColumn>, example "0.05", unit "that of the function";
+        /// Largest value allowed, at all times.
+        max: Option<NumberOrColumn>, example "10.0", unit "that of the function";
+        /// Smallest and largest slope.
+        slope: Option<RangeSpec>, example "{min: -0.2, max: 0.0}", unit "that of the function per s";
+        /// Monotone, or curved in one direction; or a list of such.
+        shape: Option<OneOrList<ShapeName>>, example "non-increasing";
+        /// Times at which the value is held.
+        at: Option<OneOrList<Number>>, example "0.0", unit "s";
+        /// Values at these times, one for all or one each.
+        value: Option<OneOrList<Number>>, example "1.0", unit "that of the function";
+        /// Mean over the record.
+        mean: Option<Number>, example "0.75", unit "that of the function";
+        /// Integral over the record.
+        integral: Option<Number>, example "18.75", unit "that of the function times s";
+        /// Two functions: the first is `ratio` times the second.
+        equal: Option<Vec<FunctionName>>, example "[damping, stiffness]";
+        /// Factor of the second function of `equal`.
+        ratio: Option<Number>, example "0.1", default "1";
+        /// The stored energy never grows: c - m'/2 >= 0 and k' <= 0.
+        passive: Option<bool>, example "true";
+        /// Band of the natural frequency sqrt(k/m)/2π, at every instant.
+        frequency: Option<RangeSpec>, example "{min: 0.1, max: 0.3}", unit "Hz";
+        /// Cap on the size of c/(2 sqrt(k m)).
+        damping_ratio: Option<RangeSpec>, example "{max: 0.2}";
+        /// The price of breaking it: a weight on the mean squared excess.
+        soft: Option<Number>, example "10.0", default "it holds";
+    }
 }
 
 choice! {
@@ -274,33 +265,32 @@ choice! {
     }
 }
 
-/// A range of numbers, open where an end is missing.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a map such as {min: 0.1, max: 0.5}")]
-pub struct RangeSpec {
-    /// Smallest value allowed.
-    pub min: Option<Number>,
-    /// Largest value allowed.
-    pub max: Option<Number>,
+keys! {
+    /// A range; either end may be missing.
+    pub struct RangeSpec = "range", expecting "a map such as {min: 0.1, max: 0.5}" {
+        /// Lower end.
+        min: Option<Number>, example "0.1", default "open";
+        /// Upper end.
+        max: Option<Number>, example "0.5", default "open";
+    }
 }
 
-/// How to fit.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {method: gauss-newton, initial: data}"
-)]
-pub struct FitSpec {
-    /// Solver.
-    pub method: Option<FitMethod>,
-    /// Where the fit starts.
-    pub initial: Option<InitialName>,
-    /// Which gradient the solver follows.
-    pub gradient: Option<Gradient>,
-    /// Number of steps that L-BFGS remembers.
-    pub memory: Option<Count>,
-    /// When to stop.
-    pub stop: Option<StopSpec>,
+keys! {
+    /// How to fit.
+    pub struct FitSpec = "fit", expecting "a map such as {method: gauss-newton, initial: data}" {
+        /// Solver.
+        method: Option<FitMethod>, example "lbfgs", default "gauss-newton";
+        /// Where the fit starts.
+        initial: Option<InitialName>, example "data", default "functions";
+        /// Which gradient the solver follows.
+        gradient: Option<Gradient>, example "continuous", default "discrete";
+        /// Pairs of steps that L-BFGS remembers.
+        memory: Option<Count>, example "20", default "20";
+        /// When to stop; whichever comes first.
+        stop: Option<StopSpec>,
+            example "{iterations: 200, cost_ratio: 1e-4}",
+            default "{iterations: 1000, tolerance: 1e-10}";
+    }
 }
 
 choice! {
@@ -339,58 +329,52 @@ choice! {
     }
 }
 
-/// When to stop; whichever comes first.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {iterations: 1000, cost_ratio: 1e-4}"
-)]
-pub struct StopSpec {
-    /// After this many iterations.
-    pub iterations: Option<Count>,
-    /// When the cost has fallen to this part of its first value.
-    pub cost_ratio: Option<Number>,
-    /// When the squared norm of the gradient has fallen to this part of its first value.
-    pub gradient_ratio: Option<Number>,
-    /// When an iteration lowers the cost by at most this part of it and changes no function by more
-    /// than the square root of this, relative to the function's size; or when it changes none by more
-    /// than this.
-    pub tolerance: Option<Number>,
-    /// When an iteration changes no function by more than this part of its size.
-    pub step: Option<Number>,
-    /// After this time, in s.
-    pub seconds: Option<Number>,
+keys! {
+    /// When to stop; whichever comes first.
+    pub struct StopSpec = "stop", expecting "a map such as {iterations: 1000, cost_ratio: 1e-4}" {
+        /// After so many iterations; exactly so many if nothing else is asked for.
+        iterations: Option<Count>, example "200", default "1000";
+        /// Converged when J/J0 is at most this (and so is the gradient, if asked for).
+        cost_ratio: Option<Number>, example "1e-4", unit "part of the first J";
+        /// Converged when the squared norm of the gradient is at most this part of its first value.
+        gradient_ratio: Option<Number>, example "1e-4", unit "part of the first G^2";
+        /// Converged when an iteration changes J and the functions by less than this part.
+        tolerance: Option<Number>, example "1e-10", default "1e-10, if no other rule is given";
+        /// Converged when an iteration changes no function by more than this part of its size.
+        step: Option<Number>, example "1e-12";
+        /// Wall-clock limit.
+        seconds: Option<Number>, example "60", unit "s";
+    }
 }
 
-/// True functions, used for reporting only.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a map such as {data: truth.csv}")]
-pub struct TruthSpec {
-    /// CSV file, relative to the model file.
-    pub data: Text,
-    /// Names of its columns.
-    pub columns: Option<TruthColumnsSpec>,
+keys! {
+    /// The true functions, for reports only.
+    pub struct TruthSpec = "truth", expecting "a map such as {data: truth.csv}" {
+        /// File of the true functions with times in `t_s`, relative to the model file.
+        data: Text, example "truth.csv";
+        /// Names of its columns.
+        columns: Option<TruthColumnsSpec>,
+            example "{mass: m}",
+            default "mass_kg, damping_N_s_per_m, stiffness_N_per_m, …";
+    }
 }
 
-/// Names of the columns of a file of true functions.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {mass: mass_kg, damping: damping_N_s_per_m, stiffness: stiffness_N_per_m}"
-)]
-pub struct TruthColumnsSpec {
-    /// Column of the mass, in kg.
-    pub mass: Option<Text>,
-    /// Column of the damping, in N s/m.
-    pub damping: Option<Text>,
-    /// Column of the stiffness, in N/m.
-    pub stiffness: Option<Text>,
-    /// Column of the cubic stiffness, in N/m^3.
-    pub cubic_stiffness: Option<Text>,
-    /// Column of the quadratic damping, in N s^2/m^2.
-    pub quadratic_damping: Option<Text>,
-    /// Column of the Coulomb friction, in N.
-    pub coulomb_friction: Option<Text>,
-    /// Column of the offset, in N.
-    pub offset: Option<Text>,
+keys! {
+    /// Names of the columns of the true functions.
+    pub struct TruthColumnsSpec = "truth_columns", expecting "a map such as {mass: mass_kg, damping: damping_N_s_per_m, stiffness: stiffness_N_per_m}" {
+        /// Column of the mass.
+        mass: Option<Text>, example "my_column", unit "kg", default "mass_kg";
+        /// Column of the damping.
+        damping: Option<Text>, example "my_column", unit "N s/m", default "damping_N_s_per_m";
+        /// Column of the stiffness.
+        stiffness: Option<Text>, example "my_column", unit "N/m", default "stiffness_N_per_m";
+        /// Column of the cubic stiffness.
+        cubic_stiffness: Option<Text>, example "my_column", unit "N/m^3";
+        /// Column of the quadratic damping.
+        quadratic_damping: Option<Text>, example "my_column", unit "N s^2/m^2";
+        /// Column of the Coulomb friction.
+        coulomb_friction: Option<Text>, example "my_column", unit "N";
+        /// Column of the offset.
+        offset: Option<Text>, example "my_column", unit "N";
+    }
 }

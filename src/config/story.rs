@@ -5,25 +5,21 @@ use super::guard::{Checked, LONGEST_MODEL};
 use super::locate::{Segment, locate};
 use super::model_file::check_path;
 use super::scalar::{Format, Text};
+use crate::config::key::keys;
 use crate::error::InputError;
 use crate::input::read_text;
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// What a file that tells a story says.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map with the keys format, title, story"
-)]
-struct StorySpec {
-    /// Version of the file format.
-    #[allow(dead_code, reason = "checked when it is read")]
-    format: Format,
-    /// What the page is called.
-    title: Option<Text>,
-    /// The models, relative to this file.
-    story: Vec<Text>,
+keys! {
+    /// A story: models that `kmcfit study` runs in order and tells on one page.
+    pub struct StorySpec = "story", expecting "a map with the keys format, title, story" {
+        /// Version of the file format.
+        format: Format, example "1";
+        /// What the page is called.
+        title: Option<Text>, example "From the paper to the device", default "the name of the file";
+        /// Model files, in the order in which they are told; paths start from this file.
+        story: Vec<Text>, example "[paper.yaml, paper-smooth.yaml]";
+    }
 }
 
 /// A story: its title and the model files, in order.

@@ -4,8 +4,8 @@ use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultD
 use crate::digits::significant;
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
+use kmcfit_core::internals::system::Method;
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;

@@ -2,8 +2,8 @@
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{Penalty, Quantity};
-use kmcfit_core::internals::objective::Loss;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::Solver;
 use serde::{Deserialize, Serialize};
 

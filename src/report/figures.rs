@@ -4,7 +4,7 @@ use super::figure::{Axis, Figure, Panel};
 use super::mark::{Colour, Dash, Mark, Style};
 use super::predict::PredictedMotion;
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
-use kmcfit_core::internals::dynamics::Trajectory;
+use kmcfit_core::internals::simulate::Trajectory;
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
 
 /// Beyond this number of readings the dots are drawn smaller.

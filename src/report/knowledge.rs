@@ -1,8 +1,8 @@
 //! What a model says about the device besides its readings, in words.
 
-use kmcfit_core::internals::dynamics::ChannelKind;
 use kmcfit_core::internals::functions::Basis;
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{ChannelKind, Experiment};
 
 /// What is known: records, fixed functions, bases with few numbers, constraints, smoothness.
 pub fn knowledge(problem: &Problem) -> Vec<String> {

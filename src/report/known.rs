@@ -3,10 +3,10 @@
 use super::seen::SeenChannel;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{FitAssessment, StepCheck};
-use kmcfit_core::internals::dynamics::Breakdown;
 use kmcfit_core::internals::identifiability::{Bands, Judgement};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::simulate::Breakdown;
 use kmcfit_core::internals::solvers::{Fit, Solver, predict_held_out};
 use nalgebra::DMatrix;
 

@@ -10,8 +10,9 @@ use super::seen::SeenChannel;
 use kmcfit_core::internals::assessment::{
     FitStatistics, ResidualPattern, StepCheck, diagnostics, outliers, pattern,
 };
-use kmcfit_core::internals::objective::{Evaluation, Loss, Weighting};
+use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Loss, Weighting};
 use nalgebra::DMatrix;
 
 /// One channel with its predictions.

@@ -1,8 +1,9 @@
 //! The motion of a found device from other initial states, against the true device's.
 
 use super::document::Prediction;
-use kmcfit_core::internals::dynamics::quadrature::trapezoid;
-use kmcfit_core::internals::dynamics::{Breakdown, Device, Oscillator, State, Trajectory};
+use kmcfit_core::internals::simulate::{Breakdown, Trajectory};
+use kmcfit_core::internals::system::quadrature::trapezoid;
+use kmcfit_core::internals::system::{Device, Oscillator, State};
 
 /// A prediction and the motions that it sums up.
 #[derive(Debug, Clone)]

@@ -18,7 +18,6 @@ use super::{findings, measured};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use kmcfit_core::internals::assessment::{POOR, constant_probability, diagnostics, standard_error};
-use kmcfit_core::internals::dynamics::{Excitation, Term};
 use kmcfit_core::internals::functions::basis::physical_powers;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::identifiability::{
@@ -28,6 +27,7 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, Optimality, PathPoint, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
 };
+use kmcfit_core::internals::system::{Excitation, Term};
 use std::collections::BTreeMap;
 use std::io;
 use std::time::Duration;

@@ -5,7 +5,7 @@ use super::figure::Figure;
 use super::figures;
 use crate::config::ChannelNote;
 use kmcfit_core::internals::assessment::diagnostics;
-use kmcfit_core::internals::objective::Channel;
+use kmcfit_core::internals::record::Channel;
 
 /// A channel, what the model says of its readings, and how reports speak of it.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,6 @@
 //! Where the time of a run went.
 
-use kmcfit_core::internals::dynamics::arithmetic;
+use kmcfit_core::internals::simulate::arithmetic;
 use kmcfit_core::internals::solvers::Fit;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;

@@ -8,6 +8,10 @@ use std::collections::BTreeSet;
 const LONGEST: usize = 1 << 15;
 /// Seeds that are longer are only run as they are.
 const LONGEST_SEED: usize = 1 << 14;
+/// Longer seeds than this take most of the time and have nothing that shorter ones lack but their length: one input in
+/// [`RARE`] comes from them.
+const SHORT_SEED: usize = 1 << 11;
+const RARE: usize = 50;
 /// Most changes of one input.
 const CHANGES: usize = 6;
 
@@ -105,7 +109,8 @@ const PIECES: &[&str] = &[
 /// Makes inputs.
 pub struct Mutator {
     random: ChaCha8Rng,
-    seeds: Vec<Vec<u8>>,
+    short: Vec<Vec<u8>>,
+    long: Vec<Vec<u8>>,
     words: Vec<Vec<u8>>,
 }
 
@@ -115,22 +120,37 @@ impl Mutator {
         let is_word = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-');
         let words = seeds.iter().flat_map(|seed| seed.split(|b| !is_word(b)));
         let words: BTreeSet<&[u8]> = words.filter(|w| (2..30).contains(&w.len())).collect();
+        let words = words.into_iter().map(<[u8]>::to_vec).collect();
+        let (short, long) = seeds.into_iter().partition(|s| s.len() <= SHORT_SEED);
         Self {
             random: ChaCha8Rng::seed_from_u64(seed),
-            words: words.into_iter().map(<[u8]>::to_vec).collect(),
-            seeds,
+            short,
+            long,
+            words,
         }
     }
 
     /// The next input.
     pub fn next(&mut self) -> Vec<u8> {
-        let which = self.below(self.seeds.len());
-        let mut bytes = self.seeds[which].clone();
+        let mut bytes = self.seed().clone();
         for _ in 0..=self.below(CHANGES) {
             self.change(&mut bytes);
         }
         bytes.truncate(LONGEST);
         bytes
+    }
+
+    /// A short seed, rarely a long one.
+    fn seed(&mut self) -> &Vec<u8> {
+        let is_long = self.below(RARE) == 0;
+        let is_long = (is_long || self.short.is_empty()) && !self.long.is_empty();
+        let count = if is_long { &self.long } else { &self.short }.len();
+        let which = self.below(count);
+        if is_long {
+            &self.long[which]
+        } else {
+            &self.short[which]
+        }
     }
 
     fn below(&mut self, end: usize) -> usize {
@@ -189,9 +209,8 @@ impl Mutator {
 
     /// Some lines of another input.
     fn splice(&mut self, bytes: &mut Vec<u8>, at: usize) {
-        let which = self.below(self.seeds.len());
-        let (from, length) = (self.below(self.seeds[which].len()), 1 + self.below(200));
-        let other = &self.seeds[which];
+        let other = self.seed().clone();
+        let (from, length) = (self.below(other.len()), 1 + self.below(200));
         let piece = other[from..(from + length).min(other.len())].to_vec();
         bytes.splice(at..at, piece);
     }

@@ -13,8 +13,8 @@ use kmcfit::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
     STUDY_JOURNAL, with_checksums,
 };
-use kmcfit_core::internals::dynamics::State;
 use kmcfit_core::internals::solvers::{Fit, Observer, fit_with_noise_watched};
+use kmcfit_core::internals::system::State;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;

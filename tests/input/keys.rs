@@ -97,7 +97,7 @@ fn descend(
 #[test]
 fn reader_and_registry_know_the_same_keys_and_examples_are_read() {
     let mut seen = BTreeSet::new();
-    visit(&MODEL, "", &base(), &mut seen);
+    visit(MODEL, "", &base(), &mut seen);
     assert!(seen.len() > 120, "{}", seen.len());
     let all = keys::all();
     let story = STORY.keys.len();

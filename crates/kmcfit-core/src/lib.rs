@@ -2,9 +2,10 @@
 //!
 //! Modules, in the order in which data flow:
 //!
-//! 1. `problem`: system, records, penalties and constraints.
-//! 2. `functions`: from parameters to mass, damping and stiffness at the nodes, their roughness and variation;
-//!    `dynamics`: from those to the response, its linearisation, its adjoints.
+//! 1. `system`: time grid, integrator, force terms, nodal coefficients, input; `record`: inputs, channels, sensors,
+//!    noise models; `functions`: from parameters to mass, damping and stiffness at the nodes, their roughness and
+//!    variation; `problem`: system, records, penalties and constraints.
+//! 2. `simulate`: from nodal coefficients to the response, its linearisation, its adjoints.
 //! 3. `objective`: the cost of the parameters and its gradient, from one simulation per point.
 //! 4. `constraints`: from statements about the functions to rows and cones in the parameters.
 //! 5. `qp`: the convex subproblems; without active inequalities by an elimination along time or a sparse factorisation,
@@ -16,17 +17,18 @@
 //!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction.
 //! 9. `builder`: a problem in a few lines of Rust.
 //!
-//! Beside these, `signal` has interpolation, excitation, filters and spectra; `lanes` vector arithmetic.
+//! Beside these, `signal` has interpolation, excitation, filters and spectra; `simd` vector arithmetic.
 //!
 //! # Example
 //!
 //! A device whose mass falls along a line is simulated, and found again from its motion:
 //!
 //! ```
-//! use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator, State, Term};
+//! use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
 //! use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
-//! use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
-//! use kmcfit_core::internals::problem::{Experiment, Problem};
+//! use kmcfit_core::internals::objective::GradientKind;
+//! use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
+//! use kmcfit_core::internals::problem::Problem;
 //! use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 //!
 //! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
@@ -80,18 +82,22 @@ mod assessment;
 mod builder;
 mod constraints;
 mod diagnostics;
-mod dynamics;
 mod functions;
 mod host;
 mod identifiability;
-mod lanes;
 mod objective;
 mod problem;
 mod qp;
+mod record;
 mod signal;
+mod simd;
+mod simulate;
 mod solvers;
 mod study;
+mod system;
 mod threads;
+
+pub use solvers::fit;
 
 /// Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API; outside semantic
 /// versioning.
@@ -109,9 +115,6 @@ pub mod internals {
     pub mod diagnostics {
         pub use crate::diagnostics::*;
     }
-    pub mod dynamics {
-        pub use crate::dynamics::*;
-    }
     pub mod functions {
         pub use crate::functions::*;
     }
@@ -120,9 +123,6 @@ pub mod internals {
     }
     pub mod identifiability {
         pub use crate::identifiability::*;
-    }
-    pub mod lanes {
-        pub use crate::lanes::*;
     }
     pub mod objective {
         pub use crate::objective::*;
@@ -133,14 +133,26 @@ pub mod internals {
     pub mod qp {
         pub use crate::qp::*;
     }
+    pub mod record {
+        pub use crate::record::*;
+    }
     pub mod signal {
         pub use crate::signal::*;
+    }
+    pub mod simulate {
+        pub use crate::simulate::*;
+    }
+    pub mod simd {
+        pub use crate::simd::*;
     }
     pub mod solvers {
         pub use crate::solvers::*;
     }
     pub mod study {
         pub use crate::study::*;
+    }
+    pub mod system {
+        pub use crate::system::*;
     }
     pub mod threads {
         pub use crate::threads::*;

@@ -3,13 +3,13 @@
 mod common;
 
 use kmcfit_core::internals::constraints::{RowGroup, Statement};
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, FitSettings, Initial, Solver, Status, Stopping, active_constraints, fit, fit_from,
 };
+use kmcfit_core::internals::system::{Device, Method};
 
 const NODES: usize = 101;
 

@@ -1,13 +1,13 @@
 //! Every basis against what its functions must be: one table over all of them.
 
-use kmcfit_core::internals::dynamics::Grid;
-use kmcfit_core::internals::dynamics::quadrature::trapezoid_weights;
 use kmcfit_core::internals::functions::basis::{
     from_physical_powers, physical_powers, uniform_knots,
 };
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Design, Functions, Gram, Quantity,
 };
+use kmcfit_core::internals::system::Grid;
+use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::CsrMatrix;
 use proptest::prelude::*;

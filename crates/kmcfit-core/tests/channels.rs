@@ -4,16 +4,15 @@
 mod common;
 
 use common::sensed::{Record, Response, cost};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
-};
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value,
 };
-use kmcfit_core::internals::objective::{
-    Channel, Evaluation, GradientKind, Loss, Sensor, Weighting,
+use kmcfit_core::internals::objective::{Evaluation, GradientKind};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
 };
-use kmcfit_core::internals::problem::{Experiment, Problem};
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

@@ -3,7 +3,7 @@
 mod common;
 
 use common::closed_form::{Bessel, constant_coefficients};
-use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
 
 fn oscillator(nodes: usize, duration: f64, method: Method) -> Oscillator {
     Oscillator {

@@ -4,12 +4,13 @@
 use kmcfit_core::internals::constraints::{
     Constraints, Impossible, Limit, RowGroup, Shape, Statement,
 };
-use kmcfit_core::internals::dynamics::{Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::{ConicStatus, project};
+use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::StartProjection;
+use kmcfit_core::internals::system::{Grid, Method, Oscillator, State, Term};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -4,9 +4,10 @@ mod common;
 
 use common::paper_problem;
 use kmcfit_core::internals::builder::{Builder, Part, Record};
-use kmcfit_core::internals::dynamics::Cause;
-use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
+use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Weighting};
+use kmcfit_core::internals::simulate::Cause;
 
 /// Rounding of the same sums in another order, relative to the largest entry.
 const ROUNDING: f64 = 1e-11;

@@ -3,14 +3,28 @@
 mod common;
 
 use common::reference::{Inputs, motion};
-use kmcfit_core::internals::dynamics::adjoint::{continuous, discrete};
-use kmcfit_core::internals::dynamics::quadrature::trapezoid_weights;
-use kmcfit_core::internals::dynamics::{
-    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term, Trajectory,
-};
 use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::simulate::{
+    Engine, Purpose, Trajectory, continuous_adjoint, reference,
+};
+use kmcfit_core::internals::system::quadrature::trapezoid_weights;
+use kmcfit_core::internals::system::{
+    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term,
+};
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
+
+/// The discrete adjoint as fits compute it.
+fn discrete_adjoint(
+    oscillator: &Oscillator,
+    device: &Device,
+    excitation: Option<&Excitation>,
+    motion: &Trajectory,
+    source: &Trajectory,
+) -> DeviceTangent {
+    let engine = Engine::choose(oscillator, excitation, motion.nodes(), Purpose::Estimation);
+    engine.discrete_adjoint(oscillator, device, excitation, motion, source)
+}
 
 /// A random device with a random force, initial state and cost weights.
 #[derive(Debug, Clone)]
@@ -65,7 +79,7 @@ impl Case {
             .forward(&self.device, self.initial, force)
             .unwrap();
         let source = self.source(&motion);
-        discrete::gradient(&oscillator, &self.device, force, &motion, &source)
+        discrete_adjoint(&oscillator, &self.device, force, &motion, &source)
     }
 
     /// The derivative with respect to input `seed`: the functions' nodes in order, then y0, v0.
@@ -157,8 +171,8 @@ proptest! {
             displacement: cut(&other.force),
             velocity: cut(&other.device.coefficients[1]),
         };
-        let forward = oscillator.tangent(&case.device, force, &motion, &direction);
-        let backward = discrete::gradient(&oscillator, &case.device, force, &motion, &weights);
+        let forward = reference::tangent(&oscillator, &case.device, force, &motion, &direction);
+        let backward = discrete_adjoint(&oscillator, &case.device, force, &motion, &weights);
         let all = |t: &Trajectory| [t.displacement.clone(), t.velocity.clone()].concat();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (ju, w) = (all(&forward), all(&weights));
@@ -300,8 +314,8 @@ fn initial_gradients(nodes: usize) -> [State; 2] {
         velocity: vec![0.0; nodes],
     };
     [
-        continuous::gradient(&oscillator, &device, None, &motion, &observed).initial,
-        discrete::gradient(&oscillator, &device, None, &motion, &source).initial,
+        continuous_adjoint(&oscillator, &device, None, &motion, &observed).initial,
+        discrete_adjoint(&oscillator, &device, None, &motion, &source).initial,
     ]
 }
 

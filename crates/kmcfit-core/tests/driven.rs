@@ -4,9 +4,10 @@
 mod common;
 
 use common::closed_form::constant_coefficients;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
-    Surroundings, Term, Trajectory,
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
 };
 use std::f64::consts::PI;
 
@@ -145,7 +146,8 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                     let relative = settled.iter().map(|i| {
                         let place = Place::node(*i, nodes);
                         let around = excitation.around(place);
-                        let sensed = oscillator.sense(
+                        let sensed = reference::observe(
+                            &oscillator,
                             kind,
                             &device,
                             Some(&excitation),
@@ -360,7 +362,8 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
                             force: (w * t).cos(),
                             base: 0.0,
                         };
-                        let seen = oscillator.sense(
+                        let seen = reference::observe(
+                            &oscillator,
                             kind,
                             &device,
                             Some(&excitation),

@@ -5,12 +5,12 @@ mod common;
 
 use common::synthetic::Truth;
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{ChannelKind, Device, Excitation, Method, Term};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
-use kmcfit_core::internals::objective::{Channel, Weighting};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::equation_error;
+use kmcfit_core::internals::system::{Device, Excitation, Method, Term};
 
 const NODES: usize = 401;
 const START: f64 = 2.0;

@@ -4,15 +4,13 @@ mod common;
 
 use common::synthetic::{Truth, run, settings, weighted_jacobian};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term,
-};
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Functions, Penalty, Quantity, Ratios,
 };
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use nalgebra::DMatrix;
 
 const NODES: usize = 401;

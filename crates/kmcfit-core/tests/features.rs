@@ -4,17 +4,17 @@
 mod common;
 
 use common::synthetic::{Truth, rms, run, settings};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
-};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Functions, Penalty, Prior, Quantity, Scalar, Value,
 };
-use kmcfit_core::internals::objective::{Channel, Loss, Sensor, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::signal::{SecondOrder, band_pass};
 use kmcfit_core::internals::solvers::fit;
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -424,7 +424,7 @@ fn readings_with_a_sigma_each_and_robust_losses() {
         Case::linear(vec![Record::free(vec![reading.clone()])]).check(&format!("{loss:?}"));
     }
     reading.loss = Loss::Squares;
-    reading.sigma = kmcfit_core::internals::objective::integral_over(&times);
+    reading.sigma = kmcfit_core::internals::record::integral_over(&times);
     Case::linear(vec![Record::free(vec![reading])]).check("integral over irregular times");
 }
 

@@ -4,11 +4,11 @@ mod common;
 
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::{CoefficientFunction, Prior, Quantity, Scalar, Value};
-use kmcfit_core::internals::objective::{Sensor, Weighting};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Sensor, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Stopping, fit_from};
+use kmcfit_core::internals::system::{Device, Method};
 use nalgebra::{Matrix2, Vector2};
 
 const NODES: usize = 101;

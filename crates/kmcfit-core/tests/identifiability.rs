@@ -4,17 +4,17 @@ mod common;
 
 use common::synthetic::{run, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
-};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
 use kmcfit_core::internals::identifiability::{
     Band, BandSettings, Bands, Candidate, CandidateChannel, Gauge, Sensitivity, Side, Spectrum,
     Symmetry, Verdict, count, rank_experiments, verdicts,
 };
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
+};
 use proptest::prelude::*;
 
 const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];

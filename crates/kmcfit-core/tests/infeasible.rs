@@ -4,7 +4,6 @@
 mod common;
 
 use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
@@ -13,6 +12,7 @@ use kmcfit_core::internals::qp::project;
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
+use kmcfit_core::internals::system::{Device, Method};
 
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;

@@ -2,7 +2,6 @@
 
 mod common;
 
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Design, Penalty, Quantity, Variation,
@@ -10,6 +9,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit_core::internals::system::{Device, Method};
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 const SIGMA: f64 = 0.02;

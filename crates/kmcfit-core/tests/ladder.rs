@@ -2,13 +2,14 @@
 
 mod common;
 
-use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::objective::{Channel, GradientKind, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
 };
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 
 /// Nodes from one reading to the next.
 const STRIDE: usize = 20;

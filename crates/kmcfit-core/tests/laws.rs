@@ -1,11 +1,11 @@
 //! Laws that hold for every device: checked on random ones, the same in every run.
 
 use kmcfit_core::internals::builder::{Builder, Part, Record};
-use kmcfit_core::internals::dynamics::{
-    Device, Excitation, Grid, Method, Oscillator, State, Term, Trajectory,
-};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Experiment;
+use kmcfit_core::internals::simulate::Trajectory;
 use kmcfit_core::internals::solvers::Fit;
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 

@@ -4,14 +4,12 @@
 mod common;
 
 use common::synthetic::{Truth, cramer_rao, rms, settings, with_noise};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Grid, Method, Oscillator, State, Term,
-};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
+use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
 use std::f64::consts::{PI, TAU};
 
 /// From 1 Hz to 2 Hz in 200 s: 300 periods.

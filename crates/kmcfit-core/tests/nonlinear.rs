@@ -3,12 +3,11 @@
 mod common;
 
 use common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Grid, Method, Oscillator, State, Term, Trajectory,
-};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::internals::simulate::Trajectory;
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 
 const NOISE: f64 = 0.01;
 const REST: State = State {

@@ -3,11 +3,11 @@
 mod common;
 
 use common::synthetic::{settings, with_noise};
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::{CoefficientFunction, Quantity, Scalar, Value};
-use kmcfit_core::internals::objective::Sensor;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Sensor;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Stopping, fit_from};
+use kmcfit_core::internals::system::{Device, Method};
 
 const NODES: usize = 101;
 /// The share of the slope by which the method has J fall at least.

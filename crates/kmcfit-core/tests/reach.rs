@@ -4,7 +4,6 @@
 mod common;
 
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
@@ -12,6 +11,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
+use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,12 +3,13 @@
 mod common;
 
 use common::closed_form::Bessel;
-use kmcfit_core::internals::dynamics::{Device, Method, Oscillator};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity, Ratios};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::simulate::reference;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::system::{Device, Method, Oscillator};
 
 fn settings(initial: Initial) -> FitSettings {
     FitSettings {
@@ -174,17 +175,15 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
         .map(|j| {
             let mut unit = vec![0.0; theta.len()];
             unit[j] = 1.0;
-            let direction = kmcfit_core::internals::dynamics::DeviceTangent {
+            let direction = kmcfit_core::internals::system::DeviceTangent {
                 device: problem.functions.direction(&unit, 0),
-                initial: kmcfit_core::internals::dynamics::State {
+                initial: kmcfit_core::internals::system::State {
                     displacement: 0.0,
                     velocity: 0.0,
                 },
             };
             let motion = &here.trajectories[0];
-            problem
-                .oscillator
-                .tangent(&here.device, None, motion, &direction)
+            reference::tangent(&problem.oscillator, &here.device, None, motion, &direction)
                 .displacement
         })
         .collect();

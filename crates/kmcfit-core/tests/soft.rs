@@ -3,12 +3,12 @@
 mod common;
 
 use kmcfit_core::internals::constraints::{RowGroup, TOLERANCE};
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::system::Method;
 
 const NODES: usize = 201;
 

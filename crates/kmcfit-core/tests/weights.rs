@@ -2,13 +2,13 @@
 
 mod common;
 
-use kmcfit_core::internals::dynamics::{Device, Method};
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity, Ratios};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Stopping, WeightPath, WeightRule, choose_weight,
 };
+use kmcfit_core::internals::system::{Device, Method};
 use std::ops::RangeInclusive;
 
 const SIGMA: f64 = 0.1;

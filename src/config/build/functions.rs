@@ -10,8 +10,8 @@ use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
 use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, OwnFunctionsSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::{Device, Grid, Term};
 use kmcfit_core::internals::functions::{self, CoefficientFunction, Quantity};
+use kmcfit_core::internals::system::{Device, Grid, Term};
 
 /// A function as the model gives it, and where.
 pub(super) struct Slot<'a> {

@@ -10,7 +10,7 @@ use crate::config::scalar::{Count, Nodes};
 use crate::config::spec::StepMethod;
 use crate::error::{InputError, Place};
 use crate::memory;
-use kmcfit_core::internals::dynamics::{Grid, Method};
+use kmcfit_core::internals::system::{Grid, Method};
 
 /// Most nodes that are chosen for the user: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;

@@ -18,10 +18,10 @@ use super::spec::InitialSpec;
 use super::{ModelFile, Source};
 use crate::error::{InputError, Place};
 use crate::memory;
-use kmcfit_core::internals::dynamics::{Device, Oscillator, State};
 use kmcfit_core::internals::functions::Functions;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{self, FitSettings, timed};
+use kmcfit_core::internals::system::{Device, Oscillator, State};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::observations::{Table, increasing};
 use crate::units::Kind;
-use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::system::Grid;
 
 /// Column of times in files of functions.
 const TIME_COLUMN: &str = "t_s";

@@ -10,10 +10,12 @@ use crate::config::spec::{
 use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::did_you_mean;
-use kmcfit_core::internals::dynamics::{ChannelKind, State};
 use kmcfit_core::internals::functions::Quantity;
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Drive, Experiment, Problem, Waveform};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{
+    Channel, ChannelKind, Drive, Experiment, Waveform, Weighting,
+};
+use kmcfit_core::internals::system::State;
 use std::time::Duration;
 
 /// What `study` looks into.
@@ -242,7 +244,7 @@ fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f6
 
 fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<(), InputError> {
     let grid = &problem.oscillator.grid;
-    match kmcfit_core::internals::dynamics::Place::of(grid, time) {
+    match kmcfit_core::internals::system::Place::of(grid, time) {
         Some(_) => Ok(()),
         None => Err(file
             .error_at(key, "this time is outside the record")

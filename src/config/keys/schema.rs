@@ -8,15 +8,15 @@ use serde_json::{Map, Value, json};
 /// It knows keys, kinds and words; what they mean together is checked by the program alone.
 pub fn schema() -> Value {
     let mut definitions = Map::new();
-    define(&MODEL, &mut definitions);
-    define(&STORY, &mut definitions);
+    define(MODEL, &mut definitions);
+    define(STORY, &mut definitions);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "kmcfit model file",
         "description": "A model of an oscillator and its records, or a story of several models.",
         "if": {"type": "object", "required": ["story"]},
-        "then": reference(&STORY),
-        "else": reference(&MODEL),
+        "then": reference(STORY),
+        "else": reference(MODEL),
         "definitions": definitions,
     })
 }

@@ -2,6 +2,7 @@
 
 use super::Scalar;
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -53,3 +54,7 @@ impl fmt::Display for ColumnId {
 }
 
 deserialize_scalar!(ColumnId, ColumnId::read, "a column");
+
+impl Value for ColumnId {
+    const KIND: Kind = Kind::Column;
+}

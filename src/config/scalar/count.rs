@@ -3,6 +3,7 @@
 use super::Scalar;
 use super::written::number_in;
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -38,3 +39,7 @@ impl From<Count> for usize {
 }
 
 deserialize_scalar!(Count, Count::read, "an integer, 0 or more");
+
+impl Value for Count {
+    const KIND: Kind = Kind::Count;
+}

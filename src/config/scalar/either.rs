@@ -2,6 +2,7 @@
 
 use super::{FromScalar, Scalar};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -34,4 +35,8 @@ impl<'de, S: FromScalar, M: Deserialize<'de>> Deserialize<'de> for ScalarOr<S, M
         }
         deserializer.deserialize_any(Reader(std::marker::PhantomData))
     }
+}
+
+impl<A: Value, B: Value> Value for ScalarOr<A, B> {
+    const KIND: Kind = Kind::AnyOf(&[A::KIND, B::KIND]);
 }

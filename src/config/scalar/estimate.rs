@@ -3,6 +3,7 @@
 use super::written::number_in;
 use super::{Number, Scalar};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use crate::near::did_you_mean;
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -94,3 +95,15 @@ impl Estimate {
 }
 
 deserialize_scalar!(Estimate, Estimate::read, "`estimate`");
+
+impl Value for Estimate {
+    const KIND: Kind = Kind::Word("estimate");
+}
+
+impl Value for NumberOrEstimate {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Estimate::KIND]);
+}
+
+impl Value for Sigma {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Estimate::KIND, Kind::Text]);
+}

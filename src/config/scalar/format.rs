@@ -2,6 +2,7 @@
 
 use super::Scalar;
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -25,3 +26,7 @@ impl Format {
 }
 
 deserialize_scalar!(Format, Format::read, "the format number 1");
+
+impl Value for Format {
+    const KIND: Kind = Kind::Format;
+}

@@ -3,6 +3,7 @@
 use super::list::elements;
 use super::{Count, Number, Scalar};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -45,4 +46,8 @@ impl<'de> Deserialize<'de> for Knots {
         }
         deserializer.deserialize_any(Reader)
     }
+}
+
+impl Value for Knots {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Count, Kind::List(&Kind::Number)]);
 }

@@ -2,6 +2,7 @@
 
 use super::{FromScalar, Scalar};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -125,4 +126,12 @@ impl<'de, T: FromScalar + Deserialize<'de>> Deserialize<'de> for OneOrList<T> {
         }
         deserializer.deserialize_any(Reader(std::marker::PhantomData))
     }
+}
+
+impl<T: Value> Value for OneOrList<T> {
+    const KIND: Kind = Kind::AnyOf(&[T::KIND, Kind::List(&T::KIND)]);
+}
+
+impl<T: Value> Value for OneOrMany<T> {
+    const KIND: Kind = Kind::AnyOf(&[T::KIND, Kind::List(&T::KIND)]);
 }

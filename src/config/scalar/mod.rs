@@ -156,6 +156,10 @@ macro_rules! choice {
             }
         }
 
+        impl $crate::config::key::Value for $name {
+            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(Self::NAMES);
+        }
+
         deserialize_scalar!($name, $name::read, "one of a list of names");
     };
 }

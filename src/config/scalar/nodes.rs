@@ -2,6 +2,7 @@
 
 use super::{Count, Scalar};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -29,3 +30,7 @@ impl Nodes {
 }
 
 deserialize_scalar!(Nodes, Nodes::read, "an integer or `auto`");
+
+impl Value for Nodes {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Count, Kind::Word("auto")]);
+}

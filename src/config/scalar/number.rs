@@ -3,6 +3,7 @@
 use super::Scalar;
 use super::written::number_in;
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -44,3 +45,7 @@ impl From<Number> for f64 {
 }
 
 deserialize_scalar!(Number, Number::read, Number::EXPECTED);
+
+impl Value for Number {
+    const KIND: Kind = Kind::Number;
+}

@@ -3,22 +3,21 @@
 use super::list::elements;
 use super::{Number, Scalar, Text};
 use crate::config::complaint::Complaint;
+use crate::config::key::keys;
+use crate::config::key::{Kind, Value};
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-/// A column of a file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {data: file.csv, column: mass_kg}"
-)]
-pub struct ColumnSpec {
-    /// CSV file, relative to the model file.
-    pub data: Text,
-    /// Name of the column.
-    pub column: Text,
+keys! {
+    /// A column of a file with times in `t_s`, read linearly between its rows.
+    pub struct ColumnSpec = "column", expecting "a map such as {data: file.csv, column: mass_kg}" {
+        /// The file, relative to the model file; the `functions.csv` of a finished run is one.
+        data: Text, example "device.csv";
+        /// Name of the column.
+        column: Text, example "mass_kg";
+    }
 }
 
 /// A number, or a column of a file with one value per line.
@@ -93,4 +92,12 @@ impl<'de> Deserialize<'de> for Start {
         }
         deserializer.deserialize_any(Reader)
     }
+}
+
+impl Value for NumberOrColumn {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Number, ColumnSpec::KIND]);
+}
+
+impl Value for Start {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Kind::List(&Kind::Number), ColumnSpec::KIND]);
 }

@@ -2,6 +2,7 @@
 
 use super::Scalar;
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, SeqAccess, Visitor};
 use std::fmt;
 use std::ops::Deref;
@@ -55,4 +56,8 @@ impl<'de> Deserialize<'de> for Text {
         // Asked for as text, a name such as 12 or 1.50 keeps its spelling.
         deserializer.deserialize_str(Reader)
     }
+}
+
+impl Value for Text {
+    const KIND: Kind = Kind::Text;
 }

@@ -3,6 +3,7 @@
 use super::written::number_in;
 use super::{Number, Scalar, choose};
 use crate::config::complaint::Complaint;
+use crate::config::key::{Kind, Value};
 use serde::de::{Deserialize, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -47,3 +48,7 @@ impl Weight {
 }
 
 deserialize_scalar!(Weight, Weight::read, "a number or the name of a rule");
+
+impl Value for Weight {
+    const KIND: Kind = Kind::AnyOf(&[Kind::Number, WeightRule::KIND]);
+}

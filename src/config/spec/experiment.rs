@@ -1,5 +1,6 @@
 //! Keys of an experiment: its file, channels, sensors, what drives it, and its beginning.
 
+use crate::config::key::keys;
 use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -11,69 +12,68 @@ use crate::config::scalar::{
 use crate::config::scalar::{Sigma, Text};
 use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
 
-/// One measured motion.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}"
-)]
-pub struct ExperimentSpec {
-    /// What reports call it.
-    pub name: Option<Text>,
-    /// File of the readings, relative to the model file; a simulation needs none.
-    pub data: Option<Text>,
-    /// How the file is written, where that is not to be found out from it.
-    pub format: Option<FileFormatSpec>,
-    /// Which columns of `data` are what.
-    pub columns: Option<ColumnsSpec>,
-    /// Readings per s, in place of a column of times.
-    pub sample_rate: Option<Number>,
-    /// Units of the columns, which are converted to SI.
-    pub units: Option<UnitsSpec>,
-    /// First and last time that is used, in s, as the file counts.
-    pub window: Option<RangeSpec>,
-    /// Time, as the file counts, that becomes 0 s.
-    pub time_zero: Option<Number>,
-    /// Every how manyth reading is kept, after a low-pass filter against aliasing.
-    pub decimate: Option<Count>,
-    /// Frequencies, in Hz, outside which readings and model are filtered alike before they are
-    /// compared.
-    pub band: Option<RangeSpec>,
-    /// Standard deviation of the readings.
-    pub sigma: Option<SigmaSpec>,
-    /// What residuals cost.
-    pub loss: Option<LossesSpec>,
-    /// Gains, offsets and drifts of the sensors.
-    pub sensors: Option<SensorsSpec>,
-    /// Force on the mass.
-    pub force: Option<ForceSpec>,
-    /// Motion of the base.
-    pub base: Option<BaseSpec>,
-    /// State at the beginning.
-    pub initial: InitialSpec,
-    /// Functions that this experiment does not share.
-    pub functions: Option<OwnFunctionsSpec>,
-    /// Whether it is kept out of the fit, to be predicted and scored.
-    pub hold_out: Option<bool>,
+keys! {
+    /// One record.
+    pub struct ExperimentSpec = "experiment", expecting "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}" {
+        /// What reports call it.
+        name: Option<Text>, example "free decay", default "experiment 1, experiment 2, …";
+        /// File of the readings, relative to the model file; a simulation needs none.
+        data: Option<Text>, example "readings.csv";
+        /// How the file is written, where that is not to be found out from it.
+        format: Option<FileFormatSpec>,
+            example "{delimiter: semicolon, decimal: comma}",
+            default "found out from the file";
+        /// Which columns of the file are what.
+        columns: Option<ColumnsSpec>,
+            example "{time: t_s, displacement: y_m}",
+            default "{time: t_s, displacement: y_m}";
+        /// Readings per second, in place of a column of times.
+        sample_rate: Option<Number>, example "1000.0", unit "Hz";
+        /// Units of the columns, which are converted to SI.
+        units: Option<UnitsSpec>, example "{displacement: mm}", default "what the file states, else SI";
+        /// First and last time that is used, as the file counts.
+        window: Option<RangeSpec>, example "{min: 0.1, max: 2.9}", unit "s", default "all";
+        /// Time, as the file counts, that becomes 0.
+        time_zero: Option<Number>, example "0.1", unit "s", default "0";
+        /// Keep every so manyth reading after a low-pass filter.
+        decimate: Option<Count>, example "4", default "1";
+        /// Frequencies outside which readings and model are filtered alike.
+        band: Option<RangeSpec>, example "{min: 5.0, max: 50.0}", unit "Hz", default "all";
+        /// Standard deviation of the readings; without it J is the paper's integral.
+        sigma: Option<SigmaSpec>, example "{displacement: 0.1}";
+        /// What residuals cost; needs `sigma`.
+        loss: Option<LossesSpec>, example "{displacement: huber}", default "squares";
+        /// reading = gain * motion + offset + drift * time.
+        sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "perfect ones";
+        /// Force on the mass: how the column `force` is read between its samples, or a shape in its place.
+        force: Option<ForceSpec>, example "{interpolation: cubic}", default "none, or the column `force`";
+        /// How the motion of the base is read between its samples.
+        base: Option<BaseSpec>, example "{interpolation: cubic}";
+        /// State at the beginning, or `estimate` for both of its numbers.
+        initial: InitialSpec, example "{displacement: 3.3, velocity: 1.0}";
+        /// Functions that this experiment does not share with the others.
+        functions: Option<OwnFunctionsSpec>,
+            example "{damping: {basis: constant, start: 1.0}}",
+            default "all are shared";
+        /// Whether it is kept out of the fit, to be predicted and scored.
+        hold_out: Option<bool>, example "true", default "false";
+    }
 }
 
-/// How a file of readings is written; what is not given is found out from the file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {delimiter: semicolon, decimal: comma, skip: 3}"
-)]
-pub struct FileFormatSpec {
-    /// What separates fields.
-    pub delimiter: Option<Delimiter>,
-    /// What separates the decimals of a number.
-    pub decimal: Option<DecimalSign>,
-    /// Lines before the row of column names.
-    pub skip: Option<Count>,
-    /// Whether there is a row of column names.
-    pub header: Option<bool>,
-    /// Whether a row of units follows it.
-    pub units_row: Option<bool>,
+keys! {
+    /// How a file of readings is written.
+    pub struct FileFormatSpec = "file_format", expecting "a map such as {delimiter: semicolon, decimal: comma, skip: 3}" {
+        /// What separates fields.
+        delimiter: Option<Delimiter>, example "semicolon", default "found out";
+        /// What separates the decimals of a number.
+        decimal: Option<DecimalSign>, example "comma", default "found out";
+        /// Lines before the row of column names.
+        skip: Option<Count>, example "4", default "found out";
+        /// Whether there is a row of column names.
+        header: Option<bool>, example "true", default "found out";
+        /// Whether a row of units follows it.
+        units_row: Option<bool>, example "true", default "found out";
+    }
 }
 
 choice! {
@@ -101,106 +101,96 @@ choice! {
 /// A column by name or number, or with a file and times of its own.
 pub type ColumnRef = ScalarOr<ColumnId, SourceSpec>;
 
-/// Which columns of a file are what.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {time: t_s, displacement: y_m}"
-)]
-pub struct ColumnsSpec {
-    /// Times.
-    pub time: Option<ColumnId>,
-    /// Displacement.
-    pub displacement: Option<ColumnRef>,
-    /// Velocity.
-    pub velocity: Option<ColumnRef>,
-    /// Acceleration.
-    pub acceleration: Option<ColumnRef>,
-    /// Force.
-    pub force: Option<ColumnRef>,
-    /// Acceleration of the base.
-    pub base_acceleration: Option<ColumnRef>,
-    /// Displacement of the base.
-    pub base_displacement: Option<ColumnRef>,
+keys! {
+    /// Which columns of a file are what, by name or by number from 1.
+    pub struct ColumnsSpec (Default) = "columns", expecting "a map such as {time: t_s, displacement: y_m}" {
+        /// Times.
+        time: Option<ColumnId>, example "t_s", default "t_s";
+        /// Displacement.
+        displacement: Option<ColumnRef>, example "y_m", default "y_m, if no other channel is named";
+        /// Velocity.
+        velocity: Option<ColumnRef>, example "v_m_per_s";
+        /// Acceleration.
+        acceleration: Option<ColumnRef>, example "a_m_per_s2";
+        /// Force on the mass.
+        force: Option<ColumnRef>, example "f_N";
+        /// Acceleration of the base; y is relative to the base then.
+        base_acceleration: Option<ColumnRef>, example "table_g";
+        /// Displacement of the base; y is relative to the base then.
+        base_displacement: Option<ColumnRef>, example "table_mm";
+    }
 }
 
-/// A column with a file or times of its own.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {data: other.csv, column: y_m, time: t_s}"
-)]
-pub struct SourceSpec {
-    /// File, relative to the model file; that of the experiment unless given.
-    pub data: Option<Text>,
-    /// Column of the values.
-    pub column: ColumnId,
-    /// Column of the times; that of the experiment unless given.
-    pub time: Option<ColumnId>,
-    /// Readings per s, in place of a column of times.
-    pub sample_rate: Option<Number>,
+keys! {
+    /// A column with a file or times of its own.
+    pub struct SourceSpec = "source", expecting "a map such as {data: other.csv, column: y_m, time: t_s}" {
+        /// File, relative to the model file.
+        data: Option<Text>, example "other.csv", default "that of the experiment";
+        /// Column of the values.
+        column: ColumnId, example "y_m";
+        /// Column of the times.
+        time: Option<ColumnId>, example "t_s", default "that of the experiment";
+        /// Readings per second, in place of a column of times.
+        sample_rate: Option<Number>, example "1000.0", unit "Hz";
+    }
 }
 
-/// Units of the columns.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {displacement: mm, acceleration: g}"
-)]
-pub struct UnitsSpec {
-    /// Of the times.
-    pub time: Option<Text>,
-    /// Of the displacement.
-    pub displacement: Option<Text>,
-    /// Of the velocity.
-    pub velocity: Option<Text>,
-    /// Of the acceleration.
-    pub acceleration: Option<Text>,
-    /// Of the force.
-    pub force: Option<Text>,
-    /// Of the acceleration of the base.
-    pub base_acceleration: Option<Text>,
-    /// Of the displacement of the base.
-    pub base_displacement: Option<Text>,
+keys! {
+    /// Units of the columns: mm, deg, g, kN, ms, …
+    pub struct UnitsSpec (Default) = "units", expecting "a map such as {displacement: mm, acceleration: g}" {
+        /// Of the times.
+        time: Option<Text>, example "ms", default "s";
+        /// Of the displacement.
+        displacement: Option<Text>, example "mm", default "m";
+        /// Of the velocity.
+        velocity: Option<Text>, example "mm/s", default "m/s";
+        /// Of the acceleration.
+        acceleration: Option<Text>, example "g", default "m/s^2";
+        /// Of the force.
+        force: Option<Text>, example "kN", default "N";
+        /// Of the acceleration of the base.
+        base_acceleration: Option<Text>, example "g", default "m/s^2";
+        /// Of the displacement of the base.
+        base_displacement: Option<Text>, example "mm", default "m";
+    }
 }
 
-/// Standard deviation of the readings, per channel.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a map such as {displacement: 0.1}")]
-pub struct SigmaSpec {
-    /// Of the displacement, in m.
-    pub displacement: Option<Sigma>,
-    /// Of the velocity, in m/s.
-    pub velocity: Option<Sigma>,
-    /// Of the acceleration, in m/s^2.
-    pub acceleration: Option<Sigma>,
+keys! {
+    /// Standard deviation of a reading: a number, a column of the file, or `estimate`.
+    pub struct SigmaSpec (Default) = "sigma", expecting "a map such as {displacement: 0.1}" {
+        /// Of the displacement.
+        displacement: Option<Sigma>, example "0.1", unit "m";
+        /// Of the velocity.
+        velocity: Option<Sigma>, example "0.1", unit "m/s";
+        /// Of the acceleration.
+        acceleration: Option<Sigma>, example "estimate", unit "m/s^2";
+    }
 }
 
-/// What residuals cost, per channel.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a map such as {displacement: huber}")]
-pub struct LossesSpec {
-    /// Of the displacement.
-    pub displacement: Option<ScalarOr<LossName, LossSpec>>,
-    /// Of the velocity.
-    pub velocity: Option<ScalarOr<LossName, LossSpec>>,
-    /// Of the acceleration.
-    pub acceleration: Option<ScalarOr<LossName, LossSpec>>,
+keys! {
+    /// What the residuals of each channel cost.
+    pub struct LossesSpec (Default) = "losses", expecting "a map such as {displacement: huber}" {
+        /// Of the displacement.
+        displacement: Option<ScalarOr<LossName, LossSpec>>, example "huber", default "squares";
+        /// Of the velocity.
+        velocity: Option<ScalarOr<LossName, LossSpec>>, example "student-t", default "squares";
+        /// Of the acceleration.
+        acceleration: Option<ScalarOr<LossName, LossSpec>>,
+            example "{name: huber, threshold: 1.345}",
+            default "squares";
+    }
 }
 
-/// A loss with its settings.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {name: huber, threshold: 1.345}"
-)]
-pub struct LossSpec {
-    /// Which.
-    pub name: LossName,
-    /// Of `huber`: where squares end, in standard deviations.
-    pub threshold: Option<Number>,
-    /// Of `student-t`: degrees of freedom.
-    pub degrees: Option<Number>,
+keys! {
+    /// A loss with its settings.
+    pub struct LossSpec = "loss", expecting "a map such as {name: huber, threshold: 1.345}" {
+        /// Which loss.
+        name: LossName, example "huber";
+        /// Of `huber`: where squares end.
+        threshold: Option<Number>, example "1.345", unit "standard deviations", default "1.345";
+        /// Of `student-t`: degrees of freedom.
+        degrees: Option<Number>, example "4.0", default "4";
+    }
 }
 
 choice! {
@@ -215,93 +205,77 @@ choice! {
     }
 }
 
-/// Sensors, per channel.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {acceleration: {offset: estimate}}"
-)]
-pub struct SensorsSpec {
-    /// Of the displacement.
-    pub displacement: Option<SensorSpec>,
-    /// Of the velocity.
-    pub velocity: Option<SensorSpec>,
-    /// Of the acceleration.
-    pub acceleration: Option<SensorSpec>,
+keys! {
+    /// Sensors, per channel: reading = gain * motion + offset + drift * time.
+    pub struct SensorsSpec (Default) = "sensors", expecting "a map such as {acceleration: {offset: estimate}}" {
+        /// Of the displacement.
+        displacement: Option<SensorSpec>, example "{drift: estimate}";
+        /// Of the velocity.
+        velocity: Option<SensorSpec>, example "{gain: estimate}";
+        /// Of the acceleration.
+        acceleration: Option<SensorSpec>, example "{offset: estimate}";
+    }
 }
 
-/// What a sensor makes of the motion.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {gain: 1.0, offset: estimate}"
-)]
-pub struct SensorSpec {
-    /// Factor; 1 unless given.
-    pub gain: Option<EstimateValue>,
-    /// Reading at rest, in the SI unit of the channel; 0 unless given.
-    pub offset: Option<EstimateValue>,
-    /// Change of the offset per s; 0 unless given.
-    pub drift: Option<EstimateValue>,
-    /// Whether it measures the motion in space and not relative to the base; unless given,
-    /// accelerations do and the others do not.
-    pub absolute: Option<bool>,
+keys! {
+    /// What a sensor makes of the motion.
+    pub struct SensorSpec (Default) = "sensor", expecting "a map such as {gain: 1.0, offset: estimate}" {
+        /// Factor.
+        gain: Option<EstimateValue>, example "1.0", default "1";
+        /// Reading at rest.
+        offset: Option<EstimateValue>, example "estimate", unit "SI unit of the channel", default "0";
+        /// Change of the offset with time.
+        drift: Option<EstimateValue>, example "estimate", unit "SI unit of the channel per s", default "0";
+        /// Whether it measures the motion in space and not relative to the base.
+        absolute: Option<bool>, example "true", default "true for accelerations, false for the others";
+    }
 }
 
 /// A number, `estimate`, or an estimate with a start or a prior.
 pub type EstimateValue = ScalarOr<NumberOrEstimate, EstimateSpec>;
 
-/// A number to be estimated.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}"
-)]
-pub struct EstimateSpec {
-    /// Where the search starts.
-    pub start: Option<Number>,
-    /// What is known of it.
-    pub prior: Option<PriorSpec>,
+keys! {
+    /// A number that is sought with the functions.
+    pub struct EstimateSpec = "estimate", expecting "a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}" {
+        /// Where the search starts.
+        start: Option<Number>, example "1.0", default "what the readings say";
+        /// What is known of it: adds ((x - mean)/sigma)^2 to J.
+        prior: Option<PriorSpec>, example "{mean: 1.0, sigma: 0.1}", default "nothing";
+    }
 }
 
-/// What is known of a number before the fit.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {mean: 1.0, sigma: 0.1}"
-)]
-pub struct PriorSpec {
-    /// Expected value.
-    pub mean: Number,
-    /// Standard deviation.
-    pub sigma: Number,
+keys! {
+    /// What is known of a number before the fit.
+    pub struct PriorSpec = "prior", expecting "a map such as {mean: 1.0, sigma: 0.1}" {
+        /// Expected value.
+        mean: Number, example "1.0";
+        /// Standard deviation.
+        sigma: Number, example "0.1";
+    }
 }
 
-/// Force on the mass: a column (see `columns`) with its interpolation, or a shape.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {interpolation: hold} or {shape: sine, amplitude: 2.0, frequency: 1.5}"
-)]
-pub struct ForceSpec {
-    /// Between the samples of the column `force`.
-    pub interpolation: Option<InterpolationName>,
-    /// A shape in place of a column.
-    pub shape: Option<ForceShape>,
-    /// Largest value, in N.
-    pub amplitude: Option<Number>,
-    /// Of a sine, in Hz.
-    pub frequency: Option<Number>,
-    /// Of a sine or a sweep at its beginning, in rad.
-    pub phase: Option<Number>,
-    /// First frequency of a sweep, in Hz.
-    pub from: Option<Number>,
-    /// Last frequency of a sweep, in Hz.
-    pub to: Option<Number>,
-    /// Where a step, a half-sine or a sweep begins, in s; 0 unless given.
-    pub at: Option<Number>,
-    /// How long a half-sine or a sweep lasts, in s.
-    pub duration: Option<Number>,
+keys! {
+    /// Force on the mass: a column with its interpolation, or a shape.
+    pub struct ForceSpec (Default) = "force", expecting "a map such as {interpolation: hold} or {shape: sine, amplitude: 2.0, frequency: 1.5}" {
+        /// Between the samples of the column `force`.
+        interpolation: Option<InterpolationName>, example "cubic", default "linear";
+        /// A shape in place of a column.
+        shape: Option<ForceShape>, example "sine";
+        /// Largest value of a shape.
+        amplitude: Option<Number>, example "1.0", unit "N";
+        /// Of a sine.
+        frequency: Option<Number>, example "1.5", unit "Hz";
+        /// Of a sine at time 0.
+        phase: Option<Number>, example "0.7", unit "rad", default "0";
+        /// First frequency of a sweep.
+        from: Option<Number>, example "0.5", unit "Hz";
+        /// Last frequency of a sweep.
+        to: Option<Number>, example "5.0", unit "Hz";
+        /// Where a step, a half-sine or a sweep begins.
+        at: Option<Number>, example "1.0", unit "s", default "0";
+        /// How long a half-sine or a sweep lasts.
+        duration: Option<Number>, example "0.1", unit "s";
+    }
 }
 
 choice! {
@@ -332,29 +306,23 @@ choice! {
     }
 }
 
-/// Motion of the base: a column `base_acceleration` or `base_displacement` and its interpolation.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {interpolation: cubic}"
-)]
-pub struct BaseSpec {
-    /// Between the samples of the base's column.
-    pub interpolation: Option<InterpolationName>,
+keys! {
+    /// Motion of the base.
+    pub struct BaseSpec = "base", expecting "a map such as {interpolation: cubic}" {
+        /// Between the samples of the column of the base.
+        interpolation: Option<InterpolationName>, example "cubic", default "linear";
+    }
 }
 
 /// State at the beginning: `estimate`, or displacement and velocity.
 pub type InitialSpec = ScalarOr<Estimate, InitialStateSpec>;
 
-/// Displacement and velocity at the beginning, known or to be estimated.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`"
-)]
-pub struct InitialStateSpec {
-    /// Displacement, in m.
-    pub displacement: EstimateValue,
-    /// Velocity, in m/s.
-    pub velocity: EstimateValue,
+keys! {
+    /// State at the beginning: each number known, `estimate`, or an estimate with a start or a prior.
+    pub struct InitialStateSpec = "initial", expecting "a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`" {
+        /// Displacement at the beginning.
+        displacement: EstimateValue, example "3.3", unit "m";
+        /// Velocity at the beginning.
+        velocity: EstimateValue, example "1.0", unit "m/s";
+    }
 }

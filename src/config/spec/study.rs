@@ -1,5 +1,6 @@
 //! Keys of a study.
 
+use crate::config::key::keys;
 use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::fmt;
@@ -8,56 +9,54 @@ use super::{ForceSpec, FunctionName, StateSpec};
 use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Scalar, Text};
 use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
 
-/// What `study` looks into, besides what it always does.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {profiles: [{function: mass, at: 0.0}], starts: 20}"
-)]
-pub struct StudySpec {
-    /// Confidence of bands and intervals; 0.95 unless given.
-    pub confidence: Option<Number>,
-    /// Seed of everything random; 1 unless given.
-    pub seed: Option<Count>,
-    /// Numbers whose profile is drawn.
-    pub profiles: Option<Vec<ProfileSpec>>,
-    /// Times at which the widest tubes are sought, in s.
-    pub tubes: Option<OneOrList<Number>>,
-    /// Largest J of a device in the tubes; unless given, what the confidence allows.
-    pub level: Option<Number>,
-    /// Number of starts of the search for other optima.
-    pub starts: Option<Count>,
-    /// The starts lie between the start values divided and multiplied by this, within the bounds.
-    pub spread: Option<Number>,
-    /// Optima whose k/m, c/m and motions agree to this are one.
-    pub same: Option<Number>,
-    /// Number of replicates of the bootstrap.
-    pub bootstrap: Option<Count>,
-    /// Where the noise of the replicates comes from.
-    pub noise: Option<NoiseName>,
-    /// Masses for which devices with the same motion are sought.
-    pub equivalents: Option<Vec<EquivalentSpec>>,
-    /// Whether each function is held against a constant.
-    pub varies: Option<bool>,
-    /// Experiments that might be made next.
-    pub candidates: Option<Vec<CandidateSpec>>,
+keys! {
+    /// What `kmcfit study` looks into besides what it always does.
+    pub struct StudySpec (Default) = "study", expecting "a map such as {profiles: [{function: mass, at: 0.0}], starts: 20}" {
+        /// Confidence of drawn bands, profiles, tubes and refits.
+        confidence: Option<Number>, example "0.95", default "0.95";
+        /// Seed of everything random.
+        seed: Option<Count>, example "1", default "1";
+        /// Numbers whose profile is drawn: the least cost with the number held.
+        profiles: Option<Vec<ProfileSpec>>, example "[{function: mass, at: 0.0}]", default "none";
+        /// Times at which the extreme devices are sought.
+        tubes: Option<OneOrList<Number>>, example "[0.0, 12.5, 25.0]", unit "s", default "five over the record";
+        /// Largest J of a device in the tubes.
+        level: Option<Number>, example "2010.0", unit "that of J", default "what the confidence allows";
+        /// Fits from scattered starts.
+        starts: Option<Count>, example "20", default "none";
+        /// The starts lie within this factor of the start values.
+        spread: Option<Number>, example "3.0", default "3";
+        /// Optima whose k/m, c/m and motions agree to this are one.
+        same: Option<Number>, example "1e-3", default "1e-3";
+        /// Refits to simulated readings.
+        bootstrap: Option<Count>, example "200", default "none";
+        /// Where the noise of the refits comes from.
+        noise: Option<NoiseName>, example "residual", default "parametric";
+        /// Masses for which devices with the same motion are sought.
+        equivalents: Option<Vec<EquivalentSpec>>,
+            example "[{name: constant mass, mass: 1.0}]",
+            default "masses that grow, fall and swing away from the fit's";
+        /// Whether each function is held against a constant.
+        varies: Option<bool>, example "true", default "false";
+        /// Experiments that might be made next.
+        candidates: Option<Vec<CandidateSpec>>,
+            example "[{name: again, initial: {displacement: 3.3, velocity: 1.0}}]",
+            default "none";
+    }
 }
 
-/// A number: a function's value at a time or its mean, or a scalar by its name.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {function: mass, at: 0.0}"
-)]
-pub struct ProfileSpec {
-    /// Which function.
-    pub function: Option<FunctionName>,
-    /// At which time, in s.
-    pub at: Option<Number>,
-    /// Or its mean.
-    pub mean: Option<bool>,
-    /// Name of an estimated number, as the report calls it.
-    pub scalar: Option<Text>,
+keys! {
+    /// A number: a function's value at a time, its mean, a constant, or a scalar.
+    pub struct ProfileSpec = "profile", expecting "a map such as {function: mass, at: 0.0}" {
+        /// Which function.
+        function: Option<FunctionName>, example "mass";
+        /// At which time.
+        at: Option<Number>, example "0.0", unit "s";
+        /// Its mean in place of a value.
+        mean: Option<bool>, example "true";
+        /// An estimated number, as the report calls it, in place of a function.
+        scalar: Option<Text>, example "initial velocity";
+    }
 }
 
 choice! {
@@ -70,38 +69,35 @@ choice! {
     }
 }
 
-/// A device to be sought with the motion of the fit.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {name: constant mass, mass: 1.0}"
-)]
-pub struct EquivalentSpec {
-    /// What the report calls it.
-    pub name: Text,
-    /// Its mass, in kg.
-    pub mass: NumberOrColumn,
-    /// The damping that it should be near to, in N s/m; that of the fit unless given.
-    pub damping: Option<NumberOrColumn>,
+keys! {
+    /// A device to be sought with the motion of the fit.
+    pub struct EquivalentSpec = "equivalent", expecting "a map such as {name: constant mass, mass: 1.0}" {
+        /// What the report calls it.
+        name: Text, example "constant mass";
+        /// Its mass.
+        mass: NumberOrColumn, example "1.0", unit "kg";
+        /// The damping that it should be near to.
+        damping: Option<NumberOrColumn>, example "0.0", unit "N s/m", default "that of the fit";
+    }
 }
 
-/// An experiment that might be made.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a map such as {name: second release, initial: {displacement: 0.0, velocity: 3.0}}"
-)]
-pub struct CandidateSpec {
-    /// What the report calls it.
-    pub name: Text,
-    /// State at its beginning.
-    pub initial: StateSpec,
-    /// Force on the mass, as a shape.
-    pub force: Option<ForceSpec>,
-    /// What is measured, at every node; the displacement unless given.
-    pub channel: Option<ChannelName>,
-    /// Standard deviation of a reading; that of the first channel of the model unless given.
-    pub sigma: Option<Number>,
+keys! {
+    /// An experiment that might be made.
+    pub struct CandidateSpec = "candidate", expecting "a map such as {name: second release, initial: {displacement: 0.0, velocity: 3.0}}" {
+        /// What the report calls it.
+        name: Text, example "a blow";
+        /// State at its beginning.
+        initial: StateSpec, example "{displacement: 0.0, velocity: 3.0}";
+        /// Force on the mass, as a shape.
+        force: Option<ForceSpec>, example "{shape: sine, amplitude: 1.0, frequency: 0.2}", default "none";
+        /// What is measured, at every node.
+        channel: Option<ChannelName>, example "acceleration", default "displacement";
+        /// Standard deviation of a reading.
+        sigma: Option<Number>,
+            example "0.1",
+            unit "SI unit of the channel",
+            default "that of the first channel of the model";
+    }
 }
 
 choice! {

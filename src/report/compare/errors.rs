@@ -1,8 +1,8 @@
 //! Distances of a run from the truth.
 
 use super::RECOVERED;
-use kmcfit_core::internals::dynamics::Device;
 use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::system::Device;
 use serde::Serialize;
 
 /// Largest distances from the truth over the nodes.

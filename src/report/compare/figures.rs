@@ -6,8 +6,8 @@ use super::run::ComparedRun;
 use super::table::short;
 use crate::report::figure::{Axis, Figure, Panel};
 use crate::report::mark::{Colour, Dash, Mark, Style};
-use kmcfit_core::internals::dynamics::Device;
 use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::system::Device;
 
 /// The colours of runs; black and grey are left to the truth.
 const COLOURS: [Colour; 6] = [

@@ -6,7 +6,7 @@ use super::verdict;
 use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::dynamics::Device;
+use kmcfit_core::internals::system::Device;
 use serde::Serialize;
 
 /// The numbers of one run, and what they mean in one line.

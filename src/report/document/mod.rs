@@ -9,8 +9,8 @@ pub use channel::{
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use kmcfit_core::internals::dynamics::Grid;
 use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 

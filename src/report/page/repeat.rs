@@ -5,7 +5,7 @@ use crate::config::Source;
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use crate::report::text::escape;
-use kmcfit_core::internals::dynamics::arithmetic;
+use kmcfit_core::internals::simulate::arithmetic;
 
 /// The command, what it was run with, the model and its data.
 pub(super) fn repeat(run: &FittedModel, document: &ResultDocument) -> String {

@@ -1,7 +1,7 @@
 //! One channel of a fit: outliers, residual diagnostics, and patterns that are neither noise nor response.
 
 use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift};
-use crate::objective::{Channel, Loss};
+use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 
 /// Residuals below this share of the largest reading are rounding.

@@ -1,8 +1,8 @@
 //! Standard error of a constant function, and Wald's test of a constant one against a varying one.
 
 use crate::functions::{Basis, CoefficientFunction};
-use crate::objective::{Channel, Loss, Weighting};
 use crate::problem::Problem;
+use crate::record::{Channel, Loss, Weighting};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 

@@ -4,10 +4,12 @@ use super::channel::diagnostics;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
-use crate::dynamics::{Breakdown, Excitation, Term};
 use crate::functions::Quantity;
-use crate::objective::{Channel, Evaluation, Loss};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::{Channel, Loss};
+use crate::simulate::Breakdown;
+use crate::system::{Excitation, Term};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 

@@ -1,8 +1,9 @@
 //! Statistics of all channels together.
 
 use crate::diagnostics::{InformationCriteria, with_estimated_sigma, with_known_sigma};
-use crate::objective::{Evaluation, Loss, Weighting};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::{Loss, Weighting};
 
 /// Goodness of fit and information criteria of a fit.
 #[derive(Debug, Clone, Default, PartialEq)]

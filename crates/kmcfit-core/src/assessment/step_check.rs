@@ -1,9 +1,9 @@
 //! Step-size check: the optimum on a grid of half the step.
 
 use crate::diagnostics::rms;
-use crate::dynamics::Breakdown;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 
 /// The optimum on a grid of half the step.
 #[derive(Debug, Clone, PartialEq)]

@@ -33,11 +33,11 @@ pub use part::Part;
 pub use record::Record;
 
 use crate::constraints::{Impossible, Statement};
-use crate::dynamics::{Grid, Method, Oscillator, Term};
 use crate::functions::{Functions, Quantity};
 use crate::problem::Problem;
 use crate::signal::even_spacing;
 use crate::solvers::{StartProjection, states_from_readings};
+use crate::system::{Grid, Method, Oscillator, Term};
 
 /// Most nodes: more would be asked for by mistake, and end in a lack of memory.
 const MOST_NODES: usize = 100_000_000;

@@ -2,9 +2,9 @@
 
 use super::BuildError;
 use crate::constraints::{Limit, Statement};
-use crate::dynamics::Grid;
 use crate::functions::basis::{from_physical_powers, uniform_knots};
 use crate::functions::{Basis, CoefficientFunction, Design, Penalty, Quantity, Variation};
+use crate::system::Grid;
 
 /// Where a function comes from.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,12 +1,14 @@
 //! One record: where the motion begins, what drives it, what was read.
 
 use super::BuildError;
-use crate::dynamics::{ChannelKind, Excitation, Grid, State, Surroundings};
 use crate::functions::Scalar;
-use crate::objective::{Channel, Loss, Weighting, integral_over, state_sizes};
-use crate::problem::{BaseMotion, Drive, Experiment, Waveform};
+use crate::objective::state_sizes;
+use crate::record::{
+    BaseMotion, Channel, ChannelKind, Drive, Experiment, Loss, Waveform, Weighting, integral_over,
+};
 use crate::signal::{Interpolation, Signal};
 use crate::signal::{even_spacing, median_spacing};
+use crate::system::{Excitation, Grid, State, Surroundings};
 
 /// Readings of one kind.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
 use super::{CoefficientFunction, Design, Gram, Runs, Scalar};
-use crate::dynamics::Device;
-use crate::dynamics::quadrature::{trapezoid, trapezoid_weights};
-use crate::lanes::sum::largest_difference;
+use crate::simd::sum::largest_difference;
+use crate::system::Device;
+use crate::system::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
 
 /// The functions to be found and the scalars beside them. Their parameters stand one after the other

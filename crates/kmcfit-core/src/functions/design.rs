@@ -1,6 +1,6 @@
 //! Design matrices: from parameters to values at the nodes.
 
-use crate::lanes::sum::largest;
+use crate::simd::sum::largest;
 use nalgebra_sparse::CsrMatrix;
 
 /// A matrix `B` of shape `nodes x parameters`.

@@ -26,7 +26,7 @@ pub(crate) use runs::Runs;
 pub use scalar::{Prior, Scalar, Value};
 pub use variation::Variation;
 
-use crate::dynamics::Grid;
+use crate::system::Grid;
 
 /// One coefficient function and where its search starts.
 #[derive(Debug, Clone)]

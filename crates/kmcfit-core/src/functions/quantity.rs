@@ -1,6 +1,6 @@
 //! Names and units of the functions.
 
-use crate::dynamics::Term;
+use crate::system::Term;
 
 /// Which coefficient function of the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

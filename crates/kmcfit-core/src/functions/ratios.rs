@@ -1,6 +1,6 @@
 //! What a free motion can show: the ratios of the functions.
 
-use crate::dynamics::Device;
+use crate::system::Device;
 
 /// Ratios of stiffness and damping to mass at the nodes, and what engineers call them.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 //! them see these two.
 
 use super::Design;
-use crate::lanes::{self, Elementwise};
+use crate::simd::{self, Elementwise};
 use std::ops::Range;
 
 /// A design with one or two entries in every row.
@@ -77,7 +77,7 @@ impl Runs {
 
     /// `values += B theta`, as [`Design::multiply_add`], with the same bits.
     pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
-        lanes::run(Elementwise(|| {
+        simd::run(Elementwise(|| {
             for piece in self.within(0..values.len()) {
                 let (values, (j, b)) = (&mut values[piece.rows], piece.first);
                 match piece.second {
@@ -100,7 +100,7 @@ impl Runs {
     pub fn largest(&self, theta: &[f64], nodes: usize) -> f64 {
         // Many side by side: one maximum would wait for itself.
         let mut most = [0.0f64; 16];
-        lanes::run(Elementwise(|| {
+        simd::run(Elementwise(|| {
             for piece in self.within(0..nodes) {
                 let (j, b) = piece.first;
                 let (k, c) = piece.second.unwrap_or((j, &self.entries[1][piece.rows]));
@@ -139,8 +139,8 @@ impl Runs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::Grid;
     use crate::functions::Basis;
+    use crate::system::Grid;
 
     const NODES: usize = 401;
 

@@ -3,7 +3,8 @@
 //! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the motion says `k/m = (f/m - y'')/y`, where `y = 0`
 //! it says `c/m = (f/m - y'')/y'`.
 
-use crate::dynamics::{Grid, Trajectory};
+use crate::simulate::Trajectory;
+use crate::system::Grid;
 
 /// Those instants, s, increasing.
 #[derive(Debug, Clone, PartialEq, Default)]

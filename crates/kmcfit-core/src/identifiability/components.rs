@@ -1,8 +1,9 @@
 //! Which functions share one scale, and where it is fixed.
 
-use crate::dynamics::Stepwise;
 use crate::functions::CoefficientFunction;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::Experiment;
+use crate::system::Stepwise;
 
 /// Functions that one factor multiplies: those of devices that have a function in common.
 #[derive(Debug, Clone, PartialEq)]

@@ -15,9 +15,10 @@ use super::covariance::{Information, stacked};
 use super::gauge::Gauge;
 use super::linear::right_svd;
 use super::sensitivity::{Sensitivity, rank_of};
-use crate::dynamics::{ChannelKind, Excitation, State};
-use crate::objective::{Channel, Evaluation, Weighting};
-use crate::problem::{Experiment, Problem};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::{Channel, ChannelKind, Experiment, Weighting};
+use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
 /// What a candidate would measure, at all nodes.

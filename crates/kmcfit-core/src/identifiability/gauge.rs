@@ -9,9 +9,9 @@ use super::components::{Component, components};
 use super::directions::Directions;
 use super::linear::{column_space, null_space};
 use super::sensitivity::Spectrum;
-use crate::dynamics::quadrature::trapezoid_weights;
 use crate::functions::{Design, Gram};
 use crate::problem::Problem;
+use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 
 /// What is left of a relation that holds, relative to the functions' sizes.

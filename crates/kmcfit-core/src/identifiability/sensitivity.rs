@@ -2,9 +2,9 @@
 
 use super::directions::Directions;
 use super::linear::right_svd;
-use crate::dynamics::{Slopes, Trajectory, adjoint};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simulate::{Slopes, Trajectory};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -176,13 +176,7 @@ fn reading_gradient(
     let mut scalars = vec![0.0; evaluation.scalars.len()];
     let mut direct = Slopes::AtNodes(&mut nodal);
     add(view, (&mut source, &mut direct, &mut scalars));
-    let share = adjoint::discrete::gradient(
-        view.oscillator,
-        view.device,
-        view.excitation,
-        view.motion,
-        &source,
-    );
+    let share = view.discrete_adjoint(&source);
     for (total, share) in nodal.functions_mut().zip(share.device.functions()) {
         total.iter_mut().zip(share).for_each(|(t, s)| *t += s);
     }

@@ -3,9 +3,9 @@
 use super::bands::{Band, Bands};
 use super::linear::{span_words, spans};
 use crate::diagnostics::{NORMAL_975, median_size};
-use crate::dynamics::Term;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::system::Term;
 
 /// A function is identified where the half-width of its 95 % band is at most this share of its
 /// size at most times ([`Problem::natural_sizes`] with the median of its values in place of the largest): a quarter

@@ -1,9 +1,10 @@
 //! The cost and its gradient and nothing else.
 
-use crate::dynamics::{Breakdown, Excitation};
 use crate::functions::Design;
-use crate::objective::Channel;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment};
+use crate::simulate::{Breakdown, least_squares};
+use crate::system::Excitation;
 
 impl Problem {
     /// The cost `J` at `theta`, and its Euclidean gradient `dJ/dtheta` by the discrete adjoint into
@@ -23,7 +24,7 @@ impl Problem {
     pub fn cost_and_gradient(&self, theta: &[f64], gradient: &mut [f64]) -> Result<f64, Breakdown> {
         assert_eq!(theta.len(), self.parameters(), "one number per parameter");
         assert_eq!(gradient.len(), self.parameters(), "one slope per parameter");
-        if let Some(misfit) = self.squares_in_blocks(theta, gradient) {
+        if let Some(misfit) = self.fused_least_squares(theta, gradient) {
             if self.is_regularised() {
                 let push = self.penalty_gradient(theta);
                 gradient.iter_mut().zip(&push).for_each(|(g, p)| *g += p);
@@ -37,7 +38,7 @@ impl Problem {
 
     /// The misfit and its gradient where both can be had in blocks; `None` where not, or where they leave the
     /// finite numbers.
-    fn squares_in_blocks(&self, theta: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn fused_least_squares(&self, theta: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let (experiment, channel, weights) = self.one_full_record()?;
         let nodes = experiment.nodes;
         if theta.len() != 3 * nodes {
@@ -47,7 +48,8 @@ impl Problem {
         let (damping, stiffness) = others.split_at(nodes);
         let (by_mass, others) = gradient.split_at_mut(nodes);
         let (by_damping, by_stiffness) = others.split_at_mut(nodes);
-        let (cost, initial) = self.oscillator.squares_in_blocks(
+        let (cost, initial) = least_squares(
+            &self.oscillator,
             [mass, damping, stiffness],
             experiment.initial,
             channel.observed(),
@@ -88,8 +90,8 @@ impl Problem {
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::{Grid, Method};
     use crate::functions::Functions;
+    use crate::system::{Grid, Method};
 
     /// The paper's problem, on few nodes.
     fn problem() -> Problem {
@@ -112,7 +114,7 @@ mod tests {
         let problem = problem();
         let theta = problem.start();
         let mut gradient = vec![0.0; theta.len()];
-        assert!(problem.squares_in_blocks(&theta, &mut gradient).is_some());
+        assert!(problem.fused_least_squares(&theta, &mut gradient).is_some());
     }
 
     /// A device that takes its functions in another order than they are listed in.

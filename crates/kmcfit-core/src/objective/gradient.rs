@@ -1,10 +1,11 @@
 //! The gradient of the cost, by either adjoint.
 
 use super::Evaluation;
-use crate::dynamics::quadrature::trapezoid_weights;
-use crate::dynamics::{Device, Slopes, State, Trajectory, adjoint};
 use crate::functions::{CoefficientFunction, Design};
 use crate::problem::Problem;
+use crate::simulate::{Engine, Slopes, Trajectory, continuous_adjoint};
+use crate::system::quadrature::trapezoid_weights;
+use crate::system::{Device, State};
 
 /// Which adjoint computes the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,13 +131,7 @@ impl Problem {
             let total = nodal[experiment.device].get_or_insert_with(empty);
             let direct = &mut Slopes::AtNodes(total);
             let source = self.source(evaluation, e, direct, &mut scalars);
-            let share = adjoint::discrete::gradient(
-                &self.oscillator,
-                view.device,
-                view.excitation,
-                view.motion,
-                &source,
-            );
+            let share = view.discrete_adjoint(&source);
             add(total, &share.device);
             add_initial(experiment.sought, share.initial, &mut scalars);
         }
@@ -179,16 +174,16 @@ impl Problem {
         let (experiment, functions) = (&self.experiments[e], &self.functions);
         let assembly = functions.assembly(experiment.device);
         let view = self.view(evaluation, e);
-        let is_driven = !self.oscillator.is_linear_and_free(view.excitation);
-        if !is_driven || !assembly.iter().all(|f| functions.is_constant_or_known(*f)) {
+        if view.engine() != Engine::Prefactored
+            || !assembly.iter().all(|f| functions.is_constant_or_known(*f))
+        {
             return false;
         }
         let mut direct = vec![0.0; assembly.len()];
         let mut own = vec![0.0; scalars.len()];
         let source = self.source(evaluation, e, &mut Slopes::Summed(&mut direct), &mut own);
-        let oscillator = &self.oscillator;
-        let found = adjoint::discrete::sums(
-            oscillator,
+        let found = view.engine().discrete_adjoint_sums(
+            view.oscillator,
             view.device,
             view.excitation,
             view.motion,
@@ -218,7 +213,7 @@ impl Problem {
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
-            let share = adjoint::continuous::gradient(
+            let share = continuous_adjoint(
                 &self.oscillator,
                 view.device,
                 view.excitation,

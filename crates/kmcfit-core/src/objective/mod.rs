@@ -1,30 +1,25 @@
 //! The cost of a parameter vector and its derivatives, from one trajectory per point.
 
-mod channel;
 mod cost_and_gradient;
 mod gradient;
 mod jacobian;
-mod loss;
-mod on_nodes;
+mod node_aligned;
+mod prediction;
 mod refine;
-mod sensor;
 mod sizes;
 mod verify;
-mod weighting;
+mod view;
 
-pub use channel::{Channel, View, ViewTangent, integral_over};
 pub use gradient::{Gradient, GradientKind};
-pub use loss::Loss;
 pub use refine::Refined;
-pub use sensor::Sensor;
 pub use sizes::state_sizes;
 pub use verify::GradientError;
-pub use weighting::Weighting;
+pub use view::{View, ViewTangent};
 
-use crate::dynamics::{
-    Breakdown, Cause, Device, DeviceTangent, Oscillator, Place, State, Trajectory,
-};
 use crate::problem::Problem;
+use crate::simulate::reference::tangent;
+use crate::simulate::{Breakdown, Cause, Engine, Purpose, Trajectory};
+use crate::system::{Device, DeviceTangent, Place, State};
 
 /// The cost at one point and everything that it was computed from.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,15 +40,6 @@ pub struct Evaluation {
     pub trajectories: Vec<Trajectory>,
     /// What the model says of the readings, for each experiment and each of its channels.
     pub predictions: Vec<Vec<Vec<f64>>>,
-}
-
-/// In which order a motion and its cost are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Order {
-    /// One step and one reading after the other.
-    Steps,
-    /// Several at once, where that is possible.
-    Blocks,
 }
 
 impl Evaluation {
@@ -106,9 +92,6 @@ impl Problem {
     /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
     /// error.
     ///
-    /// Linear free motion is computed in blocks of the record at once
-    /// ([`Oscillator::forward_in_blocks_into`](crate::dynamics::Oscillator::forward_in_blocks_into)).
-    ///
     /// # Errors
     /// As [`Problem::evaluate`].
     pub fn evaluate_into(
@@ -116,25 +99,16 @@ impl Problem {
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
-        self.evaluate_by(Order::Blocks, theta, evaluation)
+        self.evaluate_for(Purpose::Estimation, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] one step and one reading after the other, in the paper's order of
-    /// operations: its run depends on every bit.
+    /// [`Problem::evaluate_into`] by the engine of a [`Purpose`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
-    pub fn evaluate_in_order_into(
+    pub fn evaluate_for(
         &self,
-        theta: &[f64],
-        evaluation: &mut Evaluation,
-    ) -> Result<(), Breakdown> {
-        self.evaluate_by(Order::Steps, theta, evaluation)
-    }
-
-    fn evaluate_by(
-        &self,
-        order: Order,
+        purpose: Purpose,
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
@@ -143,7 +117,7 @@ impl Problem {
             self.functions.device_into(theta, i + 1, own);
         }
         evaluation.scalars.copy_from_slice(self.scalars(theta));
-        self.motions(order, evaluation)?;
+        self.motions(purpose, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         if !evaluation.cost.is_finite() {
@@ -158,10 +132,10 @@ impl Problem {
     /// # Errors
     /// A [`Breakdown`] if a motion does not exist.
     pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
-        self.motions(Order::Blocks, evaluation)
+        self.motions(Purpose::Estimation, evaluation)
     }
 
-    fn motions(&self, order: Order, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+    fn motions(&self, purpose: Purpose, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
         evaluation.misfit = 0.0;
         for (e, experiment) in self.experiments.iter().enumerate() {
             let device = match experiment.device {
@@ -169,17 +143,14 @@ impl Problem {
                 own => &evaluation.own_devices[own - 1],
             };
             let motion = &mut evaluation.trajectories[e];
-            let solve = match order {
-                Order::Steps => Oscillator::forward_into,
-                Order::Blocks => Oscillator::forward_in_blocks_into,
-            };
             let initial = experiment.initial_state(&evaluation.scalars);
-            let excitation = experiment.excitation.as_ref();
-            solve(&self.oscillator, device, initial, excitation, motion)?;
+            let (oscillator, excitation) = (&self.oscillator, experiment.excitation.as_ref());
+            let engine = Engine::choose(oscillator, excitation, motion.nodes(), purpose);
+            engine.forward_into(oscillator, device, initial, excitation, motion)?;
             let view = View {
-                oscillator: &self.oscillator,
+                oscillator,
                 device,
-                excitation: experiment.excitation.as_ref(),
+                excitation,
                 motion,
                 scalars: &evaluation.scalars,
             };
@@ -228,9 +199,8 @@ impl Problem {
                     velocity: change(experiment.sought[1]),
                 },
             };
-            let motion =
-                self.oscillator
-                    .tangent(view.device, view.excitation, view.motion, &direction);
+            let (device, excitation) = (view.device, view.excitation);
+            let motion = tangent(view.oscillator, device, excitation, view.motion, &direction);
             let along = ViewTangent {
                 device: &direction.device,
                 motion: &motion,

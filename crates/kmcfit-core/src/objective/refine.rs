@@ -1,8 +1,9 @@
 //! The optimum on a grid of half the step: how much of it is the stepper's.
 
 use super::{Evaluation, View};
-use crate::dynamics::{Breakdown, Device, Oscillator, Trajectory};
 use crate::problem::Problem;
+use crate::simulate::{Breakdown, Trajectory, reference};
+use crate::system::{Device, Oscillator};
 
 /// What half the step changes, with the functions and scalars as they are.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +43,8 @@ impl Problem {
             };
             let device = halved(evaluation.device_of(experiment.device));
             let mut motion = Trajectory::zeros(experiment.nodes);
-            oscillator.forward_into(
+            reference::forward_into(
+                &oscillator,
                 &device,
                 experiment.initial_state(&evaluation.scalars),
                 experiment.excitation.as_ref(),

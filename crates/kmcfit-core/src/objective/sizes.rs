@@ -2,11 +2,13 @@
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
-use crate::dynamics::quadrature::curvature_into;
-use crate::dynamics::{ChannelKind, MOST_TERMS, Term, Trajectory};
-use crate::lanes::sum::{dot, largest};
-use crate::problem::{Experiment, LONG, Problem};
+use crate::problem::Problem;
+use crate::record::{ChannelKind, Experiment, LONG};
 use crate::signal::Spectrum;
+use crate::simd::sum::{dot, largest};
+use crate::simulate::Trajectory;
+use crate::system::quadrature::curvature_into;
+use crate::system::{MOST_TERMS, Term};
 use std::f64::consts::TAU;
 
 impl Problem {
@@ -163,7 +165,7 @@ pub fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] 
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::Grid;
+    use crate::system::Grid;
 
     /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it, by a sensor with
     /// an offset.

@@ -1,8 +1,8 @@
 //! Proofs that a gradient is one, as functions that anyone can call.
 
 use super::{Evaluation, GradientKind};
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 
 /// One point of the paper's Fig. 2.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! Least squares in few variables, all at once.
 
 use super::Subproblem;
-use crate::lanes::tall::{PIECE, Piece, Triangle};
+use crate::simd::tall_qr::{PIECE, Piece, Triangle};
 
 /// A column that keeps less than this share of its length depends on those before it.
 const INDEPENDENT: f64 = 1e-14;

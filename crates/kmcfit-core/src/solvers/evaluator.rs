@@ -5,17 +5,17 @@ use super::iterate::Iterate;
 use super::linearization::{Linearization, halfway, in_halves};
 use super::settings::{FitSettings, Solver};
 use super::timings::{Timings, timed};
-use crate::dynamics::{Breakdown, Trajectory};
-use crate::objective::{Channel, Evaluation, Gradient, GradientKind, Loss};
+use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
+use crate::record::{Channel, Loss};
+use crate::simulate::{Breakdown, Purpose, Trajectory};
 use std::sync::OnceLock;
 
 /// The problem behind argmin's counters: the one door through which solvers evaluate.
 pub(crate) struct CountedEvaluator<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
-    /// Whether every operation has its place: the paper's run depends on every bit.
-    in_order: bool,
+    purpose: Purpose,
     /// Where the record is cut in two, so that iterates need tangent solves and no adjoint.
     halfway: Option<usize>,
     /// Most iterations of one quadratic program.
@@ -35,12 +35,16 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
             .problem
             .filter(|_| needs_jacobians)
             .and_then(halfway);
+        let has_paper_order = settings.solver == Solver::SteepestDescent
+            || settings.gradient == GradientKind::Continuous;
         Self {
             problem,
             halfway,
             kind: settings.gradient,
-            in_order: settings.solver == Solver::SteepestDescent
-                || settings.gradient == GradientKind::Continuous,
+            purpose: match has_paper_order {
+                true => Purpose::Reproduction,
+                false => Purpose::Estimation,
+            },
             program_iterations: settings.stopping.program_iterations,
             timings: Timings::default(),
         }
@@ -58,11 +62,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
-        let evaluated = match self.in_order {
-            true => problem.evaluate_in_order_into(&parameters, &mut evaluation),
-            false => problem.evaluate_into(&parameters, &mut evaluation),
-        };
-        evaluated.ok()?;
+        (problem.evaluate_for(self.purpose, &parameters, &mut evaluation)).ok()?;
         let point = self.completed(parameters, evaluation, &mut Timings::default());
         if point.fingerprint() == fingerprint || self.halfway.is_none() {
             return Some(point).filter(|point| point.fingerprint() == fingerprint);
@@ -82,10 +82,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, Breakdown> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
-        match self.in_order {
-            true => problem.evaluate_in_order_into(parameters, &mut evaluation)?,
-            false => problem.evaluate_into(parameters, &mut evaluation)?,
-        }
+        problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
         Ok(evaluation.trajectories)
     }
 
@@ -96,10 +93,9 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         evaluation: &mut Evaluation,
     ) -> Result<(), Breakdown> {
         self.count(FORWARD, 1);
-        let (problem, in_order) = (self.problem(), self.in_order);
-        timed(&mut self.timings.forward, || match in_order {
-            true => problem.evaluate_in_order_into(parameters, evaluation),
-            false => problem.evaluate_into(parameters, evaluation),
+        let (problem, purpose) = (self.problem(), self.purpose);
+        timed(&mut self.timings.forward, || {
+            problem.evaluate_for(purpose, parameters, evaluation)
         })
     }
 

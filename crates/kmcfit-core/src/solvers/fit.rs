@@ -8,8 +8,8 @@ use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 use std::time::{Duration, Instant};
 
 /// A finished fit: the best point, how it was reached and how it ended.

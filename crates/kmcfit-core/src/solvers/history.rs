@@ -1,8 +1,8 @@
 //! What happened, iteration by iteration.
 
 use super::iterate::Iterate;
-use crate::dynamics::Trajectory;
 use crate::problem::Problem;
+use crate::simulate::Trajectory;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// One iteration: the cost after it, the gradient before it.

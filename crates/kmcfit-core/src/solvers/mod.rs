@@ -52,8 +52,8 @@ pub use timings::{Timings, timed};
 pub use validation::predict_held_out;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 
 impl Problem {
     /// Fits from the problem's start with the usual settings.

@@ -10,8 +10,8 @@ use super::reason::Reason;
 use super::settings::FitSettings;
 use super::termination::{Outcome, Status};
 use crate::constraints::TOLERANCE;
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 
 /// The end of a fit none of whose starts in the constraint set has a motion, the first for the reason
 /// `breakdown`: `infeasible`, with the start `given` before it was moved into the constraints as the

@@ -7,9 +7,9 @@ use super::history::IterationRecord;
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::termination::Status;
-use crate::dynamics::Breakdown;
-use crate::objective::{Channel, Loss, Weighting};
 use crate::problem::Problem;
+use crate::record::{Channel, Loss, Weighting};
+use crate::simulate::Breakdown;
 
 /// Most rounds of fit and estimate.
 const ROUNDS: usize = 20;
@@ -143,8 +143,8 @@ fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::Grid;
     use crate::solvers::{Solver, Stopping, fit_from};
+    use crate::system::Grid;
     use std::time::Duration;
 
     /// Work and time of both, the motions of the first, and the place of the second.

@@ -1,7 +1,7 @@
 //! Reasons for which a fit ended.
 
-use crate::dynamics::Breakdown;
 use crate::qp::ConicStatus;
+use crate::simulate::Breakdown;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::time::Duration;

@@ -18,9 +18,10 @@ use super::starts::{
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
-use crate::dynamics::Breakdown;
-use crate::objective::{Channel, GradientKind};
+use crate::objective::GradientKind;
 use crate::problem::Problem;
+use crate::record::Channel;
+use crate::simulate::Breakdown;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -385,8 +386,8 @@ fn largest_chi_square(readings: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::dynamics::Grid;
     use crate::solvers::{Stopping, fit_from};
+    use crate::system::Grid;
 
     /// Iterations, work and time of both parts, and the numbers of the iterations one after the other.
     #[test]

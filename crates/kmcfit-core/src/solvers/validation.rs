@@ -4,10 +4,11 @@ use super::checkpoint::Observer;
 use super::executor::search;
 use super::settings::{FitSettings, Solver};
 use super::state_estimation::states_from_readings;
-use crate::dynamics::Breakdown;
 use crate::functions::{CoefficientFunction, Functions, Scalar};
 use crate::objective::Evaluation;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::Experiment;
+use crate::simulate::Breakdown;
 
 /// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
 /// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own readings.

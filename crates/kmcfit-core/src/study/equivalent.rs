@@ -19,11 +19,11 @@
 //! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
 //! a stepper of order two reproduces the motion to the square of its step.
 
-use crate::dynamics::quadrature::trapezoid_weights;
-use crate::dynamics::{Device, Grid};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::system::quadrature::trapezoid_weights;
+use crate::system::{Device, Grid};
 
 /// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
 /// record, so that the wish comes first between the anchors.

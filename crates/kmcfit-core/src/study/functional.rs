@@ -1,9 +1,9 @@
 //! A number that is linear in the parameters.
 
-use crate::dynamics::Place;
-use crate::dynamics::quadrature::trapezoid_weights;
 use crate::functions::Basis;
 use crate::problem::Problem;
+use crate::system::Place;
+use crate::system::quadrature::trapezoid_weights;
 
 /// `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, a function's value or its mean.
 #[derive(Debug, Clone, PartialEq)]

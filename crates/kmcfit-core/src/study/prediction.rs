@@ -6,9 +6,10 @@
 //! none of them out, however unlikely the linearisation calls them.
 
 use super::pull_apart::Extreme;
-use crate::dynamics::{Breakdown, Excitation, State, Trajectory};
-use crate::objective::{Channel, Weighting};
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment, Weighting};
+use crate::simulate::{Breakdown, Trajectory};
+use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
 /// Half width of a 95 % band of a normal number, in standard deviations.

@@ -6,10 +6,10 @@ pub mod reference;
 pub mod sensed;
 pub mod synthetic;
 
-use kmcfit_core::internals::dynamics::{Device, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
-use kmcfit_core::internals::objective::{Channel, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
+use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
 
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! A second, independent forward solve: textbook formulas, written out, for any kind of number.
 
-use kmcfit_core::internals::dynamics::Method;
+use kmcfit_core::internals::system::Method;
 use num_dual::DualNum;
 
 /// Functions and force at the nodes.

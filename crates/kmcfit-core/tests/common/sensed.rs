@@ -1,8 +1,8 @@
 //! A second, independent evaluation of a record with everything in it: textbook formulas, written
 //! out, for any kind of number.
 
-use kmcfit_core::internals::dynamics::{ChannelKind, Method};
-use kmcfit_core::internals::objective::Loss;
+use kmcfit_core::internals::record::{ChannelKind, Loss};
+use kmcfit_core::internals::system::Method;
 use num_dual::DualNum;
 
 /// A number that derivatives run through.

@@ -2,12 +2,13 @@
 //! fitted.
 
 use super::sensed::{Record, Response};
-use kmcfit_core::internals::dynamics::{
-    ChannelKind, Device, Excitation, Oscillator, State, Stepwise, Surroundings, Term,
-};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::system::{
+    Device, Excitation, Oscillator, State, Stepwise, Surroundings, Term,
+};
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

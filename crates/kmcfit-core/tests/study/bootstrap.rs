@@ -1,6 +1,6 @@
 use crate::problems::regular;
-use kmcfit_core::internals::objective::{Channel, Weighting};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::Linear;
 use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};

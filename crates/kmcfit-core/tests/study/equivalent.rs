@@ -1,6 +1,6 @@
-use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::study::equivalent::{Motion, Wish, anchors, equivalent, imbalance};
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

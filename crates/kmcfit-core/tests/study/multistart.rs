@@ -1,6 +1,6 @@
 use crate::problems::{REST, Record, bound, constants, device, oscillator, problem, readings};
-use kmcfit_core::internals::objective::Weighting;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::study::multistart::{
     Distance, Multistart, Ranges, between, multistart,
 };

@@ -1,6 +1,5 @@
 use crate::common;
 use crate::problems::regular;
-use kmcfit_core::internals::dynamics::{Excitation, State};
 use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
@@ -8,6 +7,7 @@ use kmcfit_core::internals::study::prediction::{Run, predict};
 use kmcfit_core::internals::study::profile::QUANTILE_95;
 use kmcfit_core::internals::study::pull_apart::{Level, ratios_at, tube};
 use kmcfit_core::internals::study::{Linear, Target};
+use kmcfit_core::internals::system::{Excitation, State};
 
 /// The band is as wide as the spread of the motions of refitted devices; the worst case over the
 /// extreme devices, which are at the ends of the same ellipse, is a little narrower than the band

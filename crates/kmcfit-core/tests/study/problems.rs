@@ -1,12 +1,12 @@
 //! Small problems with few parameters.
 
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value,
 };
-use kmcfit_core::internals::objective::{Channel, Sensor, Weighting};
-use kmcfit_core::internals::problem::{Experiment, Problem};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
+use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 
 pub const SIGMA: f64 = 0.05;
 pub const REST: State = State {

@@ -3,14 +3,14 @@ use crate::problems::{
     Record, bound, constants, device, linear, oscillator, problem, readings, regular, scalar,
 };
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::dynamics::{Excitation, Method};
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity, Value};
-use kmcfit_core::internals::objective::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
 use kmcfit_core::internals::study::profile::{End, QUANTILE_95, Verdict};
 use kmcfit_core::internals::study::pull_apart::{Level, tube};
 use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
+use kmcfit_core::internals::system::{Excitation, Method};
 
 fn optimum(problem: &Problem) -> Vec<f64> {
     let settings = crate::common::synthetic::settings();

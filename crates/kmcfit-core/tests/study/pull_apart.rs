@@ -2,8 +2,8 @@ use crate::common::{INITIAL, csv, paper_device, paper_problem, shared};
 use crate::problems::{linear, regular};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{Basis, Penalty};
-use kmcfit_core::internals::objective::Loss;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::profile::QUANTILE_95;
 use kmcfit_core::internals::study::pull_apart::{

@@ -1,7 +1,7 @@
 use crate::problems::knots;
 use kmcfit_core::internals::functions::{Basis, Penalty};
-use kmcfit_core::internals::objective::{Channel, Weighting};
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::variation::{Asking, Varies, variation};
 

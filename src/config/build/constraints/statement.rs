@@ -7,8 +7,8 @@ use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
 use crate::digits::clock;
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
-use kmcfit_core::internals::dynamics::Grid;
 use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::system::Grid;
 
 /// How far outside the record a time may be, in steps, to be taken for its end.
 const SAME_TIME: f64 = 1e-6;

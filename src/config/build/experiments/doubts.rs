@@ -7,10 +7,11 @@ use crate::config::spec::{ExperimentSpec, InitialSpec};
 use crate::digits::{clock, significant};
 use crate::error::InputError;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
-use kmcfit_core::internals::dynamics::{ChannelKind, Term};
 use kmcfit_core::internals::functions::Quantity;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
+use kmcfit_core::internals::system::Term;
 use std::f64::consts::TAU;
 
 /// Factors between channels, or between a reading and a known state, that look like a wrong unit.
@@ -255,8 +256,8 @@ fn offsets(
 ) -> Result<(), InputError> {
     let mut functions = problem.functions.iter();
     let sought = functions.any(|f| f.quantity == Quantity::Offset && f.parameters() > 0);
-    let shifted = |e: &kmcfit_core::internals::problem::Experiment| {
-        let sees = |c: &kmcfit_core::internals::objective::Channel| {
+    let shifted = |e: &kmcfit_core::internals::record::Experiment| {
+        let sees = |c: &kmcfit_core::internals::record::Channel| {
             c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index())
         };
         open(e.sought[0]) && e.channels.iter().all(sees)
@@ -287,21 +288,21 @@ pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputEr
     if !problem.oscillator.terms.iter().all(|term| term.is_linear()) {
         return Ok(());
     }
-    let gains_open = |e: &kmcfit_core::internals::problem::Experiment| {
-        let gain = |c: &kmcfit_core::internals::objective::Channel| {
+    let gains_open = |e: &kmcfit_core::internals::record::Experiment| {
+        let gain = |c: &kmcfit_core::internals::record::Channel| {
             // A base that is added to the motion is a scale of its own.
             open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
         };
         !e.channels.is_empty() && e.channels.iter().all(gain)
     };
-    let starts_open = |e: &kmcfit_core::internals::problem::Experiment| {
+    let starts_open = |e: &kmcfit_core::internals::record::Experiment| {
         let rest = [e.initial.displacement, e.initial.velocity];
         (0..2).all(|q| match e.sought[q] {
             Some(index) => open(Some(index)),
             None => rest[q] == 0.0,
         })
     };
-    let is_free = |e: &kmcfit_core::internals::problem::Experiment| e.is_free();
+    let is_free = |e: &kmcfit_core::internals::record::Experiment| e.is_free();
     for (place, e) in problem.experiments.iter().enumerate() {
         if is_free(e) && gains_open(e) && starts_open(e) {
             return Err(file
@@ -321,7 +322,7 @@ pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputEr
         }
     }
     let forced: Vec<_> = problem.experiments.iter().filter(|e| !is_free(e)).collect();
-    let by_force = |e: &&kmcfit_core::internals::problem::Experiment| {
+    let by_force = |e: &&kmcfit_core::internals::record::Experiment| {
         e.excitation.as_ref().is_some_and(|x| x.base.is_none())
     };
     let mut functions = problem.functions.iter();

@@ -6,9 +6,9 @@ use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
 use crate::error::InputError;
 use crate::units::Kind;
-use kmcfit_core::internals::dynamics::Grid;
-use kmcfit_core::internals::problem::{BaseMotion, Drive, Experiment, Waveform};
+use kmcfit_core::internals::record::{BaseMotion, Drive, Experiment, Waveform};
 use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
+use kmcfit_core::internals::system::Grid;
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]

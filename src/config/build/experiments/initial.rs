@@ -6,9 +6,10 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, InitialSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::{ChannelKind, State};
 use kmcfit_core::internals::functions::{Scalar, Value};
 use kmcfit_core::internals::objective::state_sizes;
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::system::State;
 
 /// The initial state, and which scalars it is where it is sought.
 pub fn build(

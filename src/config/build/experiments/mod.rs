@@ -17,10 +17,9 @@ use crate::observations::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
-use kmcfit_core::internals::dynamics::{ChannelKind, Grid};
 use kmcfit_core::internals::functions::Scalar;
-use kmcfit_core::internals::objective::Weighting;
-use kmcfit_core::internals::problem::Experiment;
+use kmcfit_core::internals::record::{ChannelKind, Experiment, Weighting};
+use kmcfit_core::internals::system::Grid;
 
 pub(super) use doubts::unidentifiable;
 pub(super) use excitation::shape;
@@ -299,7 +298,7 @@ fn place(
 /// The nodes that a motion needs to reach `end`.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
-    let steps = (steps - kmcfit_core::internals::dynamics::Place::SAME_TIME)
+    let steps = (steps - kmcfit_core::internals::system::Place::SAME_TIME)
         .ceil()
         .max(0.0);
     (steps as usize + 1).clamp(Grid::FEWEST_NODES, grid.nodes())

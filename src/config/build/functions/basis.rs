@@ -5,10 +5,10 @@ use crate::config::scalar::{Count, Knots, Number};
 use crate::config::spec::{Basis as Kind, FunctionSpec};
 use crate::digits::clock;
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::Grid;
-use kmcfit_core::internals::dynamics::quadrature::trapezoid_weights;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, Design, Gram};
+use kmcfit_core::internals::system::Grid;
+use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 
 /// How near the first and last knot must be to the ends of the record, in steps.
 const SAME_TIME: f64 = 1e-6;

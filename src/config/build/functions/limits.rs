@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Number, Weight};
 use crate::config::spec::{FunctionSpec, SmoothSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::Grid;
+use kmcfit_core::internals::system::Grid;
 
 /// Highest derivative that can be penalised.
 const HIGHEST_ORDER: usize = 2;

@@ -3,9 +3,9 @@
 use crate::config::ModelFile;
 use crate::config::scalar::{Number, Start};
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::Grid;
 use kmcfit_core::internals::functions::Basis;
 use kmcfit_core::internals::functions::basis::from_physical_powers;
+use kmcfit_core::internals::system::Grid;
 
 /// The parameters to start from: those of a constant, those listed, or the closest to a column.
 pub(super) fn parameters(

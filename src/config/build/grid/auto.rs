@@ -9,8 +9,8 @@
 
 use crate::config::build::experiments::Record;
 use crate::digits::significant;
-use kmcfit_core::internals::dynamics::Method;
 use kmcfit_core::internals::signal::Spectrum;
+use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;
 
 /// Phase error at the end of the record that is aimed at, rad: as a share of the amplitude the

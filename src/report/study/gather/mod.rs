@@ -13,13 +13,13 @@ pub use profiles::{linear, profile_of};
 pub use seen::{bands, spectrum};
 
 use super::pieces::*;
-use kmcfit_core::internals::objective::Weighting;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::solvers::Fit;
 
 /// The fit that is studied.
 pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
-    let sigma = |c: &kmcfit_core::internals::objective::Channel| match c.weighting() {
+    let sigma = |c: &kmcfit_core::internals::record::Channel| match c.weighting() {
         Weighting::Estimated { sigma } => Some(*sigma),
         _ => None,
     };

@@ -4,7 +4,6 @@ use crate::config::{Equivalent, StudyPlan};
 use crate::report::study::pieces::*;
 use crate::report::study::text::ENDED;
 use kmcfit_core::internals::diagnostics::chi_square_one;
-use kmcfit_core::internals::dynamics::{Device, Grid, State};
 use kmcfit_core::internals::functions::Quantity;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -12,6 +11,7 @@ use kmcfit_core::internals::study::equivalent::{Motion, Wish, equivalent};
 use kmcfit_core::internals::study::pull_apart::{
     Ended, Extreme, Level, ratios_at, tube, values_at,
 };
+use kmcfit_core::internals::system::{Device, Grid, State};
 
 /// Roughness that the devices in a tube may have, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
@@ -206,7 +206,7 @@ fn record(grid: &Grid, name: &str, device: &Device, motion_error: f64) -> Equiva
 mod tests {
     use super::*;
     use kmcfit_core::internals::builder::{Builder, Part, Record};
-    use kmcfit_core::internals::dynamics::Grid;
+    use kmcfit_core::internals::system::Grid;
 
     /// What is listed of a ring-down of six periods by the midpoint rule, on 61 nodes.
     fn listed(asked: impl Fn(usize) -> Option<f64>) -> Vec<EquivalentRecord> {

@@ -5,13 +5,13 @@ use crate::report::findings;
 use crate::report::study::pieces::*;
 use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::normal_half_width;
-use kmcfit_core::internals::dynamics::Device;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
     self, BandSettings, Bands, Gauge, Sensitivity, Spectrum, anchors, verdicts,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::system::Device;
 
 /// Directions that are drawn of each end of the spectrum.
 const DIRECTIONS: usize = 3;

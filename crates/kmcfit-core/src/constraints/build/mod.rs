@@ -23,8 +23,8 @@ mod values;
 pub use shape::Shape;
 
 use super::Constraints;
-use crate::dynamics::Grid;
 use crate::functions::{CoefficientFunction, Functions, Quantity};
+use crate::system::Grid;
 use std::fmt;
 
 /// A limit of a function, in its unit.

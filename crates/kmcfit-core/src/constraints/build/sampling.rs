@@ -2,8 +2,8 @@
 
 use super::All;
 use super::form::Form;
-use crate::dynamics::Grid;
 use crate::functions::Basis;
+use crate::system::Grid;
 use nalgebra_sparse::CsrMatrix;
 
 /// Times nearer than this, relative to the record, are one: the same that the bases take for one.

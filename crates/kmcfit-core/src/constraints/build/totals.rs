@@ -3,8 +3,8 @@
 use super::form::{Form, group};
 use super::{All, Impossible};
 use crate::constraints::RowGroup;
-use crate::dynamics::quadrature::trapezoid_weights;
 use crate::functions::Basis;
+use crate::system::quadrature::trapezoid_weights;
 
 pub(super) fn mean(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, Impossible> {
     let mut form = total(all, j);

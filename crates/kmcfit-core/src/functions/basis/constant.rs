@@ -2,7 +2,7 @@
 
 use super::knots::uniform_knots;
 use super::space::Space;
-use crate::dynamics::Grid;
+use crate::system::Grid;
 
 /// The function 1.
 pub(super) struct Constant {

@@ -1,6 +1,6 @@
 //! Knots and the cells between them.
 
-use crate::dynamics::Grid;
+use crate::system::Grid;
 
 /// How near a time must be to a knot, relative to the record, to count as being on it: far above
 /// the rounding of node times, far below a step.

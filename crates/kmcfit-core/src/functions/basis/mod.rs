@@ -7,9 +7,8 @@
 mod b_spline;
 mod constant;
 mod differences;
-mod gauss;
 mod knots;
-mod nodal;
+mod legendre;
 mod piecewise_constant;
 mod piecewise_linear;
 mod polynomial;
@@ -19,8 +18,8 @@ pub use knots::uniform_knots;
 pub use polynomial::{from_physical_powers, physical_powers};
 
 use super::{Design, Gram};
-use crate::dynamics::Grid;
-use crate::dynamics::quadrature::trapezoid_weights;
+use crate::system::Grid;
+use crate::system::quadrature::trapezoid_weights;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use space::{Space, matrix};
 
@@ -80,7 +79,7 @@ impl Basis {
     /// The functions of this basis on a record: the one place where the kinds are told apart.
     fn on(&self, grid: &Grid) -> Box<dyn Space> {
         match self {
-            Basis::Nodal => Box::new(nodal::on(grid)),
+            Basis::Nodal => Box::new(piecewise_linear::PiecewiseLinear::on_nodes(grid)),
             Basis::Constant => Box::new(constant::Constant::on(grid)),
             Basis::PiecewiseConstant { knots } => {
                 Box::new(piecewise_constant::PiecewiseConstant::new(knots))

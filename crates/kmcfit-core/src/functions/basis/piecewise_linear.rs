@@ -3,6 +3,7 @@
 use super::differences;
 use super::knots::Knots;
 use super::space::{Space, square_integral};
+use crate::system::Grid;
 use nalgebra_sparse::CsrMatrix;
 
 /// Hat functions: 1 at their own knot, 0 at all others.
@@ -13,12 +14,16 @@ pub(super) struct PiecewiseLinear {
 impl PiecewiseLinear {
     /// Between `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
-        Self::on(Knots::new(knots))
+        Self {
+            knots: Knots::new(knots),
+        }
     }
 
-    /// On cells that are there already.
-    pub fn on(knots: Knots) -> Self {
-        Self { knots }
+    /// Between the nodes of `grid`.
+    pub fn on_nodes(grid: &Grid) -> Self {
+        Self {
+            knots: Knots::nodes(grid),
+        }
     }
 }
 

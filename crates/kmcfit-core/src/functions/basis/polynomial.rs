@@ -4,8 +4,9 @@
 //! their Gram matrix has condition `2 degree + 1`.
 
 use super::knots::uniform_knots;
+use super::legendre::legendre;
 use super::space::Space;
-use crate::dynamics::Grid;
+use crate::system::Grid;
 
 /// `P_n(x)`, `n = 0..=degree`, with `x = 2 (t - start) / duration - 1`.
 pub(super) struct Legendre {
@@ -43,28 +44,6 @@ impl Space for Legendre {
         let values = legendre(x.clamp(-1.0, 1.0), self.degree, derivative);
         entries.extend(values.into_iter().map(|p| chain * p).enumerate());
     }
-}
-
-/// `d^derivative P_n / dx^derivative` at `x` for `n = 0..=degree`.
-///
-/// Values by `(n+1) P_{n+1} = (2n+1) x P_n - n P_{n-1}`, derivatives by
-/// `P'_{n+1} = P'_{n-1} + (2n+1) P_n`.
-pub(super) fn legendre(x: f64, degree: usize, derivative: usize) -> Vec<f64> {
-    let mut values = vec![1.0; degree + 1];
-    for n in 0..degree {
-        let before = if n == 0 { 0.0 } else { values[n - 1] };
-        let k = n as f64;
-        values[n + 1] = ((2.0 * k + 1.0) * x * values[n] - k * before) / (k + 1.0);
-    }
-    for _ in 0..derivative {
-        let mut slopes = vec![0.0; degree + 1];
-        for n in 0..degree {
-            let before = if n == 0 { 0.0 } else { slopes[n - 1] };
-            slopes[n + 1] = before + (2.0 * n as f64 + 1.0) * values[n];
-        }
-        values = slopes;
-    }
-    values
 }
 
 /// The coefficients `a_0..=a_d` of `p(t) = sum_i a_i t^i` for the Legendre parameters `theta`; `t` in

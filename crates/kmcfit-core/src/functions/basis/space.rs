@@ -1,6 +1,6 @@
 //! What every basis can do on a record.
 
-use super::gauss;
+use super::legendre;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 /// The functions `b_j` of a basis on a record: polynomials between break points.
@@ -49,7 +49,7 @@ pub(super) fn square_integral<S: Space + ?Sized>(space: &S, order: usize) -> Csr
     let Some(rest) = space.degree().checked_sub(order) else {
         return CsrMatrix::zeros(0, space.parameters());
     };
-    let rule = gauss::rule(rest + 1);
+    let rule = legendre::gauss_rule(rest + 1);
     let breaks = space.breaks();
     let cells = breaks.windows(2);
     let points: Vec<(f64, f64)> = cells

@@ -1,7 +1,8 @@
 //! Columns: which parameters act on a reading at all.
 
-use crate::dynamics::{ChannelKind, Method, Place};
 use crate::problem::Problem;
+use crate::record::ChannelKind;
+use crate::system::{Method, Place};
 
 /// The nodes whose values act on some reading.
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {

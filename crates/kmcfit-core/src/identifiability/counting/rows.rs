@@ -3,9 +3,10 @@
 use super::super::components::force_of;
 use super::Statement;
 use super::columns::last_acting;
-use crate::dynamics::{ChannelKind, Method, Place};
 use crate::functions::Basis;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::{ChannelKind, Experiment};
+use crate::system::{Method, Place};
 use std::collections::BTreeMap;
 
 /// Two inputs are independent if this share of one is left beside the others.
@@ -80,7 +81,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
 fn superposes(
     problem: &Problem,
     experiment: &Experiment,
-    channel: &crate::objective::Channel,
+    channel: &crate::record::Channel,
 ) -> bool {
     problem.oscillator.terms.iter().all(|t| t.is_linear())
         && experiment.sought == [None; 2]
@@ -141,7 +142,7 @@ impl Inputs {
             functions.all(|f| f.parameters() == 0 || f.basis == Some(Basis::Nodal))
         });
         let sampled = records.iter().all(|r| {
-            let plain = |c: &&crate::objective::Channel| c.kind() == ChannelKind::Displacement;
+            let plain = |c: &&crate::record::Channel| c.kind() == ChannelKind::Displacement;
             r.channels.len() == 1
                 && r.channels
                     .iter()

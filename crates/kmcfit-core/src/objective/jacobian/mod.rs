@@ -3,12 +3,13 @@
 mod moving;
 mod reader;
 
-use super::{Channel, Evaluation, View};
-use crate::dynamics::{Course, TILE};
-use crate::lanes::LANES;
-use crate::lanes::sum::are_finite;
-use crate::lanes::tall::Piece;
-use crate::problem::{Experiment, LONG, Problem};
+use super::{Evaluation, View};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment, LONG};
+use crate::simd::LANES;
+use crate::simd::sum::are_finite;
+use crate::simd::tall_qr::Piece;
+use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
 use moving::Moving;
 use nalgebra::DMatrix;
 use reader::Reader;
@@ -160,7 +161,7 @@ fn sweep(
         *piece = take(full);
         piece.restart(next);
     };
-    let course = Course {
+    let course = BaseTrajectory {
         oscillator: view.oscillator,
         device: view.device,
         excitation: view.excitation,
@@ -221,9 +222,11 @@ fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
     use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
-    use crate::objective::{GradientKind, Weighting};
+    use crate::objective::GradientKind;
+    use crate::record::ChannelKind;
+    use crate::record::Weighting;
+    use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
 
     const NODES: usize = 70;
 

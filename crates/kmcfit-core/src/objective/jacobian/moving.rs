@@ -1,9 +1,9 @@
 //! Which functions change along which parameter, tile by tile.
 
-use crate::dynamics::{Slot, Steady, TILE_NODES, Tangents};
 use crate::functions::{Design, Functions, Runs};
-use crate::lanes::LANES;
-use crate::problem::Experiment;
+use crate::record::Experiment;
+use crate::simd::LANES;
+use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
 
 /// The functions of an experiment's device that have parameters, and where these stand.
 pub(super) struct Moving<'a> {

@@ -1,9 +1,13 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::dynamics::{Accelerations, Change, FUNCTIONS, Sensed, Steady, TILE, Tangents};
-use crate::lanes::tall::Piece;
-use crate::lanes::{self, Arithmetic, Eight, Kernel, LANES};
-use crate::objective::{Channel, View};
+use crate::objective::View;
+use crate::record::Channel;
+use crate::simd::tall_qr::Piece;
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
+use crate::simulate::Sensed;
+use crate::simulate::fast::nodal_observations::Accelerations;
+use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
+use crate::system::FUNCTIONS;
 use std::ops::Range;
 
 /// Takes the tangents of one channel's readings, tile by tile.
@@ -78,7 +82,7 @@ impl<'a> Reader<'a> {
     /// Takes the readings in the steps `steps`, over which the tangents have just gone, until the `piece` is
     /// full: whether there may be more.
     pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut Piece) -> bool {
-        lanes::run(Read {
+        simd::run(Read {
             reader: self,
             tangents,
             steps,

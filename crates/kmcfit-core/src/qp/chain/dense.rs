@@ -1,6 +1,6 @@
 //! Small dense rows on top of each other.
 
-use crate::lanes::{self, Arithmetic, Kernel};
+use crate::simd::{self, Arithmetic, Kernel};
 
 /// Rows of equal length.
 #[derive(Default)]
@@ -65,7 +65,7 @@ impl Dense {
     /// Reflects the rows `active`, of which the first becomes the only one with an entry in `column`
     /// and of which none has an entry before it.
     pub fn reflect(&mut self, active: &[usize], column: usize, sums: &mut Vec<f64>) {
-        lanes::run(Reflect {
+        simd::run(Reflect {
             rows: self,
             active,
             column,

@@ -5,9 +5,9 @@
 
 use super::reduced::{NARROW, Reduced};
 use super::residuals::Residuals;
-use crate::lanes::tall::{PIECE, Triangle};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simd::tall_qr::{PIECE, Triangle};
 use crate::threads;
 use std::ops::Range;
 

@@ -15,9 +15,10 @@ pub(super) use reduced::Reduced;
 pub(crate) use reduced::weighted_jacobian;
 
 use super::timings::{Timings, timed};
-use crate::objective::{Evaluation, Gradient, Loss};
+use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::record::Loss;
 use penalties::add_soft;
 use reduced::of_whole_jacobian;
 

@@ -1,11 +1,11 @@
 //! The readings linearised by tangent solves and reduced to a triangle, for functions with few parameters.
 
 use super::residuals::Residuals;
-use crate::lanes::LANES;
-use crate::lanes::tall::Triangle;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::simd::LANES;
+use crate::simd::tall_qr::Triangle;
 use crate::solvers::timings::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
 use std::time::{Duration, Instant};

@@ -1,7 +1,8 @@
 //! Weighted residuals of the readings.
 
-use crate::objective::{Channel, Evaluation};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::Channel;
 use std::ops::Range;
 
 /// How the residuals of the readings of all channels are weighed.
@@ -63,8 +64,8 @@ impl Residuals {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::Grid;
-    use crate::objective::Weighting;
+    use crate::record::Weighting;
+    use crate::system::Grid;
 
     /// The squares of the weighted residuals are the cost, in which the readings at both ends count half; some readings
     /// at a time are the same.

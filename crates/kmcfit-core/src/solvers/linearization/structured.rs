@@ -2,11 +2,13 @@
 //! of nodes, for functions with many parameters.
 
 use crate::constraints::Rows;
-use crate::dynamics::{ChannelKind, StepJacobian, Trajectory};
-use crate::objective::{Channel, Evaluation, View};
-use crate::problem::{Experiment, Problem};
+use crate::objective::{Evaluation, View};
+use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::record::{Channel, ChannelKind, Experiment};
 use crate::signal::SecondOrder;
+use crate::simulate::reference::step_jacobians;
+use crate::simulate::{StepJacobian, Trajectory};
 
 /// Entries of a linearised step to make room for: three states, three functions at both ends.
 const ENTRIES: usize = 9;
@@ -15,8 +17,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        let oscillator = &problem.oscillator;
-        oscillator.step_jacobians(view.device, view.excitation, view.motion)
+        step_jacobians(view.oscillator, view.device, view.excitation, view.motion)
     });
     each.collect()
 }

@@ -1,15 +1,15 @@
 use super::halves::Half;
 use super::*;
-use crate::dynamics::{ChannelKind, Excitation, Grid, Method, Oscillator, State, Term};
 use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
-use crate::objective::{Channel, GradientKind, Weighting};
-use crate::problem::Experiment;
+use crate::objective::GradientKind;
+use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::counts::Counts;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
 use crate::solvers::{Fit, fit, fit_from};
+use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
 use crate::threads;
 
 fn fitted(problem: &Problem) -> Fit {

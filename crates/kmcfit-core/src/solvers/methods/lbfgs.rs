@@ -13,11 +13,11 @@
 use super::line_search::{Line, weak_wolfe};
 use super::{Step, StepRule};
 use crate::functions::{Functions, Quantity};
-use crate::lanes::sum::dot;
-use crate::lanes::sum::largest;
-use crate::lanes::{self, Elementwise};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simd::sum::dot;
+use crate::simd::sum::largest;
+use crate::simd::{self, Elementwise};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
@@ -444,7 +444,7 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 fn add_scaled(a: &mut [f64], factor: f64, b: &[f64]) {
-    lanes::run(Elementwise(|| {
+    simd::run(Elementwise(|| {
         for (a, b) in a.iter_mut().zip(b) {
             *a += factor * b;
         }

@@ -7,13 +7,15 @@
 //! functions from anywhere.
 
 use crate::constraints::TOLERANCE;
-use crate::dynamics::{State, Trajectory};
-use crate::objective::{Channel, Evaluation, View};
+use crate::objective::{Evaluation, View};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::record::Channel;
+use crate::simulate::Trajectory;
 use crate::solvers::linearization::linearise_about;
 use crate::solvers::methods::equation_error::{from_motions, with_initial_states};
 use crate::solvers::state_estimation::{Kinematics, by_spline};
+use crate::system::State;
 
 /// Most corrections of the parameters.
 const ROUNDS: usize = 16;

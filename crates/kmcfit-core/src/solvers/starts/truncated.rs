@@ -5,15 +5,16 @@
 //! all of it.
 
 use super::{Referred, reference};
-use crate::dynamics::{Excitation, Grid, Stepwise};
 use crate::functions::{Basis, CoefficientFunction, Functions};
-use crate::problem::{Drive, Experiment, LONG, Problem};
+use crate::problem::Problem;
+use crate::record::{Drive, Experiment, LONG};
 use crate::solvers::checkpoint::Observer;
 use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::timings::Timings;
+use crate::system::{Excitation, Grid, Stepwise};
 use crate::threads;
 use std::time::{Duration, Instant};
 

@@ -9,9 +9,9 @@ mod uniform;
 pub(super) use band_limited::Band;
 pub(super) use spline::kinematics as by_spline;
 
-use crate::dynamics::State;
-use crate::objective::Channel;
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment};
+use crate::system::State;
 
 /// A smooth motion near the readings, at some nodes of the grid.
 pub(super) struct Kinematics {

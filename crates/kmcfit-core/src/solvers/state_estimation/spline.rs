@@ -8,11 +8,12 @@
 
 use super::stencil::weights;
 use super::{Kinematics, noise_level, rms, unsensed};
-use crate::dynamics::{ChannelKind, Place, State, Trajectory};
-use crate::objective::{Channel, Weighting};
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::signal::{Interpolation, Signal, Spectrum};
+use crate::simulate::Trajectory;
+use crate::system::{Place, State};
 use std::f64::consts::TAU;
 
 /// Points of a difference stencil: derivatives are of order 4 or better.

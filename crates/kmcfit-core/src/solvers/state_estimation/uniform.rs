@@ -1,9 +1,9 @@
 //! From displacements at equally spaced nodes: smoothed, then differences of order 4.
 
 use super::{Kinematics, noise_level, rms};
-use crate::dynamics::State;
-use crate::objective::{Channel, Weighting};
 use crate::qp::Subproblem;
+use crate::record::{Channel, Weighting};
+use crate::system::State;
 
 /// Rounds of the search for the smoothing weight: each halves its decimal exponent's interval.
 const ROUNDS: u32 = 14;

@@ -1,7 +1,7 @@
 //! Whether two optima share a valley.
 
-use crate::dynamics::Device;
 use crate::problem::Problem;
+use crate::system::Device;
 
 /// The cost along two paths between two points; infinite where there is no motion.
 #[derive(Debug, Clone, PartialEq)]

@@ -19,8 +19,8 @@ mod walk;
 
 use super::functional::Linear;
 use super::parallel::map;
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 use walk::Walk;
 
 /// The 95 % quantile of chi-square with one degree of freedom.

@@ -2,9 +2,9 @@
 
 use super::{End, FAR, Mark, Profile, ProfileSettings, Verdict};
 use crate::constraints::RowGroup;
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::simulate::Breakdown;
 use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};

@@ -3,9 +3,10 @@
 use super::{Ended, Extreme, Level};
 use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
-use crate::objective::{Channel, Evaluation, Loss};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, Subproblem};
+use crate::record::{Channel, Loss};
 use crate::solvers::{add_priors, linear_readings};
 use crate::study::functional::Target;
 use crate::study::refit::sizes;

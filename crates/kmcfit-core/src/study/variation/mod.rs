@@ -25,8 +25,8 @@ mod reduced;
 
 use super::parallel::map;
 use super::refit::{nearest, settings, sizes};
-use crate::dynamics::Breakdown;
 use crate::problem::Problem;
+use crate::simulate::Breakdown;
 use crate::solvers::fit_from;
 use linearised::Linearised;
 use reduced::Reduced;

@@ -13,10 +13,10 @@ use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
 use crate::error::InputError;
 use crate::units::{Kind, Unit};
-use kmcfit_core::internals::dynamics::{ChannelKind, Grid};
-use kmcfit_core::internals::objective::{Loss, Weighting};
+use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
+use kmcfit_core::internals::system::Grid;
 use noise::{loss, weighting};
 use sampling::{band, decimate, nearly_equal};
 

@@ -5,7 +5,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{ScalarOr, Sigma};
 use crate::config::spec::LossName;
 use crate::error::InputError;
-use kmcfit_core::internals::objective::{Loss, Weighting};
+use kmcfit_core::internals::record::{Loss, Weighting};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
 const HUBER: f64 = 1.345;

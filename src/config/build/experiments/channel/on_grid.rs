@@ -5,11 +5,12 @@ use super::{RawChannel, Spec, spec_of};
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
-use kmcfit_core::internals::dynamics::{ChannelKind, Grid, Surroundings};
 use kmcfit_core::internals::functions::{Scalar, Value};
-use kmcfit_core::internals::objective::{Channel, Sensor, Weighting, integral_over};
-use kmcfit_core::internals::problem::Experiment;
+use kmcfit_core::internals::record::{
+    Channel, ChannelKind, Experiment, Sensor, Weighting, integral_over,
+};
 use kmcfit_core::internals::signal::even_spacing;
+use kmcfit_core::internals::system::{Grid, Surroundings};
 
 /// Puts a channel on the grid.
 pub fn place(

@@ -2,10 +2,10 @@
 
 use super::measured::{Measured, Measurements};
 use super::{Minimum, Purpose, add_rows, device, minimise};
-use crate::dynamics::Device;
 use crate::objective::{Evaluation, Gradient};
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::record::Experiment;
 use crate::solvers::counts::Counts;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
@@ -15,6 +15,7 @@ use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::reason::{Reason, UnsupportedRecord};
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
+use crate::system::Device;
 use std::time::Instant;
 
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.

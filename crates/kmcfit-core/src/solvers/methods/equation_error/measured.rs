@@ -1,12 +1,14 @@
 //! What the readings themselves say of a motion: its state and what drives it, without a simulation.
 
-use crate::dynamics::{ChannelKind, Device, Grid, Place, Stepwise, Trajectory};
 use crate::functions::Functions;
-use crate::objective::{Channel, Loss, View};
-use crate::problem::{Experiment, Problem};
+use crate::objective::View;
+use crate::problem::Problem;
+use crate::record::{Channel, ChannelKind, Experiment, Loss};
 use crate::signal::zero_phase;
+use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
 use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
+use crate::system::{Device, Grid, Place, Stepwise};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
 /// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in

@@ -13,13 +13,14 @@ pub(in crate::solvers) use fit::fit;
 pub use measured::Measurements;
 
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
-use crate::dynamics::quadrature::trapezoid_weights;
-use crate::dynamics::{Device, Place, Term};
-use crate::problem::{Experiment, Problem};
+use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, Subproblem};
+use crate::record::Experiment;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
+use crate::system::quadrature::trapezoid_weights;
+use crate::system::{Device, Place, Term};
 use measured::Measured;
 
 /// A pull towards the start, relative to the equation's own weight: it decides what the equation

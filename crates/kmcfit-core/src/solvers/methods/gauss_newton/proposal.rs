@@ -1,9 +1,10 @@
 //! The step that a linearised problem proposes, and what is predicted of it.
 
 use crate::constraints;
-use crate::objective::{Evaluation, Loss};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
+use crate::record::Loss;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::robust_surplus;

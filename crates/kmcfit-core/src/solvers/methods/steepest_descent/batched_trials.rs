@@ -2,10 +2,12 @@
 //! the lowest one only.
 
 use super::{Best, take, trial};
-use crate::dynamics::{Layout, Method, Ray, Term, Trials, replay};
-use crate::lanes::{LANES, Row};
-use crate::objective::{Evaluation, Weighting};
+use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::Weighting;
+use crate::simd::{LANES, Row};
+use crate::simulate::fast::step_batch::{Layout, Ray, Trials, replay};
+use crate::simulate::{is_linear_midpoint, reference};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 
@@ -81,7 +83,7 @@ fn move_to(
     let motion = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
     let is_whole = replay(device, initial, states, oscillator.grid.step(), motion);
-    if !is_whole && (oscillator.forward_into(device, initial, None, motion)).is_err() {
+    if !is_whole && reference::forward_into(oscillator, device, initial, None, motion).is_err() {
         return false;
     }
     evaluation.predictions[0][0].clone_from(&motion.displacement);
@@ -101,8 +103,7 @@ pub(super) fn ray<'a>(
     let nodes = experiment.nodes;
     let is_integral = matches!(channel.weighting(), Weighting::Integral { .. });
     let fits = is_integral
-        && oscillator.method == Method::Midpoint
-        && oscillator.terms == [Term::Damping, Term::Stiffness]
+        && is_linear_midpoint(oscillator)
         && experiment.excitation.is_none()
         && !problem.is_regularised()
         && point.parameters.len() == 3 * nodes;

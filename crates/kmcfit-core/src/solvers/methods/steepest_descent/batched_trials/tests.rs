@@ -1,10 +1,11 @@
 use super::*;
-use crate::dynamics::{Grid, Oscillator, State};
 use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
-use crate::objective::{Channel, GradientKind};
-use crate::problem::Experiment;
+use crate::objective::GradientKind;
+use crate::record::{Channel, Experiment};
+use crate::simulate::Purpose;
 use crate::solvers::methods::steepest_descent::lengths;
 use crate::solvers::{FitSettings, Solver};
+use crate::system::{Grid, Method, Oscillator, State, Term};
 
 const NODES: usize = 401;
 
@@ -74,7 +75,8 @@ fn steps_are_the_best_of_all_trials() {
         for length in lengths(before) {
             let mut evaluation = problem.workspace();
             let parameters = trial(before, length);
-            let evaluated = problem.evaluate_in_order_into(&parameters, &mut evaluation);
+            let evaluated =
+                problem.evaluate_for(Purpose::Reproduction, &parameters, &mut evaluation);
             if evaluated.is_ok() && evaluation.cost < lowest.0 {
                 lowest = (evaluation.cost, length);
             }
@@ -89,7 +91,7 @@ fn steps_are_the_best_of_all_trials() {
 fn a_motion_does_not_depend_on_its_states() {
     let problem = problem();
     let mut expected = problem.workspace();
-    let evaluated = problem.evaluate_in_order_into(&problem.start(), &mut expected);
+    let evaluated = problem.evaluate_for(Purpose::Reproduction, &problem.start(), &mut expected);
     evaluated.expect("a motion");
     let mut found = problem.workspace();
     for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {

@@ -1,0 +1,181 @@
+//! Accelerations read on every node, eight at a time.
+
+use super::View;
+use crate::record::{Channel, ChannelKind};
+use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
+use crate::simulate::fast::padded_loads;
+use crate::simulate::{Slopes, Trajectory};
+use crate::system::{Excitation, FUNCTIONS};
+
+impl Channel {
+    /// Whether reading `i` is the acceleration at node `i`.
+    pub(super) fn is_acceleration_on_nodes(&self) -> bool {
+        self.is_on_every_node() && self.kind() == ChannelKind::Acceleration
+    }
+
+    /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
+    /// nothing.
+    #[inline(always)]
+    fn around_eight<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        excitation: Option<&Excitation>,
+        i: usize,
+    ) -> [Eight<A>; 2] {
+        if let Some(around) = self.surroundings() {
+            return [0, 1].map(|part| padded_loads::eight(arithmetic, &around[part], i));
+        }
+        let mut rows = [[0.0; LANES]; 2];
+        if excitation.is_some() {
+            let [forces, bases] = &mut rows;
+            let lanes = forces.iter_mut().zip(bases).enumerate();
+            for (l, (force, base)) in lanes.take(self.len() - i) {
+                let around = self.around_reading(excitation, i + l);
+                (*force, *base) = (around.force, around.base);
+            }
+        }
+        rows.map(|row| Eight::load(arithmetic, &row))
+    }
+
+    /// The accelerations on eight nodes from node `i` on.
+    #[inline(always)]
+    pub(super) fn accelerations<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        view: View,
+        i: usize,
+        seen: &mut Accelerations,
+    ) {
+        let nodes = NodalObservations {
+            oscillator: view.oscillator,
+            device: view.device,
+            states: view.motion,
+        };
+        let around = self.around_eight(arithmetic, view.excitation, i);
+        nodes.accelerations(arithmetic, i, around, seen);
+    }
+}
+
+/// Appends what the model says of the readings of `channel`.
+pub(super) struct Predict<'a> {
+    pub channel: &'a Channel,
+    pub view: View<'a>,
+    pub out: &'a mut Vec<f64>,
+}
+
+impl Kernel for Predict<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let Self { channel, view, out } = self;
+        let [gain, offset, drift] = channel.sensor().values(view.scalars);
+        let factor = Eight::splat(arithmetic, gain);
+        let mut seen = Accelerations::NOTHING;
+        for from in (0..channel.len()).step_by(LANES) {
+            let count = LANES.min(channel.len() - from);
+            channel.accelerations(arithmetic, view, from, &mut seen);
+            let mut value = Eight::load(arithmetic, &seen.value);
+            if !channel.base().is_empty() {
+                value += padded_loads::eight(arithmetic, channel.base(), from);
+            }
+            let mut row = (factor * value).row();
+            if (offset, drift) != (0.0, 0.0) {
+                for (l, value) in row.iter_mut().enumerate().take(count) {
+                    *value = *value + offset + drift * channel.age(from + l);
+                }
+            }
+            match count {
+                LANES => out.extend(row),
+                _ => out.extend_from_slice(&row[..count]),
+            }
+        }
+    }
+}
+
+/// [`Channel::add_transpose`] of such readings, after the filter.
+pub(super) struct AddTranspose<'a, 'b> {
+    pub channel: &'a Channel,
+    pub view: View<'a>,
+    pub slopes: &'a [f64],
+    pub source: &'a mut Trajectory,
+    pub direct: &'a mut Slopes<'b>,
+    pub scalars: &'a mut [f64],
+}
+
+impl Kernel for AddTranspose<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let Self {
+            channel,
+            view,
+            slopes,
+            source,
+            direct,
+            scalars,
+        } = self;
+        let [gain, ..] = channel.sensor().values(view.scalars);
+        let sensor = channel.sensor();
+        let seeks = sensor.indices().iter().any(Option::is_some);
+        let factor = Eight::splat(arithmetic, gain);
+        let mut seen = Accelerations::NOTHING;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
+        for (from, slopes) in (0..).step_by(LANES).zip(slopes.chunks(LANES)) {
+            channel.accelerations(arithmetic, view, from, &mut seen);
+            let mut row = [0.0; LANES];
+            row[..slopes.len()].copy_from_slice(slopes);
+            let push = factor * Eight::load(arithmetic, &row);
+            let [by_y, by_v] = &seen.states;
+            let nodes = from..from + slopes.len();
+            add_products(
+                arithmetic,
+                push,
+                by_y,
+                &mut source.displacement[nodes.clone()],
+            );
+            add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
+            match direct {
+                Slopes::AtNodes(device) => {
+                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, &mut values[nodes.clone()]);
+                    }
+                }
+                // Lanes without a reading have no slope.
+                Slopes::Summed(_) => {
+                    for (sums, by) in sums.iter_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, sums);
+                    }
+                }
+            }
+            if seeks {
+                for (l, slope) in slopes.iter().enumerate() {
+                    let i = from + l;
+                    let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
+                    sensor.add_gradient(factors, *slope, scalars);
+                }
+            }
+        }
+        if let Slopes::Summed(all) = direct {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
+            }
+        }
+    }
+}
+
+/// Adds `push * by` to up to eight values.
+#[inline(always)]
+fn add_products<A: Arithmetic>(arithmetic: A, push: Eight<A>, by: &Row, values: &mut [f64]) {
+    let products = push * Eight::load(arithmetic, by);
+    match values.first_chunk_mut::<LANES>() {
+        Some(row) => *row = (Eight::load(arithmetic, row) + products).row(),
+        None => {
+            for (value, product) in values.iter_mut().zip(products.row()) {
+                *value += product;
+            }
+        }
+    }
+}

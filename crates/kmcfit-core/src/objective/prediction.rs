@@ -1,0 +1,182 @@
+//! What the model says of a channel's readings, how that changes, and the transpose.
+
+use super::node_aligned::{AddTranspose, Predict};
+use super::{View, ViewTangent};
+use crate::record::{Channel, ChannelKind, Sensor};
+use crate::signal::{zero_phase, zero_phase_transpose};
+use crate::simd;
+use crate::simulate::reference::{Sensed, observe};
+use crate::simulate::{Slopes, Trajectory};
+use crate::system::Place;
+
+impl Channel {
+    /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
+    pub fn sensed(&self, view: View, i: usize) -> Sensed {
+        let mut sensed = observe(
+            view.oscillator,
+            self.kind(),
+            view.device,
+            view.excitation,
+            view.motion,
+            self.places()[i],
+            self.around_reading(view.excitation, i),
+        );
+        if let Some(base) = self.base().get(i) {
+            sensed.value += base;
+        }
+        sensed
+    }
+
+    /// The value alone of [`Channel::sensed`].
+    fn seen(&self, view: View, i: usize) -> f64 {
+        match (
+            self.kind(),
+            self.places()[i].as_node(),
+            self.base().is_empty(),
+        ) {
+            (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
+            _ => self.sensed(view, i).value,
+        }
+    }
+
+    /// What the model says of the readings.
+    pub fn predict(&self, view: View) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.len());
+        self.predict_into(view, &mut out);
+        out
+    }
+
+    /// [`Channel::predict`] into storage that is used again.
+    pub fn predict_into(&self, view: View, out: &mut Vec<f64>) {
+        out.clear();
+        if self.is_on_every_node() && self.is_plain() {
+            out.extend_from_slice(&view.motion.displacement[..self.len()]);
+            return;
+        }
+        if self.is_acceleration_on_nodes() {
+            let channel = self;
+            out.reserve_exact(self.len());
+            simd::run(Predict { channel, view, out });
+        } else if self.sensor() == Sensor::default() {
+            out.extend((0..self.len()).map(|i| self.seen(view, i)));
+        } else {
+            let [gain, offset, drift] = self.sensor().values(view.scalars);
+            let model = |i: usize| gain * self.seen(view, i) + offset + drift * self.age(i);
+            out.extend((0..self.len()).map(model));
+        }
+        if !self.filter().is_empty() {
+            *out = zero_phase(self.filter(), out);
+        }
+    }
+
+    /// The change of [`Channel::predict`] along a direction.
+    pub fn predict_tangent(&self, view: View, along: ViewTangent) -> Vec<f64> {
+        let [gain, ..] = self.sensor().values(view.scalars);
+        let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
+        let model = |i: usize| {
+            let sensed = self.sensed(view, i);
+            let Place { step, .. } = self.places()[i];
+            let mut change = gain * answer(&sensed, step, along);
+            if by_gain != 0.0 {
+                change += by_gain * sensed.value;
+            }
+            change + by_offset + by_drift * self.age(i)
+        };
+        let out: Vec<f64> = (0..self.len()).map(model).collect();
+        match self.filter().is_empty() {
+            true => out,
+            false => zero_phase(self.filter(), &out),
+        }
+    }
+
+    /// Transpose of [`Channel::predict_tangent`]: takes derivatives of a cost with respect to the
+    /// predictions to `source` (with respect to the states), `direct` (with respect to the functions,
+    /// at fixed states) and `scalars`, adding to each.
+    pub fn add_transpose(
+        &self,
+        view: View,
+        slopes: &[f64],
+        source: &mut Trajectory,
+        direct: &mut Slopes,
+        scalars: &mut [f64],
+    ) {
+        let filtered;
+        let slopes = match self.filter().is_empty() {
+            true => slopes,
+            false => {
+                filtered = zero_phase_transpose(self.filter(), slopes);
+                &filtered
+            }
+        };
+        if self.is_on_every_node() && self.is_plain() {
+            let pairs = source.displacement.iter_mut().zip(slopes);
+            pairs.for_each(|(source, slope)| *source += slope);
+            return;
+        }
+        if self.is_acceleration_on_nodes() {
+            return simd::run(AddTranspose {
+                channel: self,
+                view,
+                slopes,
+                source,
+                direct,
+                scalars,
+            });
+        }
+        let [gain, ..] = self.sensor().values(view.scalars);
+        let indices = self.sensor().indices();
+        let simple = self.kind() == ChannelKind::Displacement && indices == [None; 3];
+        for (i, slope) in slopes.iter().enumerate() {
+            let place = self.places()[i];
+            if let (true, Some(node)) = (simple, place.as_node()) {
+                source.displacement[node] += gain * slope;
+                continue;
+            }
+            let sensed = self.sensed(view, i);
+            spread(&sensed, place.step, gain * slope, source, direct);
+            let factors = [sensed.value, 1.0, self.age(i)];
+            self.sensor().add_gradient(factors, *slope, scalars);
+        }
+    }
+
+    /// Whether the predictions depend on the functions also at fixed states.
+    pub fn sees_functions(&self) -> bool {
+        match self.kind() {
+            ChannelKind::Displacement => false,
+            ChannelKind::Velocity => self.places().iter().any(|p| p.as_node().is_none()),
+            ChannelKind::Acceleration => true,
+        }
+    }
+}
+
+/// The change of what is sensed when the motion and the device change.
+fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
+    let (y, v) = (&along.motion.displacement, &along.motion.velocity);
+    let by_states = sensed.states[0] * y[step]
+        + sensed.states[1] * v[step]
+        + sensed.states[2] * y[step + 1]
+        + sensed.states[3] * v[step + 1];
+    let mut change = by_states;
+    for (f, values) in along.device.functions().enumerate() {
+        for side in 0..2 {
+            let slope = sensed.functions[side][f];
+            if slope != 0.0 {
+                change += slope * values[step + side];
+            }
+        }
+    }
+    change
+}
+
+/// Transpose of [`answer`].
+fn spread(sensed: &Sensed, step: usize, slope: f64, source: &mut Trajectory, direct: &mut Slopes) {
+    for side in 0..2 {
+        source.displacement[step + side] += slope * sensed.states[2 * side];
+        source.velocity[step + side] += slope * sensed.states[2 * side + 1];
+    }
+    for f in 0..direct.functions() {
+        for side in 0..2 {
+            direct.add(f, step + side, slope * sensed.functions[side][f]);
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! A simulated record, and its change along a direction.
+
+use crate::simulate::{Engine, Purpose, Trajectory};
+use crate::system::{Device, DeviceTangent, Excitation, Oscillator};
+
+/// A simulated record.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// Grid, stepper and terms.
+    pub oscillator: &'a Oscillator,
+    /// The device that moves.
+    pub device: &'a Device,
+    /// What drives it.
+    pub excitation: Option<&'a Excitation>,
+    /// Its motion.
+    pub motion: &'a Trajectory,
+    /// Values of all scalars.
+    pub scalars: &'a [f64],
+}
+
+/// How a view changes along a direction.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewTangent<'a> {
+    /// Change of the device.
+    pub device: &'a Device,
+    /// Change of the motion.
+    pub motion: &'a Trajectory,
+    /// Change of the scalars.
+    pub scalars: &'a [f64],
+}
+
+impl View<'_> {
+    /// The engine of its response and derivatives.
+    pub(crate) fn engine(&self) -> Engine {
+        let nodes = self.motion.nodes();
+        Engine::choose(self.oscillator, self.excitation, nodes, Purpose::Estimation)
+    }
+
+    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
+    pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> DeviceTangent {
+        let Self {
+            oscillator,
+            device,
+            excitation,
+            motion,
+            ..
+        } = self;
+        (self.engine()).discrete_adjoint(oscillator, device, *excitation, motion, source)
+    }
+}

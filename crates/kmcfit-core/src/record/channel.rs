@@ -1,0 +1,359 @@
+//! One channel of a record: the samples of one sensor.
+
+use super::{ChannelKind, Loss, Sensor, Weighting};
+use crate::signal::{SecondOrder, zero_phase};
+use crate::system::{Excitation, Grid, Place, Surroundings};
+
+/// The readings of one sensor.
+///
+/// The model of reading `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
+/// displacement, velocity or acceleration of the motion ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the
+/// base where the sensor does not move with it, and `t_0` the time of the first reading. With a
+/// filter, model and readings are filtered alike before they are compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    kind: ChannelKind,
+    times: Vec<f64>,
+    places: Vec<Place>,
+    observed: Vec<f64>,
+    /// The readings before the filter; none without one.
+    unfiltered: Vec<f64>,
+    weighting: Weighting,
+    loss: Loss,
+    sensor: Sensor,
+    /// Forces and accelerations of the base at the readings, if they are given.
+    around: Option<[Vec<f64>; 2]>,
+    base: Vec<f64>,
+    filter: Vec<SecondOrder>,
+    /// Whether reading `i` stands on node `i`.
+    on_every_node: bool,
+}
+
+impl Channel {
+    /// Readings `values` (in the SI unit of `kind`) at `times` (s, increasing), a motion over the
+    /// first `nodes` nodes of `grid`; `None` unless there is a reading, one time for each, and all
+    /// times are within the motion.
+    pub fn new(
+        kind: ChannelKind,
+        times: Vec<f64>,
+        values: Vec<f64>,
+        weighting: Weighting,
+        grid: &Grid,
+        nodes: usize,
+    ) -> Option<Self> {
+        let place = |t: &f64| {
+            let place = Place::of(grid, *t)?;
+            match place.as_node() {
+                Some(node) => (node < nodes).then(|| Place::node(node, nodes)),
+                None => (place.step + 1 < nodes).then_some(place),
+            }
+        };
+        let places: Option<Vec<Place>> = times.iter().map(place).collect();
+        let fits = times.len() == values.len() && !values.is_empty();
+        let places = places?;
+        let on_every_node = (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i));
+        fits.then_some(Self {
+            kind,
+            on_every_node,
+            places,
+            times,
+            observed: values,
+            unfiltered: Vec::new(),
+            weighting,
+            loss: Loss::Squares,
+            sensor: Sensor::default(),
+            around: None,
+            base: Vec::new(),
+            filter: Vec::new(),
+        })
+    }
+
+    /// Displacements `values` (m) at the nodes `0, stride, 2 stride, ...` of `grid`.
+    ///
+    /// # Panics
+    /// If `stride` is zero, there are no values, or they do not fit on the grid.
+    pub fn displacement_at_nodes(
+        values: Vec<f64>,
+        stride: usize,
+        weighting: Weighting,
+        grid: &Grid,
+    ) -> Self {
+        let times = (0..values.len()).map(|i| grid.time(i * stride)).collect();
+        let kind = ChannelKind::Displacement;
+        let channel = Self::new(kind, times, values, weighting, grid, grid.nodes());
+        let channel = channel.expect("readings on the nodes of the grid");
+        assert!(stride > 0, "readings advance");
+        channel
+    }
+
+    /// With what a residual costs; only readings with a sigma can have another loss than squares.
+    ///
+    /// # Panics
+    /// If a robust loss meets readings without a sigma.
+    #[must_use]
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        assert!(
+            loss == Loss::Squares || self.weighting.is_sigma(),
+            "a robust loss needs a sigma"
+        );
+        self.loss = loss;
+        self
+    }
+
+    /// With gain, offset and drift.
+    #[must_use]
+    pub fn with_sensor(mut self, sensor: Sensor) -> Self {
+        self.sensor = sensor;
+        self
+    }
+
+    /// With force and acceleration of the base at the times of the readings, which an acceleration
+    /// depends on; without them both are taken as linear over each step.
+    ///
+    /// # Panics
+    /// If there is not one for each reading.
+    #[must_use]
+    pub fn with_surroundings(mut self, around: Vec<Surroundings>) -> Self {
+        assert_eq!(around.len(), self.times.len(), "one for each reading");
+        let forces = around.iter().map(|a| a.force).collect();
+        let bases = around.iter().map(|a| a.base).collect();
+        self.around = Some([forces, bases]);
+        self
+    }
+
+    /// With the motion of the base (of the channel's kind) added to the relative one: a sensor on
+    /// the mass that does not move with the base.
+    ///
+    /// # Panics
+    /// If there is not one for each reading.
+    #[must_use]
+    pub fn with_base(mut self, base: Vec<f64>) -> Self {
+        assert_eq!(base.len(), self.times.len(), "one for each reading");
+        self.base = base;
+        self
+    }
+
+    /// With a zero-phase filter for readings and model; the readings given so far are filtered.
+    #[must_use]
+    pub fn with_filter(mut self, filter: Vec<SecondOrder>) -> Self {
+        if self.unfiltered.is_empty() {
+            self.unfiltered = std::mem::take(&mut self.observed);
+        }
+        self.filter = filter;
+        self.filter_readings();
+        self
+    }
+
+    /// With other readings: `predicted`, as the model says them (after the filter), plus `noise` as a
+    /// sensor adds it (before the filter).
+    ///
+    /// # Panics
+    /// If there is not one of each for every reading.
+    #[must_use]
+    pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
+        assert_eq!(predicted.len(), self.len(), "one for each reading");
+        assert_eq!(noise.len(), self.len(), "one for each reading");
+        let filtered = match self.filter.is_empty() {
+            true => noise.to_vec(),
+            false => zero_phase(&self.filter, noise),
+        };
+        let pairs = predicted.iter().zip(&filtered);
+        self.observed = pairs.map(|(y, e)| y + e).collect();
+        self.unfiltered.clear();
+        self
+    }
+
+    fn filter_readings(&mut self) {
+        if !self.unfiltered.is_empty() {
+            self.observed = zero_phase(&self.filter, &self.unfiltered);
+        }
+    }
+
+    /// With the weighting exchanged.
+    #[must_use]
+    pub fn with_weighting(mut self, weighting: Weighting) -> Self {
+        self.weighting = weighting;
+        self
+    }
+
+    /// The first `count` readings, at least one; filtered as if there had been no more.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Self {
+        let count = count.max(1);
+        let short = |list: &[f64]| list[..count.min(list.len())].to_vec();
+        let mut weighting = self.weighting.clone();
+        weighting.truncate(count);
+        let mut part = Self {
+            kind: self.kind,
+            times: short(&self.times),
+            places: self.places[..count.min(self.len())].to_vec(),
+            observed: short(&self.observed),
+            unfiltered: short(&self.unfiltered),
+            weighting,
+            loss: self.loss,
+            sensor: self.sensor,
+            around: (self.around.as_ref()).map(|parts| parts.each_ref().map(|p| short(p))),
+            base: short(&self.base),
+            filter: self.filter.clone(),
+            on_every_node: self.on_every_node,
+        };
+        part.filter_readings();
+        part
+    }
+
+    /// The readings within the first `steps` steps, if there are any; what stands on the node behind them
+    /// belongs to the next.
+    pub(crate) fn within(&self, steps: usize) -> Option<Self> {
+        let count = self.count_within(steps);
+        (count > 0).then(|| self.first(count))
+    }
+
+    /// How many readings [`Channel::within`] takes.
+    pub(crate) fn count_within(&self, steps: usize) -> usize {
+        self.places.partition_point(|p| p.step < steps)
+    }
+
+    /// The same readings on another grid over the same time; `None` if they are not all on it.
+    pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
+        let unfiltered = Self::new(
+            self.kind,
+            self.times.clone(),
+            self.observed.clone(),
+            self.weighting.clone(),
+            grid,
+            nodes,
+        )?;
+        Some(Self {
+            places: unfiltered.places,
+            on_every_node: unfiltered.on_every_node,
+            ..self.clone()
+        })
+    }
+
+    /// What is measured.
+    pub fn kind(&self) -> ChannelKind {
+        self.kind
+    }
+
+    /// Times of the readings, s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Where they are on the grid.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// The readings, filtered if the channel has a filter, in the SI unit of the kind.
+    pub fn observed(&self) -> &[f64] {
+        &self.observed
+    }
+
+    /// Number of readings; at least one.
+    pub fn len(&self) -> usize {
+        self.observed.len()
+    }
+
+    /// Never: a channel has a reading.
+    pub fn is_empty(&self) -> bool {
+        self.observed.is_empty()
+    }
+
+    /// How residuals are weighed.
+    pub fn weighting(&self) -> &Weighting {
+        &self.weighting
+    }
+
+    /// What a residual costs.
+    pub fn loss(&self) -> Loss {
+        self.loss
+    }
+
+    /// Gain, offset and drift.
+    pub fn sensor(&self) -> Sensor {
+        self.sensor
+    }
+
+    /// The filter's sections; none for no filter.
+    pub fn filter(&self) -> &[SecondOrder] {
+        &self.filter
+    }
+
+    /// Force and base at reading `i`: as given, or else linear over the step.
+    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
+        match (&self.around, excitation) {
+            (Some([forces, bases]), _) => Surroundings {
+                force: forces[i],
+                base: bases[i],
+            },
+            (None, Some(excitation)) => excitation.around(self.places[i]),
+            (None, None) => Surroundings::default(),
+        }
+    }
+
+    /// [`Channel::base_at`] every reading; empty for none.
+    #[inline(always)]
+    pub(crate) fn base(&self) -> &[f64] {
+        &self.base
+    }
+
+    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
+    /// with the base.
+    pub fn base_at(&self, i: usize) -> f64 {
+        self.base.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Time since the first reading, s.
+    pub fn age(&self, i: usize) -> f64 {
+        self.times[i] - self.times[0]
+    }
+
+    /// Whether the readings are displacements of a plain sensor, and nothing is between model and
+    /// readings.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.kind == ChannelKind::Displacement
+            && self.sensor == Sensor::default()
+            && self.base.is_empty()
+            && self.filter.is_empty()
+    }
+
+    /// Whether all readings are displacements at nodes.
+    pub(crate) fn is_displacement_at_nodes(&self) -> bool {
+        let all = || self.places.iter().all(|p| p.as_node().is_some());
+        self.kind == ChannelKind::Displacement && (self.on_every_node || all())
+    }
+
+    /// Whether reading `i` stands on node `i`.
+    pub(crate) fn is_on_every_node(&self) -> bool {
+        self.on_every_node
+    }
+
+    /// Forces and accelerations of the base at the readings, if they are given.
+    #[inline(always)]
+    pub(crate) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
+        self.around.as_ref()
+    }
+
+    /// What the filter makes of a series over the readings.
+    pub(crate) fn filtered(&self, series: &[f64]) -> Vec<f64> {
+        zero_phase(&self.filter, series)
+    }
+
+    /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
+    /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
+    pub fn stride(&self) -> Option<usize> {
+        if self.is_plain() && self.on_every_node {
+            return Some(1);
+        }
+        if !self.is_plain() || self.places[0].as_node() != Some(0) {
+            return None;
+        }
+        let stride = match self.places.get(1) {
+            Some(place) => place.as_node()?,
+            None => 1,
+        };
+        let in_place = |(i, place): (usize, &Place)| place.as_node() == Some(i * stride);
+        (self.places.iter().enumerate().all(in_place)).then_some(stride)
+    }
+}

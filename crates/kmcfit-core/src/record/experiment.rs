@@ -1,0 +1,100 @@
+//! One record: input, initial state and channels.
+
+use super::{Channel, Drive};
+use crate::system::{Excitation, Grid, State};
+
+/// One record of a device's motion.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Name for reports.
+    pub name: String,
+    /// Displacement and velocity at the first node; where they are sought, the start of the search.
+    pub initial: State,
+    /// The scalars that displacement and velocity at the first node are, where they are sought.
+    pub sought: [Option<usize>; 2],
+    /// What drives the motion, on the grid; `None` is free motion.
+    pub excitation: Option<Excitation>,
+    /// What it was made from; empty where it was given on the grid.
+    pub drive: Drive,
+    /// Number of nodes of its motion: a record may end before the grid does.
+    pub nodes: usize,
+    /// Which device of [`Functions::assemblies`] moves.
+    pub device: usize,
+    /// What was measured; none for an experiment that is only simulated.
+    pub channels: Vec<Channel>,
+}
+
+impl Experiment {
+    /// Free motion of the main device over `nodes` nodes from a known state, without readings.
+    pub fn free(name: impl Into<String>, initial: State, nodes: usize) -> Self {
+        Self {
+            name: name.into(),
+            initial,
+            sought: [None; 2],
+            excitation: None,
+            drive: Drive::default(),
+            nodes,
+            device: 0,
+            channels: Vec::new(),
+        }
+    }
+
+    /// With one more channel of readings.
+    #[must_use]
+    pub fn with_channel(mut self, channel: Channel) -> Self {
+        self.channels.push(channel);
+        self
+    }
+
+    /// Under an excitation.
+    #[must_use]
+    pub fn with_excitation(mut self, excitation: Excitation) -> Self {
+        self.excitation = Some(excitation);
+        self
+    }
+
+    /// The state at the first node, for the values `scalars` of all scalars.
+    pub fn initial_state(&self, scalars: &[f64]) -> State {
+        let value = |sought: Option<usize>, known: f64| sought.map_or(known, |i| scalars[i]);
+        State {
+            displacement: value(self.sought[0], self.initial.displacement),
+            velocity: value(self.sought[1], self.initial.velocity),
+        }
+    }
+
+    /// The same experiment on a grid of half the step; `None` if its readings are not on it. An
+    /// excitation that was given on the old grid is linear between its stages.
+    pub fn halved(&self, grid: &Grid) -> Option<Self> {
+        let nodes = 2 * self.nodes - 1;
+        let channels: Option<Vec<Channel>> =
+            self.channels.iter().map(|c| c.on(grid, nodes)).collect();
+        let excitation = self
+            .excitation
+            .as_ref()
+            .map(|old| match self.drive == Drive::default() {
+                false => self.drive.on(grid, nodes),
+                true => old.halved(),
+            });
+        Some(Self {
+            channels: channels?,
+            excitation,
+            nodes,
+            ..self.clone()
+        })
+    }
+
+    /// Whether nothing drives the motion.
+    pub fn is_free(&self) -> bool {
+        self.excitation.as_ref().is_none_or(Excitation::is_zero)
+    }
+
+    /// Whether anything was measured.
+    pub fn is_read(&self) -> bool {
+        !self.channels.is_empty()
+    }
+
+    /// Number of readings of all channels.
+    pub fn reading_count(&self) -> usize {
+        self.channels.iter().map(Channel::len).sum()
+    }
+}

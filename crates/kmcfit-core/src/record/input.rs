@@ -1,0 +1,88 @@
+//! Inputs over time, from which the excitation on any grid is made.
+
+use super::ChannelKind;
+use crate::signal::{Shape, Signal};
+use crate::system::{Excitation, Grid, Stepwise};
+
+/// A force over time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Waveform {
+    /// Measured, N.
+    Samples(Signal),
+    /// A formula, N.
+    Shape(Shape),
+}
+
+/// A measured motion of the base.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BaseMotion {
+    /// Its acceleration, m/s^2.
+    Acceleration(Signal),
+    /// Its displacement, m, as a smooth function: it is differentiated twice.
+    Displacement(Signal),
+}
+
+/// What drives a motion, at any time: from it the excitation on any grid is made.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Drive {
+    /// The force.
+    pub force: Option<Waveform>,
+    /// The motion of the base.
+    pub base: Option<BaseMotion>,
+}
+
+impl Drive {
+    /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
+    pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
+        let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
+            let step = |i: usize| {
+                let (left, right) = (grid.time(i), grid.time(i + 1));
+                [at(left), at(0.5 * (left + right)), before(right)]
+            };
+            Stepwise::new((0..nodes - 1).map(step).collect())
+        };
+        Excitation {
+            force: self.force.as_ref().map(|force| match force {
+                Waveform::Samples(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+            }),
+            base: self.base.as_ref().map(|base| match base {
+                BaseMotion::Acceleration(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                BaseMotion::Displacement(s) => {
+                    sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
+                }
+            }),
+        }
+    }
+
+    /// The force at time `t` (s), N.
+    pub fn force_at(&self, t: f64) -> f64 {
+        match &self.force {
+            None => 0.0,
+            Some(Waveform::Samples(signal)) => signal.value(t),
+            Some(Waveform::Shape(shape)) => shape.value(t),
+        }
+    }
+
+    /// The acceleration of the base at time `t` (s), m/s^2.
+    pub fn base_acceleration_at(&self, t: f64) -> f64 {
+        self.base_motion_at(ChannelKind::Acceleration, t)
+            .unwrap_or(0.0)
+    }
+
+    /// The motion of the base at time `t` (s) in the SI unit of `kind`; `None` where it is not known.
+    pub fn base_motion_at(&self, kind: ChannelKind, t: f64) -> Option<f64> {
+        match (&self.base, kind) {
+            (None, _) => Some(0.0),
+            (Some(BaseMotion::Acceleration(signal)), ChannelKind::Acceleration) => {
+                Some(signal.value(t))
+            }
+            (Some(BaseMotion::Acceleration(_)), _) => None,
+            (Some(BaseMotion::Displacement(signal)), kind) => Some(match kind {
+                ChannelKind::Displacement => signal.value(t),
+                ChannelKind::Velocity => signal.derivative(t),
+                ChannelKind::Acceleration => signal.second_derivative(t),
+            }),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! How far the predictions are from the readings, and what that costs.
+
+use super::{Channel, LONG, Loss, Weighting};
+use crate::simd::sum::squared_distance;
+use crate::system::quadrature::trapezoid_weights_at;
+use std::ops::Range;
+
+impl Channel {
+    /// Residuals `r = model - reading`, one per reading.
+    pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        predicted.iter().zip(self.observed()).map(|(y, o)| y - o)
+    }
+
+    /// The residuals of some readings.
+    pub(crate) fn residuals_of<'a>(
+        &'a self,
+        predicted: &'a [f64],
+        readings: Range<usize>,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let pairs = predicted[readings.clone()].iter();
+        pairs.zip(&self.observed()[readings]).map(|(y, o)| y - o)
+    }
+
+    /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or
+    /// `sum rho(r / sigma)`.
+    ///
+    /// The equally spaced integral sums in the paper's order, both ends first: its run depends on
+    /// every bit. Many squares are summed in lanes.
+    pub fn cost(&self, predicted: &[f64]) -> f64 {
+        if let Weighting::Integral { spacing } = self.weighting() {
+            let square = |i: usize| {
+                let r = predicted[i] - self.observed()[i];
+                r * r
+            };
+            let last = self.len() - 1;
+            let ends = spacing * 0.5 * (square(0) + square(last));
+            return (1..last).fold(ends, |sum, i| sum + spacing * 0.5 * (2.0 * square(i)));
+        }
+        if let Weighting::Sigma(sigma) | Weighting::Estimated { sigma } = self.weighting()
+            && self.loss() == Loss::Squares
+            && self.len() >= LONG
+        {
+            return squared_distance(predicted, self.observed(), 1.0 / sigma);
+        }
+        let terms = self.residuals(predicted).enumerate();
+        terms
+            .map(|(i, r)| match self.weighting().sigma(i) {
+                Some(sigma) => self.loss().cost(r / sigma),
+                None => self.weighting().weight(i, self.len()) * r * r,
+            })
+            .sum()
+    }
+
+    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
+    /// the difference of two rounded costs would be lost in their rounding.
+    pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
+        let pairs = from.iter().zip(to).zip(self.observed()).enumerate();
+        let difference = |(i, ((y, moved), observed)): (usize, ((&f64, &f64), &f64))| match (
+            self.loss(),
+            self.weighting().sigma(i),
+        ) {
+            (Loss::Squares, _) | (_, None) => {
+                let weight = self.weighting().weight(i, self.len());
+                weight * (moved - y) * ((moved - observed) + (y - observed))
+            }
+            (loss, Some(sigma)) => {
+                loss.cost((moved - observed) / sigma) - loss.cost((y - observed) / sigma)
+            }
+        };
+        pairs.map(difference).sum()
+    }
+
+    /// The weights of the readings within and at both ends, if the cost is a sum of squares and all
+    /// within have the same.
+    pub fn uniform_weights(&self) -> Option<[f64; 2]> {
+        match (self.weighting(), self.loss()) {
+            (Weighting::Integral { spacing }, _) => Some([*spacing, 0.5 * spacing]),
+            (Weighting::Sigma(sigma) | Weighting::Estimated { sigma }, Loss::Squares) => {
+                Some([1.0 / (sigma * sigma); 2])
+            }
+            _ => None,
+        }
+    }
+
+    /// Weight of the residual `r` of reading `i` in the least-squares problem that has the gradient
+    /// of the cost: `sum w r^2`.
+    pub fn weight(&self, i: usize, r: f64) -> f64 {
+        let weight = self.weighting().weight(i, self.len());
+        match (self.loss(), self.weighting().sigma(i)) {
+            (Loss::Squares, _) | (_, None) => weight,
+            (loss, Some(sigma)) => weight * loss.weight(r / sigma),
+        }
+    }
+
+    /// `dJ/d model = 2 w r` of every reading.
+    pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
+        if let Some([inner, ends]) = self.uniform_weights() {
+            let residuals = self.residuals(predicted);
+            let mut slopes: Vec<f64> = residuals.map(|r| 2.0 * inner * r).collect();
+            let last = self.len() - 1;
+            for i in [0, last] {
+                slopes[i] = 2.0 * ends * (predicted[i] - self.observed()[i]);
+            }
+            return slopes;
+        }
+        let residuals = self.residuals(predicted).enumerate();
+        residuals
+            .map(|(i, r)| 2.0 * self.weight(i, r) * r)
+            .collect()
+    }
+}
+
+/// Weights of the trapezoid rule over times that need not be equally spaced: the paper's cost for
+/// irregular readings.
+pub fn integral_over(times: &[f64]) -> Weighting {
+    Weighting::Trapezoid(trapezoid_weights_at(times))
+}

@@ -1,0 +1,22 @@
+//! Measured records: inputs, channels, sensors and noise models.
+
+mod channel;
+mod experiment;
+mod input;
+mod kind;
+mod loss;
+mod misfit;
+mod sensor;
+mod weighting;
+
+pub use channel::Channel;
+pub use experiment::Experiment;
+pub use input::{BaseMotion, Drive, Waveform};
+pub use kind::ChannelKind;
+pub use loss::Loss;
+pub use misfit::integral_over;
+pub use sensor::Sensor;
+pub use weighting::Weighting;
+
+/// Steps from which on a record is long: it is then worth being gone through in parts.
+pub(crate) const LONG: usize = 1 << 15;

@@ -1,0 +1,56 @@
+//! What a sensor makes of the motion that it sees.
+
+use crate::functions::Value;
+
+/// Reading `= gain * motion + offset + drift * time`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensor {
+    /// Factor, without unit.
+    pub gain: Value,
+    /// Reading at rest, in the unit of the channel.
+    pub offset: Value,
+    /// Change of the offset, in the unit of the channel per s.
+    pub drift: Value,
+}
+
+impl Default for Sensor {
+    /// A perfect sensor.
+    fn default() -> Self {
+        Self {
+            gain: Value::Known(1.0),
+            offset: Value::Known(0.0),
+            drift: Value::Known(0.0),
+        }
+    }
+}
+
+impl Sensor {
+    fn list(self) -> [Value; 3] {
+        [self.gain, self.offset, self.drift]
+    }
+
+    /// Gain, offset and drift for the values `scalars` of all scalars.
+    pub fn values(self, scalars: &[f64]) -> [f64; 3] {
+        self.list().map(|value| value.of(scalars))
+    }
+
+    /// Their changes along a change of the scalars.
+    pub fn changes(self, scalars: &[f64]) -> [f64; 3] {
+        self.indices()
+            .map(|index| index.map_or(0.0, |i| scalars[i]))
+    }
+
+    /// Which scalars they are, where they are sought.
+    pub fn indices(self) -> [Option<usize>; 3] {
+        self.list().map(Value::index)
+    }
+
+    /// Adds the gradient with respect to the scalars: `slope` times the `factors` of gain, offset and drift.
+    pub(crate) fn add_gradient(self, factors: [f64; 3], slope: f64, scalars: &mut [f64]) {
+        for (index, factor) in self.indices().into_iter().zip(factors) {
+            if let Some(index) = index {
+                scalars[index] += slope * factor;
+            }
+        }
+    }
+}

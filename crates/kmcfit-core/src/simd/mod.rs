@@ -1,0 +1,373 @@
+//! Eight numbers at a time, with whatever the processor offers for it.
+//!
+//! A kernel ([`Kernel`]) is written once, in terms of [`Eight`], and compiled for AVX-512, for
+//! AVX2 and for plain numbers; which of them runs is decided when the program runs. All do the same IEEE
+//! operations on the same eight lanes in the same order and none contracts a product and a sum, so
+//! **all give the same bits**: the processor decides how fast an answer comes, never what it is. Two things are there for
+//! speed alone and may differ, [`Eight::quotients`] and [`Eight::reciprocal`]: who uses them sees to it that what comes
+//! out does not.
+//!
+//! [`pulp`] proves the presence of instructions by its types, so there is no `unsafe` here.
+
+mod portable;
+pub(crate) mod sum;
+pub(crate) mod tall_qr;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+use portable::Portable;
+use std::ffi::OsString;
+use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub};
+use std::sync::LazyLock;
+
+/// Number of lanes.
+pub(crate) const LANES: usize = 8;
+
+/// One value a lane, in memory.
+pub(crate) type Row = [f64; LANES];
+
+/// What lies on a boundary of 64 bytes, so that no row in it stands across two lines of the processor's memory: to read a
+/// row that has just been written takes several times as long there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Aligned<T>(pub T);
+
+impl<T> Deref for Aligned<T> {
+    type Target = T;
+
+    #[inline(always)]
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Aligned<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
+/// Arithmetic on [`LANES`] numbers at once.
+pub(crate) trait Arithmetic: Copy {
+    /// The numbers, in registers.
+    type Registers: Copy;
+    /// Arithmetic on the first four of them alone, where that takes half the time.
+    type Half: Arithmetic;
+    fn half(self) -> Self::Half;
+    fn splat(self, x: f64) -> Self::Registers;
+    fn load(self, row: &Row) -> Self::Registers;
+    fn store(self, x: Self::Registers) -> Row;
+    fn add(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    /// The larger of two, or `b` where one of them is no number.
+    fn larger(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    /// Whether there is an instruction for a product and a sum that are rounded once.
+    const IS_FUSED: bool;
+    /// `1 / d`, and what its rounding has lost; zeros, and no work, without that instruction.
+    #[inline(always)]
+    fn reciprocal(self, _: Self::Registers) -> [Self::Registers; 2] {
+        [self.splat(0.0); 2]
+    }
+    /// `a / d` and `b / d`: see [`Eight::quotients`].
+    #[inline(always)]
+    fn quotients(self, [a, b]: [Self::Registers; 2], d: Self::Registers) -> [Self::Registers; 2] {
+        [self.div(a, d), self.div(b, d)]
+    }
+    /// Rows to columns.
+    #[inline(always)]
+    fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES] {
+        let rows = rows.map(|row| self.store(row));
+        std::array::from_fn(|i| self.load(&std::array::from_fn(|j| rows[j][i])))
+    }
+}
+
+/// Eight numbers with operators.
+#[derive(Clone, Copy)]
+pub(crate) struct Eight<A: Arithmetic> {
+    arithmetic: A,
+    registers: A::Registers,
+}
+
+impl<A: Arithmetic> Eight<A> {
+    #[inline(always)]
+    pub fn splat(arithmetic: A, x: f64) -> Self {
+        Self {
+            arithmetic,
+            registers: arithmetic.splat(x),
+        }
+    }
+
+    #[inline(always)]
+    pub fn load(arithmetic: A, row: &Row) -> Self {
+        Self {
+            arithmetic,
+            registers: arithmetic.load(row),
+        }
+    }
+
+    #[inline(always)]
+    pub fn row(self) -> Row {
+        self.arithmetic.store(self.registers)
+    }
+
+    /// Rows to columns.
+    #[inline(always)]
+    pub fn transpose(arithmetic: A, rows: [Self; LANES]) -> [Self; LANES] {
+        let mut registers = [rows[0].registers; LANES];
+        for (registers, row) in registers.iter_mut().zip(rows) {
+            *registers = row.registers;
+        }
+        let mut columns = rows;
+        for (column, registers) in columns.iter_mut().zip(arithmetic.transpose(registers)) {
+            column.registers = registers;
+        }
+        columns
+    }
+
+    /// The larger of two, or the second where one of them is no number.
+    #[inline(always)]
+    pub fn larger(self, other: Self) -> Self {
+        Self {
+            registers: self.arithmetic.larger(self.registers, other.registers),
+            ..self
+        }
+    }
+
+    /// `1 / d`, and what its rounding has lost to within `2^-105` of it; zeros where there are no fused products
+    /// and sums ([`Arithmetic::IS_FUSED`]).
+    #[inline(always)]
+    pub fn reciprocal(self) -> [Self; 2] {
+        let [reciprocal, lost] = self.arithmetic.reciprocal(self.registers);
+        [
+            Self {
+                registers: reciprocal,
+                ..self
+            },
+            Self {
+                registers: lost,
+                ..self
+            },
+        ]
+    }
+
+    /// `a / d` and `b / d`, with one division and multiplications where that is faster: quotients that are off by less than
+    /// `2^-50` of a unit in the last place are rounded, so that they have the bits of two divisions but where the exact one
+    /// is as near as that to the middle between two numbers. The divisors are between `2^-300` and `2^300` and the
+    /// numerators zero or between `2^-600` and `2^600` in size; a zero may have the other sign. Of smaller numerators more
+    /// bits may differ, of larger ones what is not finite.
+    #[inline(always)]
+    pub fn quotients(a: Self, b: Self, d: Self) -> [Self; 2] {
+        let [a, b] = (d.arithmetic).quotients([a.registers, b.registers], d.registers);
+        [Self { registers: a, ..d }, Self { registers: b, ..d }]
+    }
+}
+
+/// Rows to columns, in memory.
+#[inline(always)]
+pub(crate) fn transposed<A: Arithmetic>(arithmetic: A, rows: &[Row; LANES]) -> [Row; LANES] {
+    let mut eights = [Eight::splat(arithmetic, 0.0); LANES];
+    for (eight, row) in eights.iter_mut().zip(rows) {
+        *eight = Eight::load(arithmetic, row);
+    }
+    let mut columns = [[0.0; LANES]; LANES];
+    for (column, eight) in columns.iter_mut().zip(Eight::transpose(arithmetic, eights)) {
+        *column = eight.row();
+    }
+    columns
+}
+
+/// Eight values from the one at `from` on; behind the end the last again.
+#[inline(always)]
+pub(crate) fn window(f: &[f64], from: usize) -> Row {
+    if let Some(row) = f.get(from..).and_then(|f| f.first_chunk()) {
+        return *row;
+    }
+    let mut row = [0.0; LANES];
+    for (i, x) in (from..).zip(&mut row) {
+        *x = f[i.min(f.len() - 1)];
+    }
+    row
+}
+
+macro_rules! operator {
+    ($trait:ident, $name:ident) => {
+        impl<A: Arithmetic> $trait for Eight<A> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                Self {
+                    registers: self.arithmetic.$name(self.registers, other.registers),
+                    ..self
+                }
+            }
+        }
+    };
+}
+
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<A: Arithmetic> AddAssign for Eight<A> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<A: Arithmetic> Neg for Eight<A> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self::splat(self.arithmetic, -1.0) * self
+    }
+}
+
+/// Work that is done in eight lanes.
+pub(crate) trait Kernel {
+    /// What it gives.
+    type Output;
+
+    /// Does it. Must be `#[inline(always)]`, like all that it calls, to be compiled for the
+    /// instructions of `arithmetic`.
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output;
+}
+
+/// The variable of the environment that holds the arithmetic down: `AVX-512`, `AVX2` or `scalar`. What comes
+/// out is the same; it is for tests, and for processors that are slower with wide registers.
+pub const LIMIT: &str = "KMCFIT_ARITHMETIC";
+
+/// How wide the registers may be.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Width {
+    Scalar,
+    Avx2,
+    Avx512,
+}
+
+impl Width {
+    const ALL: [Width; 3] = [Width::Scalar, Width::Avx2, Width::Avx512];
+
+    fn name(self) -> &'static str {
+        match self {
+            Width::Scalar => "scalar",
+            Width::Avx2 => "AVX2",
+            Width::Avx512 => "AVX-512",
+        }
+    }
+
+    /// What this processor has.
+    fn here() -> Width {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if x86::Avx512::find().is_some() {
+                return Width::Avx512;
+            }
+            if x86::Avx2::find().is_some() {
+                return Width::Avx2;
+            }
+        }
+        Width::Scalar
+    }
+
+    /// What is used: the widest that there is, within the limit if there is a good one.
+    fn used() -> Width {
+        static USED: LazyLock<Width> = LazyLock::new(|| {
+            limit()
+                .ok()
+                .flatten()
+                .unwrap_or(Width::Avx512)
+                .min(Width::here())
+        });
+        *USED
+    }
+}
+
+/// The limit that [`LIMIT`] sets; its text where that is no arithmetic.
+fn limit() -> Result<Option<Width>, String> {
+    parse_limit(std::env::var_os(LIMIT))
+}
+
+/// The limit of a text. An empty one sets none, like a variable that is not set: shells and job
+/// files clear a variable so.
+fn parse_limit(text: Option<OsString>) -> Result<Option<Width>, String> {
+    let Some(text) = text.filter(|text| !text.is_empty()) else {
+        return Ok(None);
+    };
+    let named = |width: &Width| text.eq_ignore_ascii_case(width.name());
+    match Width::ALL.into_iter().find(named) {
+        Some(width) => Ok(Some(width)),
+        None => Err(text.to_string_lossy().into_owned()),
+    }
+}
+
+/// Checks that [`LIMIT`], if it is set, names an arithmetic.
+///
+/// # Errors
+/// The text found, if it names none of [`arithmetics`].
+pub fn check_limit() -> Result<(), String> {
+    limit().map(|_| ())
+}
+
+/// The names of all arithmetics.
+pub fn arithmetics() -> [&'static str; 3] {
+    Width::ALL.map(Width::name)
+}
+
+/// Runs a kernel with the widest arithmetic that this processor has.
+pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let width = Width::used();
+        if width == Width::Avx512
+            && let Some(avx512) = x86::Avx512::find()
+        {
+            return avx512.run(kernel);
+        }
+        if width >= Width::Avx2
+            && let Some(avx2) = x86::Avx2::find()
+        {
+            return avx2.run(kernel);
+        }
+    }
+    kernel.run(Portable)
+}
+
+/// A plain loop over numbers that do not wait for each other, compiled for the widest arithmetic by
+/// the compiler itself.
+pub(crate) struct Elementwise<F: FnOnce()>(pub F);
+
+impl<F: FnOnce()> Kernel for Elementwise<F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, _: A) {
+        (self.0)();
+    }
+}
+
+/// The name of the arithmetic that [`run`] uses.
+pub(crate) fn name() -> &'static str {
+    Width::used().name()
+}
+
+/// What a kernel gives with every arithmetic that this processor has.
+#[cfg(test)]
+pub(crate) fn on_each<K: Kernel>(kernel: impl Fn() -> K) -> Vec<K::Output> {
+    let mut outputs = vec![kernel().run(Portable)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        outputs.extend(x86::Avx2::find().map(|avx2| avx2.run(kernel())));
+        outputs.extend(x86::Avx512::find().map(|avx512| avx512.run(kernel())));
+    }
+    outputs
+}

@@ -1,0 +1,452 @@
+//! The triangular factor of a tall matrix, by Householder reflections of some rows at a time.
+//!
+//! The rows are taken in pieces that stay in the processor's nearest memory; each is reflected into the
+//! triangle of all rows before it. A parameter that the first readings do not see stays out of the way
+//! until it is seen: the columns are taken in the order in which they begin.
+
+use super::{Column, HIGH, LANES, PIECE, Piece, Row};
+use crate::simd::{self, Arithmetic, Eight, Kernel};
+use nalgebra::DMatrix;
+
+/// Columns that are reflected at once.
+const WIDE: usize = LANES;
+
+/// `|D A x - d|^2 = |R x - b|^2 + rest^2` with diagonal `D`.
+#[derive(Clone)]
+pub(crate) struct Triangle {
+    /// Rows of `R`, each with its `b` behind the columns that have begun.
+    rows: Vec<Vec<f64>>,
+    /// Columns that have begun, or stand before one that has.
+    begun: usize,
+    /// The square of the rest.
+    rest: f64,
+}
+
+impl Triangle {
+    /// Of no rows yet, with so many columns. Best in the order in which they begin: those behind the last one that
+    /// has cost nothing.
+    pub fn new(columns: usize) -> Self {
+        Self {
+            rows: vec![vec![0.0; columns + 1]; columns],
+            begun: 0,
+            rest: 0.0,
+        }
+    }
+
+    /// From `A`, the diagonal `roots` of `D`, and `d`; with the column of `A` that each column of `R` is.
+    pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
+        let height = matrix.nrows();
+        let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
+        let begins: Vec<usize> = columns.iter().map(|c| begin(c)).collect();
+        let mut order: Vec<usize> = (0..columns.len()).collect();
+        order.sort_by_key(|j| begins[*j]);
+        let mut triangle = Self::new(order.len());
+        let mut piece = Piece::new(order.len());
+        while piece.first < height {
+            let rows = piece.first..(piece.first + PIECE).min(height);
+            piece.count = rows.len();
+            for (place, j) in order.iter().enumerate() {
+                let column = &columns[*j][rows.clone()];
+                piece.column_mut(place)[..rows.len()].copy_from_slice(column);
+            }
+            triangle.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
+            piece.first = rows.end;
+        }
+        (triangle, order)
+    }
+
+    /// Adds the rows of a piece, with `D` and `d` for each; what the piece holds then means nothing.
+    pub fn add_weighted(&mut self, piece: &mut Piece, roots: &[f64], right: &[f64]) {
+        let places = self.begin(piece);
+        simd::run(Weigh {
+            columns: &mut piece.columns[..places],
+            roots,
+        });
+        self.reflect(piece, right);
+    }
+
+    /// As [`Triangle::add_weighted`] with ones for `D`.
+    pub fn add(&mut self, piece: &mut Piece, right: &[f64]) {
+        self.begin(piece);
+        self.reflect(piece, right);
+    }
+
+    /// Takes in the columns that begin in a piece: how many have.
+    fn begin(&mut self, piece: &mut Piece) -> usize {
+        let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
+        let has_begun = |place: &usize| piece.column(*place).chunks(4 * LANES).any(any);
+        let last = (self.begun..piece.begun()).rev().find(has_begun);
+        self.widen(last.map_or(self.begun, |last| last + 1));
+        piece.widen(self.begun);
+        self.begun
+    }
+
+    fn reflect(&mut self, piece: &mut Piece, right: &[f64]) {
+        let columns = &mut piece.columns[..=self.begun];
+        // The right-hand side behind the columns that have begun: the others are zero.
+        let to = columns[self.begun].as_flattened_mut();
+        match (to.first_chunk_mut::<PIECE>(), right.first_chunk::<PIECE>()) {
+            (Some(to), Some(right)) => *to = *right,
+            _ => to[..right.len()].copy_from_slice(right),
+        }
+        for column in columns.iter_mut() {
+            column.as_flattened_mut()[right.len()..].fill(0.0);
+        }
+        simd::run(Reflect {
+            triangle: self,
+            piece: columns,
+        });
+    }
+
+    /// More columns begin: until now there is nothing in them.
+    fn widen(&mut self, begun: usize) {
+        for row in &mut self.rows[..self.begun] {
+            let b = std::mem::take(&mut row[self.begun]);
+            row[begun] = b;
+        }
+        self.begun = begun;
+    }
+
+    /// Rows of `R` with entries, and `b`.
+    pub fn rows(&self) -> impl Iterator<Item = (impl Iterator<Item = (usize, f64)>, f64)> {
+        let rows = self.rows[..self.begun].iter().enumerate();
+        rows.map(|(i, row)| {
+            let entries = row[i..self.begun].iter().enumerate();
+            let entries = entries.map(move |(k, r)| (i + k, *r));
+            (entries.filter(|(_, r)| *r != 0.0), row[self.begun])
+        })
+    }
+
+    /// Adds the rows of another triangle, whose columns, places `0..n` and two more, answer to those of this one by `1`, and
+    /// by `states` those two.
+    pub fn join(&mut self, other: &Triangle, states: &[[f64; 2]]) {
+        let n = self.rows.len();
+        let mut piece = Piece::new(n);
+        piece.restart(0);
+        piece.count = other.begun;
+        piece.widen(n);
+        let mut right = Vec::with_capacity(other.begun);
+        for (i, (entries, b)) in other.rows().enumerate() {
+            for (place, r) in entries {
+                if place < n {
+                    piece.column_mut(place)[i] += r;
+                    continue;
+                }
+                for (own, state) in states.iter().take(n).enumerate() {
+                    piece.column_mut(own)[i] += r * state[place - n];
+                }
+            }
+            right.push(b);
+        }
+        self.add(&mut piece, &right);
+        self.rest += other.rest;
+    }
+
+    /// `R' b`, which is `(D A)' d`.
+    pub fn products(&self) -> Vec<f64> {
+        let mut products = vec![0.0; self.rows.len()];
+        for (entries, b) in self.rows() {
+            for (place, r) in entries {
+                products[place] += r * b;
+            }
+        }
+        products
+    }
+
+    /// The triangle of the same matrix beside another right-hand side, of which the products `(D A)' d` and the square
+    /// `|d|^2` are known; `None` if these belong to another matrix, of which they explain more than there is, or a column is
+    /// zero beside those before it.
+    pub fn beside(mut self, products: &[f64], square: f64) -> Option<Self> {
+        let n = self.rows.len();
+        let mut explained = 0.0;
+        for i in 0..n {
+            let above = self.rows[..i].iter().map(|row| row[i] * row[n]);
+            let b = (products[i] - above.sum::<f64>()) / self.rows[i][i];
+            self.rows[i][n] = b;
+            explained += b * b;
+        }
+        self.rest = square - explained;
+        (self.begun == n && self.is_finite() && self.rest >= 0.0).then_some(self)
+    }
+
+    /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
+    pub fn solve(&self, independent: f64) -> Option<Vec<f64>> {
+        let n = self.rows.len();
+        (self.begun == n).then_some(())?;
+        let mut x = vec![0.0; n];
+        for j in (0..n).rev() {
+            let row = &self.rows[j];
+            let known = row[j + 1..n].iter().zip(&x[j + 1..]);
+            let known: f64 = known.map(|(r, x)| r * x).sum();
+            let above = self.rows[..=j].iter().map(|row| row[j] * row[j]);
+            let length = above.sum::<f64>().sqrt();
+            let is_firm = row[j].abs() > independent * length;
+            x[j] = is_firm.then(|| (row[n] - known) / row[j])?;
+        }
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+
+    /// What no `x` can change, as a length.
+    pub fn rest(&self) -> f64 {
+        self.rest.sqrt()
+    }
+
+    /// Whether all numbers are.
+    pub fn is_finite(&self) -> bool {
+        self.rest.is_finite() && self.rows.iter().flatten().all(|r| r.is_finite())
+    }
+}
+
+/// The first row of a column that is not zero; its length if there is none.
+fn begin(column: &[f64]) -> usize {
+    let (eights, rest) = column.as_chunks::<LANES>();
+    let is_zero = |eight: &Row| eight.iter().fold(true, |all, a| all & (*a == 0.0));
+    let zeros = eights.iter().take_while(|eight| is_zero(eight)).count() * LANES;
+    let from = zeros.min(column.len() - rest.len());
+    let more = column[from..].iter().take_while(|a| **a == 0.0);
+    from + more.count()
+}
+
+/// Multiplies the rows of columns by their `roots`.
+struct Weigh<'a> {
+    columns: &'a mut [Column],
+    roots: &'a [f64],
+}
+
+impl Kernel for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let (roots, last) = self.roots.as_chunks::<LANES>();
+        for column in self.columns {
+            for (a, root) in column.iter_mut().zip(roots) {
+                *a = (Eight::load(arithmetic, root) * Eight::load(arithmetic, a)).row();
+            }
+            let rest = column.get_mut(roots.len()).into_iter().flatten();
+            rest.zip(last).for_each(|(a, root)| *a *= root);
+        }
+    }
+}
+
+/// Reflects a piece, its right-hand side last, into the triangle.
+struct Reflect<'a> {
+    triangle: &'a mut Triangle,
+    piece: &'a mut [Column],
+}
+
+impl Kernel for Reflect<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let columns = self.piece.len();
+        for k in 0..columns - 1 {
+            let (before, after) = self.piece.split_at_mut(k + 1);
+            let column = &before[k];
+            let square = dot(arithmetic, column, column);
+            if square == 0.0 {
+                continue;
+            }
+            let row = &mut self.triangle.rows[k];
+            let norm = (row[k] * row[k] + square).sqrt();
+            // Away from zero, so that nothing cancels.
+            let corner = if row[k] > 0.0 { -norm } else { norm };
+            let reflector = Reflector {
+                column,
+                top: row[k] - corner,
+                factor: 1.0 / (norm * (norm + row[k].abs())),
+            };
+            row[k] = corner;
+            let tops = &mut row[k + 1..columns];
+            let mut from = 0;
+            while from < after.len() {
+                let to = (from + WIDE).min(after.len());
+                let (columns, tops) = (&mut after[from..to], &mut tops[from..to]);
+                match to - from {
+                    8 => reflector.reflect::<A, 8>(arithmetic, columns, tops),
+                    7 => reflector.reflect::<A, 7>(arithmetic, columns, tops),
+                    6 => reflector.reflect::<A, 6>(arithmetic, columns, tops),
+                    5 => reflector.reflect::<A, 5>(arithmetic, columns, tops),
+                    4 => reflector.reflect::<A, 4>(arithmetic, columns, tops),
+                    3 => reflector.reflect::<A, 3>(arithmetic, columns, tops),
+                    2 => reflector.reflect::<A, 2>(arithmetic, columns, tops),
+                    _ => reflector.reflect::<A, 1>(arithmetic, columns, tops),
+                }
+                from = to;
+            }
+        }
+        let right = &self.piece[columns - 1];
+        self.triangle.rest += dot(arithmetic, right, right);
+    }
+}
+
+/// `1 - factor (top, column) (top, column)'`.
+struct Reflector<'a> {
+    column: &'a Column,
+    top: f64,
+    factor: f64,
+}
+
+impl Reflector<'_> {
+    #[inline(always)]
+    fn reflect<A: Arithmetic, const J: usize>(
+        &self,
+        arithmetic: A,
+        columns: &mut [Column],
+        tops: &mut [f64],
+    ) {
+        let Some(columns) = columns.first_chunk_mut::<J>() else {
+            return;
+        };
+        let mut sums = [Eight::splat(arithmetic, 0.0); J];
+        for (h, x) in self.column.iter().enumerate() {
+            let x = Eight::load(arithmetic, x);
+            for j in 0..J {
+                sums[j] += x * Eight::load(arithmetic, &columns[j][h]);
+            }
+        }
+        let mut rows = [[0.0; LANES]; LANES];
+        for j in 0..J {
+            rows[j] = sums[j].row();
+        }
+        let lanes = simd::transposed(arithmetic, &rows);
+        let mut sum = Eight::load(arithmetic, &lanes[0]);
+        for lane in &lanes[1..] {
+            sum += Eight::load(arithmetic, lane);
+        }
+        let sum = sum.row();
+        let mut shares = [Eight::splat(arithmetic, 0.0); J];
+        for j in 0..J {
+            let share = (self.top * tops[j] + sum[j]) * self.factor;
+            tops[j] -= share * self.top;
+            shares[j] = Eight::splat(arithmetic, share);
+        }
+        for (h, x) in self.column.iter().enumerate() {
+            let x = Eight::load(arithmetic, x);
+            for j in 0..J {
+                columns[j][h] = (Eight::load(arithmetic, &columns[j][h]) - shares[j] * x).row();
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn dot<A: Arithmetic>(arithmetic: A, a: &Column, b: &Column) -> f64 {
+    let mut sums = [Eight::splat(arithmetic, 0.0); 4];
+    for h in 0..HIGH {
+        sums[h % 4] += Eight::load(arithmetic, &a[h]) * Eight::load(arithmetic, &b[h]);
+    }
+    let lanes = ((sums[0] + sums[1]) + (sums[2] + sums[3])).row();
+    let mut sum = 0.0;
+    for lane in lanes {
+        sum += lane;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    const ROWS: usize = 2 * PIECE + 37;
+
+    /// A matrix of which the columns begin one after the other, not in their order; weights; right-hand side.
+    fn problem() -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
+        let begins = [PIECE + 5, 0, 90, 3, PIECE];
+        let entry = |i: usize, j: usize| match i < begins[j] {
+            true => 0.0,
+            false => ((i * (j + 2)) as f64 * 0.7 + j as f64).sin(),
+        };
+        let matrix = DMatrix::from_fn(ROWS, begins.len(), entry);
+        let roots = (0..ROWS).map(|i| 1.0 + (i as f64).cos().abs()).collect();
+        let right = (0..ROWS).map(|i| (0.3 * i as f64).cos()).collect();
+        (matrix, roots, right)
+    }
+
+    #[test]
+    fn it_has_the_minimum_of_the_tall_matrix() {
+        let (matrix, roots, right) = problem();
+        let (triangle, order) = Triangle::of(&matrix, &roots, &right);
+        assert_eq!(order, [1, 3, 2, 4, 0]);
+        let weights = DMatrix::from_diagonal(&DVector::from_vec(roots));
+        let (weighted, right) = (weights * matrix, DVector::from_vec(right));
+        let svd = weighted.clone().svd(true, true);
+        let expected = svd.solve(&right, 0.0).expect("five independent columns");
+        let found = triangle.solve(1e-14).expect("five independent columns");
+        for (place, j) in order.iter().enumerate() {
+            assert!(
+                (found[place] - expected[*j]).abs() <= 1e-13,
+                "{found:?} {expected}"
+            );
+        }
+        let rest = (weighted * expected - right).norm();
+        assert!((triangle.rest() - rest).abs() <= 1e-13 * rest);
+        assert!(triangle.is_finite());
+    }
+
+    /// The right-hand side by its products and its square; no side explains more than its square.
+    #[test]
+    fn another_side_of_the_same_matrix() {
+        let (matrix, roots, right) = problem();
+        let other: Vec<f64> = right.iter().map(|x| x * x - 0.3).collect();
+        let (expected, order) = Triangle::of(&matrix, &roots, &other);
+        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        let square: f64 = other.iter().map(|x| x * x).sum();
+        let found = (triangle.clone().beside(&expected.products(), square)).expect("such a side");
+        let pairs = |t: &Triangle| t.solve(1e-14).expect("five independent columns");
+        for (found, expected) in pairs(&found).iter().zip(pairs(&expected)) {
+            assert!((found - expected).abs() <= 1e-13, "{found} {expected}");
+        }
+        assert!((found.rest() - expected.rest()).abs() <= 1e-12 * expected.rest());
+        assert!(triangle.clone().beside(&expected.products(), 0.0).is_none());
+        let wider = Triangle::new(order.len());
+        assert!(wider.beside(&expected.products(), square).is_none());
+    }
+
+    /// However the rows are cut into pieces, to rounding.
+    #[test]
+    fn short_pieces_are_as_good() {
+        let (matrix, roots, right) = problem();
+        let (whole, order) = Triangle::of(&matrix, &roots, &right);
+        let mut parts = Triangle::new(order.len());
+        let mut piece = Piece::new(order.len());
+        let mut first = 0;
+        for count in (1..).take_while(|count| *count < 100) {
+            let rows = first..(first + count).min(ROWS);
+            piece.clear();
+            piece.count = rows.len();
+            for (place, j) in order.iter().enumerate() {
+                for (r, i) in rows.clone().enumerate() {
+                    piece.column_mut(place)[r] = matrix[(i, *j)];
+                }
+            }
+            parts.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
+            first = rows.end;
+        }
+        assert_eq!(first, ROWS);
+        let (whole, parts) = (whole.solve(1e-14), parts.solve(1e-14));
+        let pairs = whole
+            .expect("a minimum")
+            .into_iter()
+            .zip(parts.expect("a minimum"));
+        for (whole, part) in pairs {
+            assert!((whole - part).abs() <= 1e-13, "{whole} {part}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_determined_is_not_solved() {
+        let (mut matrix, roots, right) = problem();
+        let sum = matrix.column(1) + matrix.column(3);
+        matrix.set_column(2, &sum);
+        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        matrix.column_mut(2).fill(0.0);
+        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        matrix[(7, 2)] = f64::NAN;
+        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        assert!(!triangle.is_finite());
+        assert_eq!(triangle.solve(1e-14), None);
+    }
+}

@@ -1,0 +1,126 @@
+//! The discrete adjoint in blocks.
+
+use super::LinearDevice;
+use super::tile::Tile;
+use super::workspace::{Ends, Maps, Workspace};
+use crate::simd::{Arithmetic, Kernel, LANES, Row};
+use crate::system::State;
+
+/// Everything that one solve needs.
+pub(super) struct Adjoint<'a> {
+    pub device: LinearDevice<'a>,
+    pub displacement: &'a [f64],
+    pub velocity: &'a [f64],
+    /// Derivative of the cost with respect to displacement and, if there is any, velocity.
+    pub source: [Option<&'a [f64]>; 2],
+    /// Gradient with respect to mass, damping, stiffness: overwritten.
+    pub gradient: [&'a mut [f64]; 3],
+    pub workspace: &'a mut Workspace,
+}
+
+impl Kernel for Adjoint<'_> {
+    type Output = State;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> State {
+        let Self {
+            device,
+            displacement,
+            velocity,
+            source,
+            mut gradient,
+            workspace,
+        } = self;
+        let h = device.h;
+        let steps = displacement.len() - 1;
+        let scale = [1.0, 1.0 / h];
+        let at = |i: usize| [0, 1].map(|q: usize| source[q].map_or(0.0, |s| s[i] * scale[q]));
+        let mut x = at(steps);
+        gradient.iter_mut().for_each(|g| g[steps] = 0.0);
+        let (tiles, rest) = Tile::cut(steps);
+        for i in (rest..steps).rev() {
+            let motion = [displacement[i], h * velocity[i]];
+            device.step_back(i, motion, at(i), &mut x, &mut gradient);
+        }
+        for tile in tiles.rev() {
+            device.gather(arithmetic, tile, workspace);
+            tile.gather(arithmetic, displacement, &mut workspace.motion[0]);
+            tile.gather(arithmetic, velocity, &mut workspace.motion[1]);
+            let last = match source {
+                [Some(y), None] => {
+                    tile.gather(arithmetic, y, &mut workspace.source[0]);
+                    back::<A, false>(arithmetic, h, tile, workspace, &mut x)
+                }
+                _ => {
+                    for (values, rows) in source.iter().zip(&mut workspace.source) {
+                        match values {
+                            Some(values) => tile.gather(arithmetic, values, rows),
+                            None => rows[..tile.length].fill([0.0; LANES]),
+                        }
+                    }
+                    back::<A, true>(arithmetic, h, tile, workspace, &mut x)
+                }
+            };
+            let behind = collect(arithmetic, tile, workspace, &last, &mut gradient);
+            for (g, share) in gradient.iter_mut().zip(behind) {
+                g[tile.node(LANES, 0)] += share;
+            }
+        }
+        State {
+            displacement: x[0],
+            velocity: h * x[1],
+        }
+    }
+}
+
+/// The gradient of one tile, in lanes; carries the adjoint state `x` over it.
+#[inline(always)]
+fn back<A: Arithmetic, const VELOCITY: bool>(
+    arithmetic: A,
+    h: f64,
+    tile: Tile,
+    workspace: &mut Workspace,
+    x: &mut [f64; 2],
+) -> [Row; 3] {
+    let maps = workspace.prepare(arithmetic, h, tile.length);
+    let driven = workspace.drive::<A, VELOCITY>(arithmetic, h, tile.length);
+    let ends = ends(&maps, &driven, x);
+    workspace.replay_back::<A, VELOCITY>(arithmetic, h, tile.length, &ends)
+}
+
+/// Brings the gradient of a tile back from its lanes; returns what belongs to the node behind it.
+#[inline(always)]
+pub(super) fn collect<A: Arithmetic>(
+    arithmetic: A,
+    tile: Tile,
+    workspace: &Workspace,
+    last: &[Row; 3],
+    gradient: &mut [&mut [f64]; 3],
+) -> [f64; 3] {
+    for ((g, rows), last) in gradient.iter_mut().zip(&workspace.gradient).zip(last) {
+        tile.scatter(arithmetic, rows, g);
+        for (b, share) in last[..LANES - 1].iter().enumerate() {
+            g[tile.node(b + 1, 0)] += share;
+        }
+    }
+    [last[0][LANES - 1], last[1][LANES - 1], last[2][LANES - 1]]
+}
+
+/// The adjoint states at the ends of all blocks, from `x` behind the last back to the first, before
+/// which `x` is carried.
+#[inline(always)]
+pub(super) fn ends(maps: &Maps, driven: &Ends, x: &mut [f64; 2]) -> Ends {
+    let mut ends = [[[0.0; LANES]; 2]; 2];
+    for b in (0..LANES).rev() {
+        for half in [1, 0] {
+            ends[half][0][b] = x[0];
+            ends[half][1][b] = x[1];
+            // Transposed: rows are what becomes of (1, 0) and of (0, 1).
+            *x = [0, 1].map(|q: usize| {
+                let [y, w] = &maps[half][q];
+                y[b] * x[0] + w[b] * x[1] + driven[half][q][b]
+            });
+        }
+    }
+    ends
+}

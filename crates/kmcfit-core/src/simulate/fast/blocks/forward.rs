@@ -1,0 +1,64 @@
+//! The forward solve in blocks.
+
+use super::LinearDevice;
+use super::tile::Tile;
+use super::workspace::{Ends, Maps, Workspace};
+use crate::simd::{Arithmetic, Kernel, LANES};
+use crate::system::State;
+
+/// Everything that one solve needs.
+pub(super) struct Forward<'a> {
+    pub device: LinearDevice<'a>,
+    pub initial: State,
+    pub displacement: &'a mut [f64],
+    pub velocity: &'a mut [f64],
+    pub workspace: &'a mut Workspace,
+}
+
+impl Kernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let Self {
+            device,
+            displacement,
+            velocity,
+            workspace,
+            ..
+        } = self;
+        let h = device.h;
+        let steps = displacement.len() - 1;
+        let mut x = [self.initial.displacement, h * self.initial.velocity];
+        let (tiles, rest) = Tile::cut(steps);
+        for tile in tiles {
+            device.gather(arithmetic, tile, workspace);
+            let maps = workspace.prepare(arithmetic, h, tile.length);
+            let starts = starts(&maps, &mut x);
+            workspace.replay(arithmetic, h, tile.length, &starts);
+            tile.scatter(arithmetic, &workspace.motion[0], displacement);
+            tile.scatter(arithmetic, &workspace.motion[1], velocity);
+        }
+        for i in rest..=steps {
+            (displacement[i], velocity[i]) = (x[0], x[1] * device.constants().per_h);
+            if i < steps {
+                x = device.rates(i).forward(x, device.constants());
+            }
+        }
+    }
+}
+
+/// The states at the starts of all blocks, one after the other from `x`, which is carried to the end.
+#[inline(always)]
+pub(super) fn starts(maps: &Maps, x: &mut [f64; 2]) -> Ends {
+    let mut starts = [[[0.0; LANES]; 2]; 2];
+    for b in 0..LANES {
+        for half in 0..2 {
+            let [from_y, from_w] = &maps[half];
+            starts[half][0][b] = x[0];
+            starts[half][1][b] = x[1];
+            *x = [0, 1].map(|q: usize| from_y[q][b] * x[0] + from_w[q][b] * x[1]);
+        }
+    }
+    starts
+}

@@ -1,0 +1,331 @@
+use super::*;
+use crate::simd::LANES;
+use crate::simulate::{Engine, reference};
+use crate::system::{Grid, Method, Term};
+
+/// Records of a few steps more and less than whole tiles, and of several.
+const NODES: [usize; 8] = [65, 66, 81, 200, 4096, 4097, 4113, 9000];
+
+const INITIAL: State = State {
+    displacement: 3.3,
+    velocity: -1.0,
+};
+
+fn oscillator(nodes: usize) -> Oscillator {
+    Oscillator {
+        grid: Grid::new(0.0, 25.0, nodes).unwrap(),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    }
+}
+
+/// Mass falls, damping changes its sign, stiffness wobbles.
+fn device(nodes: usize) -> Device {
+    let at = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        (0..nodes).map(|i| f(i as f64 / nodes as f64)).collect()
+    };
+    Device {
+        mass: at(&|s| 1.5 - s),
+        coefficients: vec![
+            at(&|s| 0.2 * (9.0 * s).sin()),
+            at(&|s| 2.0 + (30.0 * s).cos()),
+        ],
+    }
+}
+
+fn readings(motion: &Trajectory) -> Vec<f64> {
+    let pairs = motion.displacement.iter().enumerate();
+    pairs
+        .map(|(i, y)| 0.9 * y + 0.1 * (0.03 * i as f64).sin())
+        .collect()
+}
+
+fn source(motion: &Trajectory, velocity: f64) -> Trajectory {
+    Trajectory {
+        displacement: readings(motion),
+        velocity: motion.velocity.iter().map(|v| velocity * v).collect(),
+    }
+}
+
+fn squares_of<'a>(
+    device: LinearDevice<'a>,
+    readings: &'a [f64],
+) -> least_squares::LeastSquares<'a> {
+    least_squares::LeastSquares {
+        device,
+        initial: INITIAL,
+        readings,
+        weights: [0.7, 0.2],
+    }
+}
+
+fn largest(f: &[f64]) -> f64 {
+    f.iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    largest(&difference)
+}
+
+/// Rounding of the states at every step, carried along: some epsilons a period and 25 s of them.
+const ROUNDING: f64 = 1e-12;
+
+#[test]
+fn motions_are_those_of_single_steps() {
+    for nodes in NODES {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let one_by_one = oscillator.forward(&device, INITIAL, None).unwrap();
+        let mut motion = Trajectory::zeros(nodes);
+        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+        linear.forward(INITIAL, &mut motion);
+        for (a, b) in [
+            (&motion.displacement, &one_by_one.displacement),
+            (&motion.velocity, &one_by_one.velocity),
+        ] {
+            let error = distance(a, b) / largest(b);
+            assert!(error < ROUNDING, "{nodes}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn gradients_are_those_of_single_steps() {
+    for (nodes, by_velocity) in NODES.into_iter().flat_map(|n| [(n, 0.0), (n, 0.3)]) {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let source = source(&motion, by_velocity);
+        let expected = reference::discrete_adjoint(&oscillator, &device, None, &motion, &source);
+        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+        let found = linear.gradient(&motion, &source);
+        for (a, b) in found.device.functions().zip(expected.device.functions()) {
+            let error = distance(a, b) / largest(b);
+            assert!(error < ROUNDING, "{nodes}: {error:e}");
+        }
+        let a = [found.initial.displacement, found.initial.velocity];
+        let b = [expected.initial.displacement, expected.initial.velocity];
+        assert!(distance(&a, &b) < ROUNDING * largest(&b), "{nodes}");
+    }
+}
+
+#[test]
+fn squares_are_motion_and_gradient_in_one() {
+    let weights = [0.7, 0.2];
+    for nodes in NODES {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let readings = readings(&motion);
+        let mut source = Trajectory::zeros(nodes);
+        let mut cost = 0.0;
+        for i in 0..nodes {
+            let w = weights[usize::from(i == 0 || i + 1 == nodes)];
+            let r = motion.displacement[i] - readings[i];
+            cost += w * r * r;
+            source.displacement[i] = 2.0 * w * r;
+        }
+        let expected = reference::discrete_adjoint(&oscillator, &device, None, &motion, &source);
+        let mut gradient = device.clone();
+        let [c, k] = gradient.coefficients.as_mut_slice() else {
+            unreachable!("two terms")
+        };
+        let (found, initial) = crate::simulate::least_squares(
+            &oscillator,
+            [
+                &device.mass,
+                &device.coefficients[0],
+                &device.coefficients[1],
+            ],
+            INITIAL,
+            &readings,
+            weights,
+            [&mut gradient.mass, c, k],
+        )
+        .unwrap();
+        assert!(
+            (found - cost).abs() < ROUNDING * cost,
+            "{nodes}: {found} {cost}"
+        );
+        for (a, b) in gradient.functions().zip(expected.device.functions()) {
+            let error = distance(a, b) / largest(b);
+            assert!(error < ROUNDING, "{nodes}: {error:e}");
+        }
+        let a = [initial.displacement, initial.velocity];
+        let b = [expected.initial.displacement, expected.initial.velocity];
+        assert!(distance(&a, &b) < ROUNDING * largest(&b), "{nodes}");
+    }
+}
+
+/// A motion and what follows from it, with one arithmetic.
+struct Whole<'a>(&'a Oscillator, &'a Device);
+
+impl simd::Kernel for Whole<'_> {
+    type Output = Vec<u64>;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<u64> {
+        let Self(oscillator, device) = self;
+        let nodes = device.mass.len();
+        let linear = LinearDevice::of(oscillator, device, nodes).unwrap();
+        let mut motion = Trajectory::zeros(nodes);
+        let mut gradient = Device::zeros(nodes, 2);
+        with_workspace(|workspace| {
+            forward::Forward {
+                device: linear,
+                initial: INITIAL,
+                displacement: &mut motion.displacement,
+                velocity: &mut motion.velocity,
+                workspace,
+            }
+            .run(arithmetic);
+        });
+        let readings = readings(&motion);
+        let [c, k] = gradient.coefficients.as_mut_slice() else {
+            unreachable!("two terms")
+        };
+        let of = squares_of(linear, &readings);
+        let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
+        let mut slopes = [&mut gradient.mass, c, k].map(Vec::as_mut_slice);
+        let (cost, _) = with_workspace(|workspace| {
+            let survey = least_squares::Survey {
+                of,
+                tiles: &tiles,
+                workspace,
+            };
+            let charts = survey.run(arithmetic);
+            let joint = of.join(&tiles, &charts, &mut slopes);
+            let descent = least_squares::Descent {
+                of,
+                legs: &joint.legs,
+                gradient: slopes
+                    .each_mut()
+                    .map(|g| &mut g[..tiles.last().map_or(0, |tile| tile.node(LANES, 0))]),
+                at_hand: false,
+                workspace,
+            };
+            let harvest = descent.run(arithmetic);
+            of.finish(&joint, &harvest, &mut slopes)
+        });
+        let numbers = motion.displacement.iter().chain(&motion.velocity);
+        let numbers = numbers.chain(gradient.functions().flatten()).chain([&cost]);
+        numbers.map(|x| x.to_bits()).collect()
+    }
+}
+
+#[test]
+fn all_arithmetics_give_the_same_bits() {
+    for nodes in NODES {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let outputs = simd::on_each(|| Whole(&oscillator, &device));
+        assert!(
+            outputs.iter().all(|output| output == &outputs[0]),
+            "{nodes}"
+        );
+    }
+}
+
+/// Masses at the ends of the range of numbers, and motions that leave it, go one step after the other
+/// and end as they do there.
+#[test]
+fn what_blocks_cannot_do_is_done_step_by_step() {
+    let nodes = 500;
+    let oscillator = oscillator(nodes);
+    let mut tiny = device(nodes);
+    for f in tiny.functions_mut() {
+        f.iter_mut().for_each(|x| *x *= 1e-200);
+    }
+    assert!(LinearDevice::of(&oscillator, &tiny, nodes).is_none());
+    let mut motion = Trajectory::zeros(nodes);
+    Engine::ParallelInTime
+        .forward_into(&oscillator, &tiny, INITIAL, None, &mut motion)
+        .unwrap();
+    let expected = oscillator.forward(&tiny, INITIAL, None).unwrap();
+    let error = distance(&motion.displacement, &expected.displacement);
+    assert!(
+        error < ROUNDING * largest(&expected.displacement),
+        "{error:e}"
+    );
+
+    let mut stiff = device(nodes);
+    stiff.coefficients[1].fill(1e30);
+    let expected = oscillator.forward(&stiff, INITIAL, None).unwrap_err();
+    let found =
+        Engine::ParallelInTime.forward_into(&oscillator, &stiff, INITIAL, None, &mut motion);
+    assert_eq!(found.unwrap_err(), expected);
+}
+
+/// A record that ends before the grid does: the device must have mass on all of it.
+#[test]
+fn mass_is_required_behind_the_end_of_a_record() {
+    let nodes = 500;
+    let (oscillator, mut device) = (oscillator(nodes), device(nodes));
+    device.mass[nodes - 1] = -1.0;
+    let mut short = Trajectory::zeros(300);
+    let expected = reference::forward_into(&oscillator, &device, INITIAL, None, &mut short);
+    let found =
+        Engine::ParallelInTime.forward_into(&oscillator, &device, INITIAL, None, &mut short);
+    assert!(expected.is_err());
+    assert_eq!(found, expected);
+}
+
+/// Where the motion meets the readings, the derivative of a block's cost is the difference of two numbers
+/// that are nearly the same. What it loses is less than the motion's own rounding takes from the residuals:
+/// the gradients of two motions that differ by rounding differ more.
+#[test]
+fn squares_lose_nothing_near_the_readings() {
+    let nodes = 2000;
+    let (oscillator, device) = (oscillator(nodes), device(nodes));
+    let one_by_one = oscillator.forward(&device, INITIAL, None).unwrap();
+    let wave = |(i, y): (usize, &f64)| y + 1e-8 * (0.11 * i as f64).sin();
+    let readings: Vec<f64> = one_by_one
+        .displacement
+        .iter()
+        .enumerate()
+        .map(wave)
+        .collect();
+    let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+    let mut in_blocks = Trajectory::zeros(nodes);
+    linear.forward(INITIAL, &mut in_blocks);
+    let [expected, other] = [&in_blocks, &one_by_one].map(|motion| {
+        let mut source = Trajectory::zeros(nodes);
+        for (i, s) in source.displacement.iter_mut().enumerate() {
+            *s = 2.0 * (motion.displacement[i] - readings[i]);
+        }
+        reference::discrete_adjoint(&oscillator, &device, None, motion, &source)
+    });
+    let mut gradient = device.clone();
+    let [c, k] = gradient.coefficients.as_mut_slice() else {
+        unreachable!("two terms")
+    };
+    linear.least_squares(INITIAL, &readings, [1.0, 1.0], [&mut gradient.mass, c, k]);
+    let functions = expected.device.functions().zip(other.device.functions());
+    for (found, (expected, other)) in gradient.functions().zip(functions) {
+        assert!(distance(found, expected) < distance(other, expected));
+    }
+}
+
+/// Whoever computes a tile, and whether its rates are still at hand: the same bits.
+#[test]
+fn every_cut_gives_the_same_bits() {
+    for nodes in [2000, 4097, 20_000] {
+        let (oscillator, device) = (oscillator(nodes), device(nodes));
+        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let readings = readings(&motion);
+        let of = squares_of(linear, &readings);
+        let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
+        let bits = |middle: usize| {
+            let mut slopes = device.clone();
+            let [c, k] = slopes.coefficients.as_mut_slice() else {
+                unreachable!("two terms")
+            };
+            let (cost, initial) = of.solve_in_two(&tiles, middle, [&mut slopes.mass, c, k]);
+            let others = [cost, initial.displacement, initial.velocity];
+            let all = slopes.functions().flatten().chain(&others);
+            all.map(|x| x.to_bits()).collect::<Vec<u64>>()
+        };
+        let whole = bits(tiles.len());
+        for middle in 0..tiles.len() {
+            assert!(bits(middle) == whole, "{nodes} nodes, cut at {middle}");
+        }
+    }
+}

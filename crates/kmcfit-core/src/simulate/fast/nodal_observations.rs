@@ -1,0 +1,85 @@
+//! Accelerations at eight neighbouring nodes, as an accelerometer sampled with the grid measures them:
+//! [`observe`](crate::simulate::reference::observe()) to some machine precisions.
+
+use super::elements::with_known;
+use super::padded_loads;
+use crate::simd::{Arithmetic, Eight, LANES, Row};
+use crate::simulate::Trajectory;
+use crate::system::{Device, FUNCTIONS, MOST_TERMS, Oscillator, Term};
+
+/// Accelerations at eight nodes and their derivatives, one node a lane.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Accelerations {
+    /// The accelerations of `y`, relative to the base.
+    pub value: Row,
+    /// Derivatives with respect to displacement and velocity at the node.
+    pub states: [Row; 2],
+    /// Derivatives with respect to each function's value at the node, mass first.
+    pub functions: [Row; FUNCTIONS],
+}
+
+impl Accelerations {
+    pub const NOTHING: Self = Self {
+        value: [0.0; LANES],
+        states: [[0.0; LANES]; 2],
+        functions: [[0.0; LANES]; FUNCTIONS],
+    };
+}
+
+/// A response observed at its nodes.
+#[derive(Clone, Copy)]
+pub(crate) struct NodalObservations<'a> {
+    pub oscillator: &'a Oscillator,
+    pub device: &'a Device,
+    pub states: &'a Trajectory,
+}
+
+impl NodalObservations<'_> {
+    /// The accelerations at eight nodes from node `i` on, with force and acceleration of the base at each; lanes
+    /// beyond the last node mean nothing.
+    #[inline(always)]
+    pub fn accelerations<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        i: usize,
+        around: [Eight<A>; 2],
+        out: &mut Accelerations,
+    ) {
+        let terms = self.oscillator.terms.as_slice();
+        with_known!(terms, terms, TERMS => {
+            self.of_terms::<A, TERMS>(arithmetic, terms, i, around, out);
+        });
+    }
+
+    #[inline(always)]
+    fn of_terms<A: Arithmetic, const TERMS: usize>(
+        &self,
+        arithmetic: A,
+        terms: &[Term],
+        i: usize,
+        [force, base]: [Eight<A>; 2],
+        out: &mut Accelerations,
+    ) {
+        let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
+        let y = padded_loads::eight(arithmetic, &self.states.displacement, i);
+        let v = padded_loads::eight(arithmetic, &self.states.velocity, i);
+        let per_mass = one / padded_loads::eight(arithmetic, &self.device.mass, i);
+        let minus_per_mass = -per_mass;
+        let mut push = force;
+        let [mut by_y, mut by_v] = [zero; 2];
+        for (j, term) in terms.iter().enumerate().take(TERMS) {
+            let p = &self.device.coefficients[j];
+            let p = padded_loads::eight(arithmetic, p, i);
+            let response = term.respond(arithmetic, y, v);
+            push = push - p * response.phi;
+            out.functions[j + 1] = (response.phi * minus_per_mass).row();
+            by_y = response.by_y.taken_from(by_y, p);
+            by_v = response.by_v.taken_from(by_v, p);
+        }
+        let inertia = push * per_mass;
+        out.functions[0] = (inertia * minus_per_mass).row();
+        out.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
+        out.value = (inertia - base).row();
+    }
+}

@@ -1,0 +1,59 @@
+//! Eight neighbouring values of what is known at the nodes or over the steps.
+
+use crate::simd::{Arithmetic, Eight, LANES, Row, window};
+use crate::system::Stepwise;
+
+/// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.
+#[inline(always)]
+pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> Eight<A> {
+    let inside = values.get(i..).and_then(<[f64]>::first_chunk::<LANES>);
+    match inside {
+        Some(row) => Eight::load(arithmetic, row),
+        None => Eight::load(arithmetic, &window(values, i)),
+    }
+}
+
+/// A function at the left ends, middles and right ends of the steps `i`, `i + 1`, ...
+#[inline(always)]
+pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
+    let left = eight(arithmetic, values, i);
+    let right = eight(arithmetic, values, i + 1);
+    [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
+}
+
+/// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`, and beyond the end the last
+/// step, for lanes that nobody asks.
+#[inline(always)]
+pub(crate) fn stepwise<A: Arithmetic>(
+    arithmetic: A,
+    part: Option<&Stepwise>,
+    i: usize,
+) -> [Eight<A>; 3] {
+    let Some(steps) = part.map(Stepwise::values) else {
+        return [Eight::splat(arithmetic, 0.0); 3];
+    };
+    let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);
+    let [left, middle, right] = match inside {
+        Some(steps) => columns(steps),
+        None => padded_steps(steps, i),
+    };
+    [
+        Eight::load(arithmetic, &left),
+        Eight::load(arithmetic, &middle),
+        Eight::load(arithmetic, &right),
+    ]
+}
+
+#[inline(always)]
+fn columns(steps: &[[f64; 3]; LANES]) -> [Row; 3] {
+    std::array::from_fn(|q| std::array::from_fn(|l| steps[l][q]))
+}
+
+#[cold]
+#[inline(never)]
+fn padded_steps(steps: &[[f64; 3]], i: usize) -> [Row; 3] {
+    match steps.len().checked_sub(1) {
+        Some(last) => columns(&std::array::from_fn(|l| steps[(i + l).min(last)])),
+        None => [[0.0; LANES]; 3],
+    }
+}

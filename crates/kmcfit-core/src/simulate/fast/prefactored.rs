@@ -1,0 +1,450 @@
+//! The response with prefactored stages: each function divided by the mass, and the input, times the step and the
+//! tableau's factors, are formed eight steps at a time. The rest of a step are products and sums of its states, in
+//! an order with few dependencies: a stage's velocity waits for four operations on the displacement of the stage
+//! before.
+
+use super::padded_loads;
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simulate::Trajectory;
+use crate::simulate::reference::equation::EquationOfMotion;
+use crate::system::{MIDPOINT, MOST_TERMS, Method, RK4, State, Tableau, Term};
+
+/// [`forward_into`](crate::simulate::reference::forward_into()), to 40 machine precisions of the largest value for each
+/// step. `false` if a kind of term is there twice: then nothing is done.
+pub(crate) fn forward(
+    equation: EquationOfMotion,
+    method: Method,
+    initial: State,
+    trajectory: &mut Trajectory,
+) -> bool {
+    let mut kinds = [None; MOST_TERMS];
+    for (j, term) in equation.terms.iter().enumerate() {
+        if kinds[place(*term)].replace(j).is_some() {
+            return false;
+        }
+    }
+    let width = equation.terms.iter().find_map(|term| match term {
+        Term::CoulombFriction { width } => Some(*width),
+        _ => None,
+    });
+    simd::run(Forward {
+        equation,
+        method,
+        kinds,
+        width: width.unwrap_or(1.0),
+        initial,
+        trajectory,
+    });
+    true
+}
+
+const STIFFNESS: usize = 0;
+const DAMPING: usize = 1;
+const CUBIC_STIFFNESS: usize = 2;
+const OFFSET: usize = 3;
+const QUADRATIC_DAMPING: usize = 4;
+const COULOMB_FRICTION: usize = 5;
+
+fn place(term: Term) -> usize {
+    match term {
+        Term::Stiffness => STIFFNESS,
+        Term::Damping => DAMPING,
+        Term::CubicStiffness => CUBIC_STIFFNESS,
+        Term::Offset => OFFSET,
+        Term::QuadraticDamping => QUADRATIC_DAMPING,
+        Term::CoulombFriction { .. } => COULOMB_FRICTION,
+    }
+}
+
+/// Most stages of a tableau.
+const STAGES: usize = 4;
+
+/// `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of
+/// the tableau.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Rates {
+    kinds: [Row; MOST_TERMS],
+    drive: Row,
+}
+
+/// Contributions of the acceleration of a stage.
+#[derive(Clone, Copy)]
+struct StageRates {
+    /// To the velocity of the next stage.
+    next: Rates,
+    /// To the velocity at the right node.
+    end: Rates,
+}
+
+const NOTHING: StageRates = {
+    let rates = Rates {
+        kinds: [[0.0; LANES]; MOST_TERMS],
+        drive: [0.0; LANES],
+    };
+    StageRates {
+        next: rates,
+        end: rates,
+    }
+};
+
+struct Forward<'a> {
+    equation: EquationOfMotion<'a>,
+    method: Method,
+    /// The term of each kind.
+    kinds: [Option<usize>; MOST_TERMS],
+    width: f64,
+    initial: State,
+    trajectory: &'a mut Trajectory,
+}
+
+impl Kernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let there = self.kinds.map(|kind| kind.is_some());
+        match (self.method, there) {
+            // Such lists are known when this is compiled.
+            (Method::Midpoint, [true, true, false, false, false, false]) => {
+                self.sweep(
+                    arithmetic,
+                    &MIDPOINT,
+                    [true, true, false, false, false, false],
+                );
+            }
+            (Method::Rk4, [true, true, false, false, false, false]) => {
+                self.sweep(arithmetic, &RK4, [true, true, false, false, false, false]);
+            }
+            (Method::Rk4, [true, true, true, false, false, false]) => {
+                self.sweep(arithmetic, &RK4, [true, true, true, false, false, false]);
+            }
+            (Method::Midpoint, there) => self.sweep(arithmetic, &MIDPOINT, there),
+            (Method::Rk4, there) => self.sweep(arithmetic, &RK4, there),
+        }
+    }
+}
+
+impl Forward<'_> {
+    #[inline(always)]
+    fn sweep<A: Arithmetic, const S: usize>(
+        self,
+        arithmetic: A,
+        tableau: &Tableau<S>,
+        there: [bool; MOST_TERMS],
+    ) {
+        let steady = Steady::of(&self.equation, &self.kinds);
+        let mut stages = [NOTHING; STAGES];
+        let mut per_mass = PerMass::at(arithmetic, &self.equation, 0);
+        let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
+        let motion = &mut *self.trajectory;
+        let steps = motion.nodes() - 1;
+        (motion.displacement[0], motion.velocity[0]) = (y, v);
+        let mut from = 0;
+        while from < steps {
+            if from > 0 && !steady.mass {
+                per_mass = PerMass::at(arithmetic, &self.equation, from);
+            }
+            prepare_drive(
+                arithmetic,
+                tableau,
+                &self.equation,
+                &per_mass,
+                from,
+                &mut stages,
+            );
+            for k in 0..MOST_TERMS {
+                if from > 0 && steady.kinds[k] {
+                    continue;
+                }
+                if let Some(j) = self.kinds[k] {
+                    let values = &self.equation.device.coefficients[j];
+                    prepare(
+                        arithmetic,
+                        tableau,
+                        self.equation.dt,
+                        values,
+                        &per_mass,
+                        from,
+                        k,
+                        &mut stages,
+                    );
+                }
+            }
+            let to = (from + LANES).min(steps);
+            let ends = motion.displacement[from + 1..=to]
+                .iter_mut()
+                .zip(&mut motion.velocity[from + 1..=to]);
+            for (l, (end_y, end_v)) in ends.enumerate() {
+                let l = l & (LANES - 1);
+                step(
+                    tableau,
+                    &stages,
+                    there,
+                    self.width,
+                    self.equation.dt,
+                    l,
+                    &mut y,
+                    &mut v,
+                );
+                (*end_y, *end_v) = (y, v);
+            }
+            from = to;
+        }
+    }
+}
+
+/// What stays as it is made for the first eight steps: what depends on constants alone.
+struct Steady {
+    mass: bool,
+    /// The rates of each kind.
+    kinds: [bool; MOST_TERMS],
+}
+
+impl Steady {
+    #[inline(always)]
+    fn of(equation: &EquationOfMotion, kinds: &[Option<usize>; MOST_TERMS]) -> Self {
+        let mass = is_constant(&equation.device.mass);
+        let is_steady = |j: usize| mass && is_constant(&equation.device.coefficients[j]);
+        Self {
+            mass,
+            kinds: kinds.map(|kind| kind.is_some_and(is_steady)),
+        }
+    }
+}
+
+/// Whether all values are the same.
+#[inline(always)]
+pub(super) fn is_constant(values: &[f64]) -> bool {
+    let first = values[0];
+    // A part at a time, without a branch for each value.
+    let mut parts = values.chunks(32 * LANES);
+    parts.all(|part| part.iter().fold(true, |same, x| same & (*x == first)))
+}
+
+/// One by the mass at the left ends, middles and right ends of eight steps.
+#[derive(Clone, Copy)]
+struct PerMass<A: Arithmetic>([Eight<A>; 3]);
+
+impl<A: Arithmetic> PerMass<A> {
+    #[inline(always)]
+    fn at(arithmetic: A, equation: &EquationOfMotion, i: usize) -> Self {
+        let one = Eight::splat(arithmetic, 1.0);
+        Self(padded_loads::places(arithmetic, &equation.device.mass, i).map(|mass| one / mass))
+    }
+}
+
+/// The rates of a kind of term from its function, over the steps from `i` on.
+#[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "rows go where they stay, and nowhere between"
+)]
+fn prepare<A: Arithmetic, const S: usize>(
+    arithmetic: A,
+    tableau: &Tableau<S>,
+    dt: f64,
+    values: &[f64],
+    per_mass: &PerMass<A>,
+    i: usize,
+    kind: usize,
+    stages: &mut [StageRates; STAGES],
+) {
+    let mut p = padded_loads::places(arithmetic, values, i);
+    for (p, per_mass) in p.iter_mut().zip(per_mass.0) {
+        *p = *p * per_mass;
+    }
+    for (s, stage) in stages.iter_mut().enumerate().take(S) {
+        let [next, end] = factors(tableau, dt, s);
+        let p = p[tableau.position[s] as usize];
+        stage.next.kinds[kind] = (p * Eight::splat(arithmetic, next)).row();
+        stage.end.kinds[kind] = (p * Eight::splat(arithmetic, end)).row();
+    }
+}
+
+/// What drives the steps from `i` on.
+#[inline(always)]
+fn prepare_drive<A: Arithmetic, const S: usize>(
+    arithmetic: A,
+    tableau: &Tableau<S>,
+    equation: &EquationOfMotion,
+    per_mass: &PerMass<A>,
+    i: usize,
+    stages: &mut [StageRates; STAGES],
+) {
+    let force = padded_loads::stepwise(
+        arithmetic,
+        equation.excitation.and_then(|e| e.force.as_ref()),
+        i,
+    );
+    let base = padded_loads::stepwise(
+        arithmetic,
+        equation.excitation.and_then(|e| e.base.as_ref()),
+        i,
+    );
+    for (s, stage) in stages.iter_mut().enumerate().take(S) {
+        let q = tableau.position[s] as usize;
+        let push = force[q] * per_mass.0[q];
+        let drive = push - base[q];
+        let [next, end] = factors(tableau, equation.dt, s);
+        stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();
+        stage.end.drive = (drive * Eight::splat(arithmetic, end)).row();
+    }
+}
+
+/// The step times what the acceleration of stage `s` counts for the next stage, the only one that sees
+/// it, and for the end of the step.
+#[inline(always)]
+fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] {
+    let next = if s + 1 < S { tableau.a[s + 1][s] } else { 0.0 };
+    [dt * next, dt * tableau.b[s]]
+}
+
+/// One step, in lane `l` of the rates.
+///
+/// Sums are in the order in which their parts become known: the displacement of a stage before its velocity, and
+/// at the first stage before the velocity that the step starts from.
+#[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "a struct of them would not be kept in registers"
+)]
+fn step<const S: usize>(
+    tableau: &Tableau<S>,
+    stages: &[StageRates; STAGES],
+    there: [bool; MOST_TERMS],
+    width: f64,
+    dt: f64,
+    l: usize,
+    y: &mut f64,
+    v: &mut f64,
+) {
+    let (mut y_s, mut v_s) = (*y, *v);
+    let (mut y_end, mut v_end) = (*y, *v);
+    for (s, stage) in stages.iter().enumerate().take(S) {
+        let phi = Phi::at(there, width, y_s, v_s);
+        let [next, end] = factors(tableau, dt, s);
+        if tableau.b[s] != 0.0 {
+            y_end += end * v_s;
+            let rates = &stage.end;
+            v_end =
+                phi.damped(rates, there, l, v_end) + phi.pushed(rates, there, l, rates.drive[l]);
+        }
+        if s + 1 < S {
+            y_s = *y + next * v_s;
+            let rates = &stage.next;
+            let drive = rates.drive[l];
+            let pushed = match s {
+                0 => *v + phi.pushed(rates, there, l, drive),
+                _ => phi.pushed(rates, there, l, *v + drive),
+            };
+            v_s = phi.damped(rates, there, l, pushed);
+        }
+    }
+    (*y, *v) = (y_end, v_end);
+}
+
+/// What each term multiplies its function by, at one stage; for the cubic stiffness the square alone.
+#[derive(Clone, Copy)]
+struct Phi([f64; MOST_TERMS]);
+
+impl Phi {
+    #[inline(always)]
+    fn at(there: [bool; MOST_TERMS], width: f64, y: f64, v: f64) -> Self {
+        let mut phi = [0.0; MOST_TERMS];
+        phi[OFFSET] = 1.0;
+        phi[STIFFNESS] = y;
+        phi[DAMPING] = v;
+        if there[CUBIC_STIFFNESS] {
+            phi[CUBIC_STIFFNESS] = y * y;
+        }
+        if there[QUADRATIC_DAMPING] {
+            phi[QUADRATIC_DAMPING] = Term::QuadraticDamping.phi(y, v);
+        }
+        if there[COULOMB_FRICTION] {
+            phi[COULOMB_FRICTION] = Term::CoulombFriction { width }.phi(y, v);
+        }
+        Self(phi)
+    }
+
+    /// `sum` and what the displacement brings.
+    #[inline(always)]
+    fn pushed(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
+        let Self(phi) = self;
+        let mut sum = sum;
+        for kind in [OFFSET, STIFFNESS] {
+            if there[kind] {
+                sum -= rates.kinds[kind][l] * phi[kind];
+            }
+        }
+        if there[CUBIC_STIFFNESS] {
+            // In pairs, of which neither waits for the other.
+            let slope = rates.kinds[CUBIC_STIFFNESS][l] * phi[STIFFNESS];
+            sum -= slope * phi[CUBIC_STIFFNESS];
+        }
+        sum
+    }
+
+    /// `sum` and what the velocity brings.
+    #[inline(always)]
+    fn damped(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
+        let mut sum = sum;
+        for kind in [DAMPING, QUADRATIC_DAMPING, COULOMB_FRICTION] {
+            if there[kind] {
+                sum -= rates.kinds[kind][l] * self.0[kind];
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Engine, reference};
+    use crate::system::{Device, Excitation, Grid, Oscillator};
+
+    /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
+    #[test]
+    fn functions_that_are_constant_at_first() {
+        let oscillator = Oscillator {
+            grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
+            method: Method::Rk4,
+            terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        };
+        let drive: Vec<f64> = (0..41).map(|i| (0.3 * f64::from(i)).sin()).collect();
+        let excitation = Excitation::force_at_nodes(&drive);
+        let initial = State {
+            displacement: 0.4,
+            velocity: -0.2,
+        };
+        for moving in 0..=4 {
+            let values = |f: usize, value: f64| -> Vec<f64> {
+                let grows = |i: usize| {
+                    if f == moving && i > 9 {
+                        0.02 * i as f64
+                    } else {
+                        0.0
+                    }
+                };
+                (0..41).map(|i| value + grows(i)).collect()
+            };
+            let device = Device {
+                mass: values(0, 1.2),
+                coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
+            };
+            let zeros = || Trajectory::zeros(41);
+            let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
+            Engine::Prefactored
+                .forward_into(&oscillator, &device, initial, drive, &mut fast)
+                .expect("a motion");
+            reference::forward_into(&oscillator, &device, initial, drive, &mut plain)
+                .expect("a motion");
+            let pairs = (fast.displacement.iter().zip(&plain.displacement))
+                .chain(fast.velocity.iter().zip(&plain.velocity));
+            for (fast, plain) in pairs {
+                assert!((fast - plain).abs() <= 1e-14, "{moving}: {fast} {plain}");
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The costs of many devices along a ray, one a lane: the paper's trial steps.
+//!
+//! What is wanted of them is which is lowest, and its motion, with the bits that it would have by itself
+//! ([`forward`](crate::simulate::reference::forward())). So no motion is kept: of each eight states along the record are, from
+//! which the lowest one's is made again, eight parts at once ([`replay()`]). The costs are sums in another order than that of
+//! the integral, of motions in which one quotient in `2^50` may have another last bit; those who may have the lowest cost are
+//! told from all others by a margin far above both.
+
+mod replay;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+use crate::simd::{self, LANES, Row};
+use crate::system::State;
+use std::ops::Range;
+
+pub(crate) use replay::replay;
+
+/// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
+#[derive(Clone, Copy)]
+pub(crate) struct Ray<'a> {
+    /// Mass, damping, stiffness at the nodes.
+    pub functions: [&'a [f64]; 3],
+    /// What is taken away from them, per unit of `a`.
+    pub direction: [&'a [f64]; 3],
+    /// State at the first node.
+    pub initial: State,
+    /// Displacements read at the nodes, m.
+    pub readings: &'a [f64],
+    /// Step, s.
+    pub step: f64,
+}
+
+/// Most rows at once: enough that the divisions of one row hide behind those of the others, and few
+/// enough for the registers.
+pub(crate) const ROWS: usize = 4;
+
+/// How far a cost that is summed in lanes, relative to itself, may be from the one that is summed in order. Of `n` terms
+/// that are not negative two sums are within `n EPSILON`, which is less up to 10^5 nodes (and is taken beyond). The rest is
+/// for the last bit of a quotient, which may grow on the way: one in `2^50` has another one.
+const MARGIN: f64 = 1e-10;
+
+/// In which rows and lanes the trials at some lengths are.
+#[derive(Debug, Default)]
+pub(crate) struct Layout {
+    /// Trials before the first that has mass everywhere.
+    without_mass: usize,
+    /// Trials in the first row, which may be less than full: it is filled up with its first.
+    in_first: usize,
+    rows: Vec<Row>,
+    nodes: usize,
+}
+
+impl Layout {
+    /// That of the devices at `lengths`, which fall. The ray [`is_moderate`](Ray::is_moderate) as far as the longest of them.
+    pub fn new(ray: Ray, lengths: &[f64]) -> Self {
+        let without_mass = ray.first_with_mass(lengths);
+        let lengths = &lengths[without_mass..];
+        let in_first = match lengths.len() % LANES {
+            0 => LANES.min(lengths.len()),
+            rest => rest,
+        };
+        let (first, others) = lengths.split_at(in_first);
+        let row = |part: &[f64]| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0]));
+        let first = (!first.is_empty()).then(|| row(first));
+        Self {
+            nodes: ray.readings.len(),
+            without_mass,
+            in_first,
+            rows: first
+                .into_iter()
+                .chain(others.chunks(LANES).map(row))
+                .collect(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether of the first row four lanes are enough.
+    fn begins_with_half(&self) -> bool {
+        self.rows.len() > 1 && self.in_first <= LANES / 2
+    }
+
+    /// Row and lane of a trial.
+    pub fn place(&self, which: usize) -> (usize, usize) {
+        let which = which - self.without_mass;
+        match which.checked_sub(self.in_first) {
+            None => (0, which),
+            Some(others) => (1 + others / LANES, others % LANES),
+        }
+    }
+
+    /// The trials that may have the lowest cost `integral (y - y_obs)^2 dt`, by the sums of squares of all rows: those of
+    /// all others are higher, or there is no mass, or the motion leaves the finite numbers.
+    pub fn lowest(&self, costs: &[Row]) -> Vec<usize> {
+        let of = |which: &usize| {
+            let (row, lane) = self.place(*which);
+            costs[row][lane]
+        };
+        let others = LANES * self.rows.len().saturating_sub(1);
+        let trials = self.without_mass..self.without_mass + self.in_first + others;
+        let lowest = trials
+            .clone()
+            .map(|which| of(&which))
+            .fold(f64::INFINITY, f64::min);
+        let margin = MARGIN.max(4.0 * f64::EPSILON * self.nodes as f64);
+        let may_be = |which: &usize| of(which).is_finite() && of(which) <= lowest * (1.0 + margin);
+        trials.filter(may_be).collect()
+    }
+}
+
+/// Displacements and velocities of a row where the eight parts of the record begin.
+type States = [[Row; 2]; LANES];
+
+/// The trials of some rows, at most [`ROWS`]: storage that is used again and again.
+#[derive(Default)]
+pub(crate) struct Trials {
+    rows: Range<usize>,
+    states: Vec<States>,
+    costs: Vec<Row>,
+}
+
+impl Trials {
+    /// Does the trials of some rows.
+    ///
+    /// # Panics
+    /// If they are too many.
+    pub fn run(&mut self, ray: Ray, layout: &Layout, rows: Range<usize>) {
+        assert!(rows.len() <= ROWS, "{} rows at once", rows.len());
+        let has_half = rows.start == 0 && rows.len() > 1 && layout.begins_with_half();
+        let lengths = &layout.rows[rows.clone()];
+        self.states
+            .resize(lengths.len(), [[[0.0; LANES]; 2]; LANES]);
+        self.costs.resize(lengths.len(), [0.0; LANES]);
+        match (has_half, lengths.len()) {
+            (_, 0) => {}
+            (false, 1) => self.of_rows::<1, false>(ray, lengths),
+            (false, 2) => self.of_rows::<2, false>(ray, lengths),
+            (false, 3) => self.of_rows::<3, false>(ray, lengths),
+            (false, _) => self.of_rows::<4, false>(ray, lengths),
+            (true, 2) => self.of_rows::<1, true>(ray, lengths),
+            (true, 3) => self.of_rows::<2, true>(ray, lengths),
+            (true, _) => self.of_rows::<3, true>(ray, lengths),
+        }
+        self.rows = rows;
+    }
+
+    /// The sums of squares of the rows.
+    pub fn costs(&self) -> &[Row] {
+        &self.costs
+    }
+
+    /// Displacements and velocities of a lane where its parts begin, if the row is one of these.
+    pub fn states(&self, (row, lane): (usize, usize)) -> Option<[Row; 2]> {
+        let states = self.states.get(row.checked_sub(self.rows.start)?)?;
+        let of = |which: usize| std::array::from_fn(|part| states[part][which][lane]);
+        Some([of(0), of(1)])
+    }
+
+    fn of_rows<const R: usize, const HALF: bool>(&mut self, ray: Ray, lengths: &[Row]) {
+        // Without half a row nobody looks at what stands in its place.
+        let (mut no_states, mut no_costs) = ([[[0.0; LANES]; 2]; LANES], [0.0; LANES]);
+        let states = halved(&mut self.states, HALF, &mut no_states);
+        let costs = halved(&mut self.costs, HALF, &mut no_costs);
+        let whole = lengths[usize::from(HALF)..].first_chunk();
+        if let (Some(whole), Some(states), Some(costs)) = (whole, states, costs) {
+            simd::run(rows::Rows::<R, HALF> {
+                ray,
+                lengths: (&lengths[0], whole),
+                states,
+                costs,
+            });
+        }
+    }
+}
+
+/// What belongs to half a row, or its place where there is none, and what to `R` rows.
+fn halved<'a, T, const R: usize>(
+    all: &'a mut [T],
+    has_half: bool,
+    none: &'a mut T,
+) -> Option<(&'a mut T, &'a mut [T; R])> {
+    let (half, rows) = match has_half {
+        true => all.split_first_mut()?,
+        false => (none, all),
+    };
+    Some((half, rows.first_chunk_mut()?))
+}
+
+/// Nodes in each of the eight parts of a motion, the last of which may be shorter, or empty.
+fn part(nodes: usize) -> usize {
+    nodes.div_ceil(LANES)
+}
+
+impl Ray<'_> {
+    /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
+    /// after rounding.
+    fn first_with_mass(self, lengths: &[f64]) -> usize {
+        let has_mass = |a: &f64| self.masses(*a, |m| m > 0.0);
+        lengths.iter().position(has_mass).unwrap_or(lengths.len())
+    }
+
+    /// Whether the masses of all devices as far as `longest` are so moderate, where they are positive, that
+    /// [`Eight::quotients`] divides by them as it says. A positive difference is no smaller than the
+    /// last place of what it is taken from.
+    pub fn is_moderate(self, longest: f64) -> bool {
+        const LIGHT: f64 = 1e-70;
+        const HEAVY: f64 = 1e70;
+        self.masses(0.0, |m| LIGHT < m && m < HEAVY) && self.masses(longest, |m| m < HEAVY)
+    }
+
+    /// Whether all masses at `a` are as they should be. All are looked at: a loop without a way out is the faster one.
+    fn masses(self, a: f64, are: impl Fn(f64) -> bool) -> bool {
+        let pairs = self.functions[0].iter().zip(self.direction[0]);
+        pairs.fold(true, |so_far, (p, g)| so_far & are(p - a * g))
+    }
+}

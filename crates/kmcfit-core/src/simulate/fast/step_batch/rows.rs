@@ -1,0 +1,202 @@
+//! Rows of devices, one a lane, and the steps that they take.
+
+use super::{Ray, States, part};
+use crate::simd::{Arithmetic, Eight, Kernel, Row};
+
+/// A row of devices, of which four lanes count, and `R` whole ones.
+pub(super) struct Rows<'a, const R: usize, const HALF: bool> {
+    pub ray: Ray<'a>,
+    pub lengths: (&'a Row, &'a [Row; R]),
+    pub states: (&'a mut States, &'a mut [States; R]),
+    /// Sums of squares, not finite where the motion is not.
+    pub costs: (&'a mut Row, &'a mut [Row; R]),
+}
+
+/// Mass, damping and stiffness of a row of devices.
+#[derive(Clone, Copy)]
+pub(super) struct Values<A: Arithmetic>(pub [Eight<A>; 3]);
+
+impl<A: Arithmetic> Values<A> {
+    #[inline(always)]
+    fn at(ray: &Ray, arithmetic: A, length: Eight<A>, i: usize) -> Self {
+        let mut values = [length; 3];
+        let pairs = ray.functions.iter().zip(&ray.direction);
+        for (value, (p, g)) in values.iter_mut().zip(pairs) {
+            let (p, g) = (
+                Eight::splat(arithmetic, p[i]),
+                Eight::splat(arithmetic, g[i]),
+            );
+            *value = p - length * g;
+        }
+        Self(values)
+    }
+
+    /// Twice the values in the middle: halves of all three would change no bit of an acceleration.
+    #[inline(always)]
+    fn twice_middle(self, right: Self) -> Self {
+        let mut values = self.0;
+        for (value, right) in values.iter_mut().zip(right.0) {
+            *value = right + *value;
+        }
+        Self(values)
+    }
+
+    /// `-y'' = k y/m + c v/m`, by divisions or by as few of them as there can be ([`Eight::quotients`]). Of both signs
+    /// all that follows has the same bits, but for the sign of a velocity of zero.
+    #[inline(always)]
+    fn deceleration<const DIVIDED: bool>(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
+        let [m, c, k] = self.0;
+        if DIVIDED {
+            return k * y / m + c * v / m;
+        }
+        let [elastic, viscous] = Eight::quotients(k * y, c * v, m);
+        elastic + viscous
+    }
+}
+
+/// What is the same in every step.
+#[derive(Clone, Copy)]
+pub(super) struct Steps<A: Arithmetic> {
+    dt: Eight<A>,
+    half_dt: Eight<A>,
+}
+
+impl<A: Arithmetic> Steps<A> {
+    #[inline(always)]
+    pub fn of(arithmetic: A, step: f64) -> Self {
+        let splat = |x| Eight::splat(arithmetic, x);
+        Self {
+            dt: splat(step),
+            half_dt: splat(0.5 * step),
+        }
+    }
+
+    /// One step of the midpoint rule, whose accelerations at its left node and in its middle are `DIVIDED` or not: with one of
+    /// each, divider and multipliers are busy side by side.
+    #[inline(always)]
+    pub fn step<const LEFT_DIVIDED: bool, const MIDDLE_DIVIDED: bool>(
+        self,
+        [left, right]: [Values<A>; 2],
+        [y, v]: [Eight<A>; 2],
+    ) -> [Eight<A>; 2] {
+        let Self { dt, half_dt } = self;
+        let d = left.deceleration::<LEFT_DIVIDED>(y, v);
+        let (y_half, v_half) = (y + half_dt * v, v - half_dt * d);
+        let middle = left.twice_middle(right);
+        let d_half = middle.deceleration::<MIDDLE_DIVIDED>(y_half, v_half);
+        [y + dt * v_half, v - dt * d_half]
+    }
+}
+
+/// A row of devices on their way.
+#[derive(Clone, Copy)]
+struct Devices<A: Arithmetic> {
+    arithmetic: A,
+    length: Row,
+    left: Values<A>,
+    state: [Eight<A>; 2],
+    /// The squares of the residuals.
+    sum: Eight<A>,
+}
+
+impl<A: Arithmetic> Devices<A> {
+    #[inline(always)]
+    fn begin(ray: &Ray, arithmetic: A, length: &Row) -> Self {
+        let splat = |x| Eight::splat(arithmetic, x);
+        let state = [splat(ray.initial.displacement), splat(ray.initial.velocity)];
+        let residual = state[0] - splat(ray.readings[0]);
+        Self {
+            arithmetic,
+            length: *length,
+            left: Values::at(ray, arithmetic, Eight::load(arithmetic, length), 0),
+            state,
+            // Both ends count half.
+            sum: splat(-0.5) * (residual * residual),
+        }
+    }
+
+    #[inline(always)]
+    fn step<const MIDDLE_DIVIDED: bool>(&mut self, ray: &Ray, steps: Steps<A>, i: usize) {
+        let residual = self.state[0] - Eight::splat(self.arithmetic, ray.readings[i]);
+        self.sum += residual * residual;
+        let length = Eight::load(self.arithmetic, &self.length);
+        let right = Values::at(ray, self.arithmetic, length, i + 1);
+        self.state = steps.step::<false, MIDDLE_DIVIDED>([self.left, right], self.state);
+        self.left = right;
+    }
+
+    #[inline(always)]
+    fn rows(&self) -> [Row; 2] {
+        [self.state[0].row(), self.state[1].row()]
+    }
+
+    #[inline(always)]
+    fn cost(&self, last_reading: f64) -> Row {
+        let splat = |x| Eight::splat(self.arithmetic, x);
+        let [y, v] = self.state;
+        let residual = y - splat(last_reading);
+        // Zero, and not a number where the motion is not finite.
+        let nothing = splat(0.0) * y + splat(0.0) * v;
+        (self.sum + splat(0.5) * (residual * residual) + nothing).row()
+    }
+}
+
+impl<const R: usize, const HALF: bool> Kernel for Rows<'_, R, HALF> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) {
+        let Rows {
+            ray,
+            lengths: (length, lengths),
+            states: (state, states),
+            costs: (cost, costs),
+        } = self;
+        let steps = Steps::of(arithmetic, ray.step);
+        let half_steps = Steps::of(arithmetic.half(), ray.step);
+        let nodes = ray.readings.len();
+        let last = nodes - 1;
+        let part = part(nodes);
+
+        let mut half = Devices::begin(&ray, arithmetic.half(), length);
+        let mut rows = [Devices::begin(&ray, arithmetic, &lengths[0]); R];
+        for r in 1..R {
+            rows[r] = Devices::begin(&ray, arithmetic, &lengths[r]);
+        }
+        let (mut next, mut which) = (0, 0);
+        for i in 0..last {
+            if i == next {
+                if HALF {
+                    state[which] = half.rows();
+                }
+                for r in 0..R {
+                    states[r][which] = rows[r].rows();
+                }
+                (next, which) = (next + part, which + 1);
+            }
+            rows[0].step::<true>(&ray, steps, i);
+            // Among the others: at either end it takes as long as a whole row.
+            if HALF {
+                half.step::<false>(&ray, half_steps, i);
+            }
+            for row in &mut rows[1..] {
+                row.step::<true>(&ray, steps, i);
+            }
+        }
+        // The last node, where a part begins with it.
+        if last == next {
+            if HALF {
+                state[which] = half.rows();
+            }
+            for r in 0..R {
+                states[r][which] = rows[r].rows();
+            }
+        }
+        if HALF {
+            *cost = half.cost(ray.readings[last]);
+        }
+        for r in 0..R {
+            costs[r] = rows[r].cost(ray.readings[last]);
+        }
+    }
+}

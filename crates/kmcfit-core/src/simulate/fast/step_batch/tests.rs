@@ -1,0 +1,148 @@
+use super::*;
+use crate::simulate::{Trajectory, reference};
+use crate::system::quadrature::trapezoid;
+use crate::system::{Device, Grid, Method, Oscillator, Term};
+
+/// Parts of one node and of many, whole rounds of eight and others, and last parts that are short or empty.
+const NODES: [usize; 9] = [3, 4, 8, 9, 17, 41, 64, 65, 241];
+
+/// Mass, damping and stiffness, and what is taken away from them.
+fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
+    let of = |f: fn(f64) -> f64| -> Vec<f64> {
+        (0..nodes)
+            .map(|i| f(8.0 * i as f64 / nodes as f64))
+            .collect()
+    };
+    [
+        [
+            of(|t| 2.0 + 0.3 * t.sin()),
+            of(|t| 0.4 - 0.05 * t),
+            of(|t| 3.0 + t.cos()),
+        ],
+        [
+            of(|t| 1.0 + 0.1 * t),
+            of(|t| 0.5 - 0.1 * t),
+            of(|t| t.sin() - 0.5),
+        ],
+    ]
+}
+
+fn device_at(ray: &Ray, length: f64) -> Device {
+    let [mass, damping, stiffness] = [0, 1, 2].map(|f| {
+        let pairs = ray.functions[f].iter().zip(ray.direction[f]);
+        pairs.map(|(p, g)| p - length * g).collect()
+    });
+    Device {
+        mass,
+        coefficients: vec![damping, stiffness],
+    }
+}
+
+/// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
+fn by_itself(ray: &Ray, length: f64) -> Option<(Trajectory, f64)> {
+    let nodes = ray.readings.len();
+    let oscillator = Oscillator {
+        grid: Grid::new(0.0, ray.step * (nodes - 1) as f64, nodes).unwrap(),
+        method: Method::Midpoint,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let motion =
+        reference::forward(&oscillator, &device_at(ray, length), ray.initial, None).ok()?;
+    let pairs = motion.displacement.iter().zip(ray.readings);
+    let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
+    let cost = trapezoid(&squares, ray.step);
+    Some((motion, cost))
+}
+
+fn ray<'a>(
+    functions: &'a [Vec<f64>; 3],
+    direction: &'a [Vec<f64>; 3],
+    readings: &'a [f64],
+) -> Ray<'a> {
+    Ray {
+        functions: functions.each_ref().map(Vec::as_slice),
+        direction: direction.each_ref().map(Vec::as_slice),
+        initial: State {
+            displacement: 1.2,
+            velocity: -0.7,
+        },
+        readings,
+        step: 0.125,
+    }
+}
+
+#[test]
+fn every_trial_is_the_forward_solve_by_itself() {
+    NODES.into_iter().for_each(every_trial);
+}
+
+fn every_trial(nodes: usize) {
+    let [functions, direction] = functions(nodes);
+    let readings: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
+    let ray = ray(&functions, &direction, &readings);
+    // One lane, part of a row, whole rows, and half a row beside one, two and three; the two longest leave no mass.
+    for count in [1, 7, 8, 19, 28, 32, 44, 50, 52] {
+        let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
+        let layout = Layout::new(ray, &lengths);
+        // One thread's rows and another one's.
+        let (rows, mut trials) = (layout.rows(), [Trials::default(), Trials::default()]);
+        trials[0].run(ray, &layout, 0..rows.div_ceil(2));
+        trials[1].run(ray, &layout, rows.div_ceil(2)..rows);
+        let found = trials.each_ref().map(Trials::costs).concat();
+        let lowest = layout.lowest(&found);
+        let alone: Vec<_> = lengths.iter().map(|a| by_itself(&ray, *a)).collect();
+        let costs: Vec<f64> = (alone.iter())
+            .map(|found| found.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost))
+            .collect();
+        let best = (0..count).filter(|i| costs[*i].is_finite());
+        let best = best.min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        assert_eq!(best.is_some(), !lowest.is_empty());
+        assert!(
+            best.is_none_or(|best| lowest.contains(&best)),
+            "of {count}: {costs:?}"
+        );
+        assert!(lowest.len() <= 1 || nodes < 9, "{lowest:?} of {count}");
+        for (which, cost) in costs
+            .iter()
+            .enumerate()
+            .filter(|(_, cost)| cost.is_finite())
+        {
+            let (row, lane) = layout.place(which);
+            let error = ray.step * found[row][lane] / cost - 1.0;
+            assert!(error.abs() < 1e-12, "trial {which} of {count}: {error:e}");
+        }
+        for (which, found) in alone.into_iter().enumerate() {
+            let Some((motion, _)) = found else { continue };
+            let mut again = Trajectory::zeros(nodes);
+            let device = device_at(&ray, lengths[which]);
+            let place = layout.place(which);
+            let states = trials.iter().find_map(|trials| trials.states(place));
+            let mut states = states.expect("states of every trial");
+            let is_whole = replay(&device, ray.initial, states, ray.step, &mut again);
+            assert!(is_whole && again == motion, "trial {which} of {count}");
+            // A last bit is seen, in whatever part.
+            let parts = nodes.div_ceil(part(nodes));
+            let state = &mut states[which % 2][which % parts];
+            *state = state.next_up();
+            assert!(
+                !replay(&device, ray.initial, states, ray.step, &mut again),
+                "trial {which} of {count}"
+            );
+        }
+    }
+}
+
+/// Trials whose costs are as good as equal are all told, whichever is lower in its last digits.
+#[test]
+fn costs_that_are_as_good_as_equal_are_all_candidates() {
+    let [functions, direction] = functions(41);
+    let readings = [0.3; 41];
+    let ray = ray(&functions, &direction, &readings);
+    let layout = Layout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
+    // Within the margin, and beyond it.
+    let mut costs = [1.0; LANES];
+    (costs[1], costs[2], costs[3]) = (0.5, 0.5 * (1.0 + 1e-12), 0.5 * (1.0 + 1e-9));
+    assert_eq!(layout.lowest(&[costs]), [1, 2]);
+    (costs[0], costs[1]) = (f64::NAN, f64::INFINITY);
+    assert_eq!(layout.lowest(&[costs]), [2]);
+}

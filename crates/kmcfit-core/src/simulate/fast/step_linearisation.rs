@@ -1,0 +1,277 @@
+//! Eight steps linearised at once: the response is known, so no step waits for the one before.
+
+use super::elements::with_known;
+use super::padded_loads;
+use super::prefactored::is_constant;
+use crate::simd::{Arithmetic, Eight, LANES, Row};
+use crate::simulate::Trajectory;
+use crate::simulate::reference::equation::EquationOfMotion;
+use crate::system::{
+    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, Stepwise, Tableau, Term,
+};
+
+/// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
+/// one of the right node's state (displacement, velocity).
+#[repr(align(64))]
+pub(super) struct StepLinearisation {
+    /// With respect to displacement and velocity at the left node, less the identity.
+    pub growth: [[Row; 2]; 2],
+    /// With respect to each function's value at the left node, mass first.
+    pub left: [[Row; 2]; FUNCTIONS],
+    /// With respect to each function's value at the right node.
+    pub right: [[Row; 2]; FUNCTIONS],
+    /// With respect to each function that has the same value everywhere.
+    pub sum: [[Row; 2]; FUNCTIONS],
+}
+
+impl StepLinearisation {
+    pub const NOTHING: Self = Self {
+        growth: [[[0.0; LANES]; 2]; 2],
+        left: [[[0.0; LANES]; 2]; FUNCTIONS],
+        right: [[[0.0; LANES]; 2]; FUNCTIONS],
+        sum: [[[0.0; LANES]; 2]; FUNCTIONS],
+    };
+}
+
+/// Requested derivatives, mass first.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Wanted {
+    /// With respect to the values at both nodes.
+    pub ends: [bool; FUNCTIONS],
+    /// With respect to one value for both.
+    pub sum: [bool; FUNCTIONS],
+}
+
+/// The mass over some nodes, if it is constant there: steps then share a division.
+pub(super) fn constant_mass(mass: &[f64]) -> Option<f64> {
+    is_constant(mass).then(|| mass.first().copied()).flatten()
+}
+
+/// A function at the three [`Position`]s of eight steps.
+#[derive(Clone, Copy)]
+struct Places<A: Arithmetic>([Eight<A>; 3]);
+
+impl<A: Arithmetic> Places<A> {
+    #[inline(always)]
+    fn of(arithmetic: A, values: &[f64], i: usize) -> Self {
+        Self(padded_loads::places(arithmetic, values, i))
+    }
+
+    #[inline(always)]
+    fn stepwise(arithmetic: A, part: Option<&Stepwise>, i: usize) -> Self {
+        Self(padded_loads::stepwise(arithmetic, part, i))
+    }
+
+    /// One by the mass.
+    #[inline(always)]
+    fn of_inverse_mass(
+        arithmetic: A,
+        equation: &EquationOfMotion,
+        i: usize,
+        constant: Option<f64>,
+    ) -> Self {
+        if let Some(mass) = constant {
+            return Self([Eight::splat(arithmetic, 1.0 / mass); 3]);
+        }
+        let mut places = Self::of(arithmetic, &equation.device.mass, i);
+        for place in &mut places.0 {
+            *place = Eight::splat(arithmetic, 1.0) / *place;
+        }
+        places
+    }
+
+    #[inline(always)]
+    fn at(&self, position: Position) -> Eight<A> {
+        self.0[position as usize]
+    }
+}
+
+/// Linearises the steps `i` to `i + 7` of a response, over which the mass may be known to be constant, for the functions
+/// that are `wanted`: [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
+#[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "a struct of them would not be kept in registers"
+)]
+pub(super) fn linearise<A: Arithmetic>(
+    arithmetic: A,
+    method: Method,
+    equation: &EquationOfMotion,
+    motion: &Trajectory,
+    i: usize,
+    constant_mass: Option<f64>,
+    wanted: &Wanted,
+    maps: &mut StepLinearisation,
+) {
+    let terms = equation.terms;
+    with_known!(terms, terms, TERMS => match method {
+        Method::Midpoint => {
+            let stages = StageDerivatives::<A, 2, TERMS>::new(
+                arithmetic, &MIDPOINT, terms, equation, motion, i, constant_mass,
+            );
+            stages.transpose(arithmetic, &MIDPOINT, terms.len(), equation.dt, wanted, maps);
+        }
+        Method::Rk4 => {
+            let stages = StageDerivatives::<A, 4, TERMS>::new(
+                arithmetic, &RK4, terms, equation, motion, i, constant_mass,
+            );
+            stages.transpose(arithmetic, &RK4, terms.len(), equation.dt, wanted, maps);
+        }
+    });
+}
+
+/// Derivatives of the accelerations at the stages of eight steps.
+#[derive(Clone, Copy)]
+struct StageDerivatives<A: Arithmetic, const S: usize, const TERMS: usize> {
+    /// With respect to displacement and velocity.
+    by_y: [Eight<A>; S],
+    by_v: [Eight<A>; S],
+    /// With respect to the mass.
+    by_mass: [Eight<A>; S],
+    /// With respect to the function of each term.
+    by_function: [[Eight<A>; TERMS]; S],
+}
+
+impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, TERMS> {
+    #[inline(always)]
+    fn new(
+        arithmetic: A,
+        tableau: &Tableau<S>,
+        terms: &[Term],
+        equation: &EquationOfMotion,
+        motion: &Trajectory,
+        i: usize,
+        constant_mass: Option<f64>,
+    ) -> Self {
+        let zero = Eight::splat(arithmetic, 0.0);
+        let per_mass = Places::of_inverse_mass(arithmetic, equation, i, constant_mass);
+        let input = equation.excitation;
+        let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
+        let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);
+        let mut functions = [Places([zero; 3]); TERMS];
+        let coefficients = equation.device.coefficients.iter().take(terms.len());
+        for (places, values) in functions.iter_mut().zip(coefficients) {
+            *places = Places::of(arithmetic, values, i);
+        }
+        let y0 = padded_loads::eight(arithmetic, &motion.displacement, i);
+        let v0 = padded_loads::eight(arithmetic, &motion.velocity, i);
+        let [mut v, mut a] = [[zero; S]; 2];
+        let mut stages = Self {
+            by_y: [zero; S],
+            by_v: [zero; S],
+            by_mass: [zero; S],
+            by_function: [[zero; TERMS]; S],
+        };
+        for s in 0..S {
+            let position = tableau.position[s];
+            let (mut y_s, mut v_s) = (y0, v0);
+            for r in 0..s {
+                if tableau.a[s][r] != 0.0 {
+                    let h = Eight::splat(arithmetic, equation.dt * tableau.a[s][r]);
+                    y_s += h * v[r];
+                    v_s += h * a[r];
+                }
+            }
+            v[s] = v_s;
+            let per_mass = per_mass.at(position);
+            let minus_per_mass = -per_mass;
+            let mut push = force.at(position);
+            for (j, term) in terms.iter().enumerate().take(TERMS) {
+                let p = functions[j].at(position);
+                let response = term.respond(arithmetic, y_s, v_s);
+                push = push - p * response.phi;
+                stages.by_function[s][j] = response.phi * minus_per_mass;
+                stages.by_y[s] = response.by_y.taken_from(stages.by_y[s], p);
+                stages.by_v[s] = response.by_v.taken_from(stages.by_v[s], p);
+            }
+            let inertia = push * per_mass;
+            a[s] = inertia - base.at(position);
+            stages.by_y[s] = stages.by_y[s] * per_mass;
+            stages.by_v[s] = stages.by_v[s] * per_mass;
+            stages.by_mass[s] = inertia * minus_per_mass;
+        }
+        stages
+    }
+
+    /// The derivatives of the state at the right node, from each of its components back through the stages.
+    #[inline(always)]
+    fn transpose(
+        &self,
+        arithmetic: A,
+        tableau: &Tableau<S>,
+        terms: usize,
+        dt: f64,
+        wanted: &Wanted,
+        maps: &mut StepLinearisation,
+    ) {
+        let zero = Eight::splat(arithmetic, 0.0);
+        for end in 0..2 {
+            let [mut y_bar, mut v_bar, mut a_bar] = [[zero; S]; 3];
+            let [mut to_y, mut to_v] = [zero; 2];
+            for s in (0..S).rev() {
+                let weight = Eight::splat(arithmetic, dt * tableau.b[s]);
+                if end == 0 {
+                    v_bar[s] = weight;
+                } else {
+                    a_bar[s] = weight;
+                }
+                for r in s + 1..S {
+                    if tableau.a[r][s] != 0.0 {
+                        let h = Eight::splat(arithmetic, dt * tableau.a[r][s]);
+                        a_bar[s] += h * v_bar[r];
+                        v_bar[s] += h * y_bar[r];
+                    }
+                }
+                v_bar[s] += self.by_v[s] * a_bar[s];
+                y_bar[s] = self.by_y[s] * a_bar[s];
+                to_y += y_bar[s];
+                to_v += v_bar[s];
+            }
+            maps.growth[end] = [to_y.row(), to_v.row()];
+            for f in 0..=terms.min(TERMS) {
+                let mut answer = [zero; S];
+                for s in 0..S {
+                    answer[s] = match f {
+                        0 => a_bar[s] * self.by_mass[s],
+                        _ => a_bar[s] * self.by_function[s][f - 1],
+                    };
+                }
+                if wanted.sum[f] {
+                    maps.sum[f][end] = sum(answer).row();
+                }
+                if wanted.ends[f] {
+                    let [left, right] = at_ends(arithmetic, tableau, answer);
+                    (maps.left[f][end], maps.right[f][end]) = (left.row(), right.row());
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn sum<A: Arithmetic, const S: usize>(parts: [Eight<A>; S]) -> Eight<A> {
+    let mut sum = parts[0];
+    for part in &parts[1..] {
+        sum += *part;
+    }
+    sum
+}
+
+/// Derivatives with respect to the values at the left and the right node, from those at the stages.
+#[inline(always)]
+fn at_ends<A: Arithmetic, const S: usize>(
+    arithmetic: A,
+    tableau: &Tableau<S>,
+    stages: [Eight<A>; S],
+) -> [Eight<A>; 2] {
+    let [mut left, mut middle, mut right] = [Eight::splat(arithmetic, 0.0); 3];
+    for (s, stage) in stages.into_iter().enumerate() {
+        match tableau.position[s] {
+            Position::Left => left += stage,
+            Position::Middle => middle += stage,
+            Position::Right => right += stage,
+        }
+    }
+    middle = middle * Eight::splat(arithmetic, 0.5);
+    [left + middle, right + middle]
+}

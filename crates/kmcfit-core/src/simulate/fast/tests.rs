@@ -1,0 +1,468 @@
+//! Every specialisation against its reference function, over random systems, records, steppers and excitations.
+
+use super::continuous_adjoint;
+use super::nodal_observations::{Accelerations, NodalObservations};
+use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
+use super::step_batch::{Layout, Ray, Trials, replay};
+use crate::record::ChannelKind;
+use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
+use crate::simulate::reference::{self, AdjointEquation};
+use crate::simulate::{Engine, Purpose, Trajectory, least_squares};
+use crate::system::quadrature::trapezoid;
+use crate::system::{
+    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Term,
+};
+use proptest::prelude::*;
+
+/// Largest difference of two responses or gradients, in machine precisions of the largest value, for each step: each
+/// step rounds some ten operations, and what they lose is carried along.
+const PER_STEP: f64 = 40.0;
+
+/// A random system with a random record.
+#[derive(Debug, Clone)]
+struct Case {
+    oscillator: Oscillator,
+    device: Device,
+    excitation: Option<Excitation>,
+    initial: State,
+    /// Numbers in (-1, 1), three a node.
+    numbers: Vec<f64>,
+}
+
+impl Case {
+    fn nodes(&self) -> usize {
+        self.oscillator.grid.nodes()
+    }
+
+    fn excitation(&self) -> Option<&Excitation> {
+        self.excitation.as_ref()
+    }
+
+    fn response(&self) -> Trajectory {
+        reference::forward(
+            &self.oscillator,
+            &self.device,
+            self.initial,
+            self.excitation(),
+        )
+        .expect("a response")
+    }
+
+    /// The `which`-th series of random numbers, one a node.
+    fn series(&self, which: usize) -> Vec<f64> {
+        let nodes = self.nodes();
+        (0..nodes)
+            .map(|i| self.numbers[(which * nodes + i) % self.numbers.len()])
+            .collect()
+    }
+
+    fn source(&self) -> Trajectory {
+        Trajectory {
+            displacement: self.series(0),
+            velocity: self.series(1),
+        }
+    }
+
+    fn engine(&self) -> Engine {
+        let (oscillator, excitation) = (&self.oscillator, self.excitation());
+        Engine::choose(oscillator, excitation, self.nodes(), Purpose::Estimation)
+    }
+
+    /// Whether two series agree.
+    fn agree(&self, a: &[f64], b: &[f64]) -> Result<(), TestCaseError> {
+        let largest = |f: &mut dyn Iterator<Item = f64>| f.fold(0.0f64, |m, x| m.max(x.abs()));
+        let scale = largest(&mut b.iter().copied());
+        let error = largest(&mut a.iter().zip(b).map(|(a, b)| a - b));
+        let bound = PER_STEP * self.nodes() as f64 * f64::EPSILON * scale;
+        prop_assert!(
+            error <= bound,
+            "{error:e} of {scale:e}, more than {bound:e}"
+        );
+        Ok(())
+    }
+
+    fn agree_responses(&self, a: &Trajectory, b: &Trajectory) -> Result<(), TestCaseError> {
+        self.agree(&a.displacement, &b.displacement)?;
+        self.agree(&a.velocity, &b.velocity)
+    }
+
+    fn agree_gradients(&self, a: &DeviceTangent, b: &DeviceTangent) -> Result<(), TestCaseError> {
+        let pairs = a.device.functions().zip(b.device.functions());
+        pairs.into_iter().try_for_each(|(a, b)| self.agree(a, b))?;
+        let list = |s: State| [s.displacement, s.velocity];
+        self.agree(&list(a.initial), &list(b.initial))
+    }
+}
+
+fn terms() -> impl Strategy<Value = Vec<Term>> {
+    let linear = vec![Term::Damping, Term::Stiffness];
+    let duffing = vec![Term::Damping, Term::Stiffness, Term::CubicStiffness];
+    let all = (0.05..0.5f64).prop_map(|width| {
+        vec![
+            Term::Damping,
+            Term::Stiffness,
+            Term::CubicStiffness,
+            Term::QuadraticDamping,
+            Term::CoulombFriction { width },
+            Term::Offset,
+        ]
+    });
+    let some = all
+        .prop_flat_map(|all| prop::sample::subsequence(all, 0..=6))
+        .prop_shuffle();
+    prop_oneof![2 => Just(linear), 1 => Just(duffing), 3 => some]
+}
+
+/// Range of a function.
+fn range(term: Option<&Term>) -> std::ops::Range<f64> {
+    match term {
+        None => 0.5..3.0,
+        Some(Term::Stiffness) => 0.5..5.0,
+        Some(Term::Offset) => -1.0..1.0,
+        Some(_) => 0.0..0.5,
+    }
+}
+
+/// A function: one value a node, or a constant.
+fn function(range: std::ops::Range<f64>, nodes: usize) -> impl Strategy<Value = Vec<f64>> {
+    prop_oneof![
+        prop::collection::vec(range.clone(), nodes),
+        range.prop_map(move |x| vec![x; nodes])
+    ]
+}
+
+fn stepwise(nodes: usize) -> impl Strategy<Value = Option<Stepwise>> {
+    let steps = prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), nodes - 1);
+    prop::option::of(steps.prop_map(Stepwise::new))
+}
+
+fn case_of(
+    terms: impl Strategy<Value = Vec<Term>>,
+    method: impl Strategy<Value = Method>,
+    nodes: std::ops::Range<usize>,
+    is_driven: bool,
+) -> impl Strategy<Value = Case> {
+    (terms, method, nodes, 0.01..0.1f64).prop_flat_map(move |(terms, method, nodes, step)| {
+        let functions: Vec<_> = std::iter::once(None)
+            .chain(terms.iter().map(Some))
+            .map(|term| function(range(term), nodes))
+            .collect();
+        let excitation = (stepwise(nodes), stepwise(nodes))
+            .prop_map(move |(force, base)| is_driven.then_some(Excitation { force, base }));
+        let oscillator = Oscillator {
+            grid: Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid"),
+            method,
+            terms,
+        };
+        let numbers = prop::collection::vec(-1.0..1.0f64, 3 * nodes);
+        (functions, excitation, -3.0..3.0f64, -3.0..3.0f64, numbers).prop_map(
+            move |(functions, excitation, displacement, velocity, numbers)| {
+                let mut functions = functions.into_iter();
+                Case {
+                    oscillator: oscillator.clone(),
+                    device: Device {
+                        mass: functions.next().expect("a mass"),
+                        coefficients: functions.collect(),
+                    },
+                    excitation,
+                    initial: State {
+                        displacement,
+                        velocity,
+                    },
+                    numbers,
+                }
+            },
+        )
+    })
+}
+
+fn methods() -> impl Strategy<Value = Method> {
+    prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)]
+}
+
+/// Any system.
+fn any_case() -> impl Strategy<Value = Case> {
+    case_of(terms(), methods(), 3..200, true)
+}
+
+/// Damping and stiffness alone, free, by the midpoint rule; records of several tiles among them.
+fn linear_free_case() -> impl Strategy<Value = Case> {
+    let case = |nodes| {
+        let terms = Just(vec![Term::Damping, Term::Stiffness]);
+        case_of(terms, Just(Method::Midpoint), nodes, false)
+    };
+    prop_oneof![4 => case(65..300), 1 => case(300..5000)]
+}
+
+/// Accelerations and their derivatives at eight nodes.
+struct Observe<'a>(NodalObservations<'a>, usize, [f64; 2]);
+
+impl Kernel for Observe<'_> {
+    type Output = Accelerations;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Accelerations {
+        let Self(nodes, node, around) = self;
+        let mut seen = Accelerations::NOTHING;
+        let around = around.map(|x| Eight::splat(arithmetic, x));
+        nodes.accelerations(arithmetic, node, around, &mut seen);
+        seen
+    }
+}
+
+/// A direction for each lane of a group: one series of numbers a function, or one number for a constant function.
+fn directions(case: &Case, holds: bool) -> [DeviceTangent; LANES] {
+    let functions = 1 + case.oscillator.terms.len();
+    std::array::from_fn(|lane| {
+        let mut device = Device::zeros(case.nodes(), functions - 1);
+        for (f, values) in device.functions_mut().enumerate() {
+            match holds {
+                true if f == lane => values.fill(case.numbers[lane]),
+                true => {}
+                false => values.clone_from(&case.series(7 * lane + f)),
+            }
+        }
+        DeviceTangent {
+            device,
+            initial: State {
+                displacement: case.numbers[lane],
+                velocity: -0.5,
+            },
+        }
+    })
+}
+
+/// All tangents of a group.
+fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; LANES] {
+    let directions = directions(case, holds);
+    let functions = 1 + case.oscillator.terms.len();
+    let slots = (0..functions).map(|function| Slot { group: 0, function });
+    let row = |f: &dyn Fn(&DeviceTangent) -> f64| directions.each_ref().map(f);
+    let initial = [
+        row(&|d| d.initial.displacement),
+        row(&|d| d.initial.velocity),
+    ];
+    let mut tangents = Tangents::new(slots.collect(), &[initial]);
+    let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
+    let course = BaseTrajectory {
+        oscillator: &case.oscillator,
+        device: &case.device,
+        excitation: case.excitation(),
+        motion,
+    };
+    let last = case.nodes() - 1;
+    for first in (0..last).step_by(TILE) {
+        let count = TILE.min(last - first);
+        for slot in 0..functions {
+            if holds {
+                if let (0, Some(value)) = (first, case.numbers.get(slot)) {
+                    tangents.hold(
+                        slot,
+                        Steady {
+                            lane: slot,
+                            value: *value,
+                        },
+                    );
+                }
+                continue;
+            }
+            let rows = tangents.changes_mut(slot);
+            for (i, row) in rows.iter_mut().enumerate().take(count + 1) {
+                let at = |d: &DeviceTangent| {
+                    d.device.functions().nth(slot).expect("a function")[first + i]
+                };
+                *row = directions.each_ref().map(at);
+            }
+        }
+        tangents.advance(course, first..first + count);
+        for (i, [y, v]) in tangents.states(0).iter().enumerate().take(count + 1) {
+            for (lane, out) in out.iter_mut().enumerate() {
+                (out.displacement[first + i], out.velocity[first + i]) = (y[lane], v[lane]);
+            }
+        }
+    }
+    out
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 150,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn prefactored_responses(case in any_case()) {
+        let mut fast = Trajectory::zeros(case.nodes());
+        let (oscillator, device) = (&case.oscillator, &case.device);
+        Engine::Prefactored
+            .forward_into(oscillator, device, case.initial, case.excitation(), &mut fast)
+            .expect("a response");
+        case.agree_responses(&fast, &case.response())?;
+    }
+
+    #[test]
+    fn prefactored_adjoints_and_their_sums(case in any_case()) {
+        let (oscillator, device, excitation) = (&case.oscillator, &case.device, case.excitation());
+        let (motion, source) = (case.response(), case.source());
+        let exact = reference::discrete_adjoint(oscillator, device, excitation, &motion, &source);
+        let engine = Engine::Prefactored;
+        let fast = engine.discrete_adjoint(oscillator, device, excitation, &motion, &source);
+        case.agree_gradients(&fast, &exact)?;
+        let sums = engine.discrete_adjoint_sums(oscillator, device, excitation, &motion, &source);
+        let (sums, initial) = sums.expect("finite sums");
+        prop_assert_eq!(initial, fast.initial);
+        for (sum, values) in sums.iter().zip(exact.device.functions()) {
+            let size: f64 = values.iter().map(|x| x.abs()).sum();
+            let error = (sum - values.iter().sum::<f64>()).abs();
+            prop_assert!(error <= PER_STEP * case.nodes() as f64 * f64::EPSILON * size);
+        }
+    }
+
+    #[test]
+    fn responses_and_adjoints_in_blocks(case in linear_free_case()) {
+        let (oscillator, device) = (&case.oscillator, &case.device);
+        prop_assert_eq!(case.engine(), Engine::ParallelInTime);
+        let motion = case.response();
+        let mut fast = Trajectory::zeros(case.nodes());
+        case.engine()
+            .forward_into(oscillator, device, case.initial, None, &mut fast)
+            .expect("a response");
+        case.agree_responses(&fast, &motion)?;
+        let source = case.source();
+        let exact = reference::discrete_adjoint(oscillator, device, None, &motion, &source);
+        let fast = case.engine().discrete_adjoint(oscillator, device, None, &motion, &source);
+        case.agree_gradients(&fast, &exact)?;
+    }
+
+    #[test]
+    fn fused_least_squares(case in linear_free_case()) {
+        let (oscillator, device) = (&case.oscillator, &case.device);
+        let (motion, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
+        let last = case.nodes() - 1;
+        let mut source = Trajectory::zeros(case.nodes());
+        let mut cost = 0.0;
+        for (i, (y, o)) in motion.displacement.iter().zip(&observed).enumerate() {
+            let w = weights[usize::from(i == 0 || i == last)];
+            cost += w * (y - o) * (y - o);
+            source.displacement[i] = 2.0 * w * (y - o);
+        }
+        let exact = reference::discrete_adjoint(oscillator, device, None, &motion, &source);
+        let mut gradient = device.clone();
+        let [c, k] = gradient.coefficients.as_mut_slice() else { unreachable!("two terms") };
+        let functions = [&device.mass, &device.coefficients[0], &device.coefficients[1]];
+        let found = least_squares(
+            oscillator,
+            functions.map(Vec::as_slice),
+            case.initial,
+            &observed,
+            weights,
+            [&mut gradient.mass, c, k],
+        );
+        let (found, initial) = found.expect("a record in blocks");
+        case.agree(&[found], &[cost])?;
+        case.agree_gradients(&DeviceTangent { device: gradient, initial }, &exact)?;
+    }
+
+    #[test]
+    fn continuous_adjoints_have_the_bits_of_the_reference(case in any_case()) {
+        let (motion, observed) = (case.response(), case.series(0));
+        let equation = AdjointEquation::new(&case.oscillator, &case.device, &motion, &observed);
+        let (exact, fast) = (equation.solve(), continuous_adjoint::solve(&equation));
+        prop_assert_eq!(fast.displacement, exact.displacement);
+        prop_assert_eq!(fast.first_slope, exact.first_slope);
+    }
+
+    #[test]
+    fn sensitivities_in_lanes(case in any_case(), holds in any::<bool>()) {
+        let motion = case.response();
+        let fast = sensitivities(&case, &motion, holds);
+        for (fast, direction) in fast.iter().zip(&directions(&case, holds)) {
+            let (oscillator, device) = (&case.oscillator, &case.device);
+            let exact =
+                reference::tangent(oscillator, device, case.excitation(), &motion, direction);
+            case.agree_responses(fast, &exact)?;
+        }
+    }
+
+    #[test]
+    fn accelerations_at_nodes(case in any_case()) {
+        let (oscillator, device) = (&case.oscillator, &case.device);
+        let states = case.response();
+        let around = [case.numbers[0], case.numbers[1]];
+        let surroundings = crate::system::Surroundings { force: around[0], base: around[1] };
+        for first in (0..case.nodes()).step_by(LANES) {
+            let nodes = NodalObservations { oscillator, device, states: &states };
+            let seen = simd::run(Observe(nodes, first, around));
+            for node in first..case.nodes().min(first + LANES) {
+                let place = Place::node(node, case.nodes());
+                let kind = ChannelKind::Acceleration;
+                let exact = reference::observe(
+                    oscillator, kind, device, case.excitation(), &states, place, surroundings,
+                );
+                let (lane, side) = (node - first, usize::from(place.fraction == 1.0));
+                let functions = 1 + oscillator.terms.len();
+                let list = |value: f64, states: [f64; 2], functions: Vec<f64>| {
+                    [vec![value], states.to_vec(), functions].concat()
+                };
+                let fast = list(
+                    seen.value[lane],
+                    seen.states.map(|row| row[lane]),
+                    seen.functions[..functions].iter().map(|row| row[lane]).collect(),
+                );
+                let exact = list(
+                    exact.value,
+                    [exact.states[2 * side], exact.states[2 * side + 1]],
+                    exact.functions[side][..functions].to_vec(),
+                );
+                case.agree(&fast, &exact)?;
+            }
+        }
+    }
+
+    #[test]
+    fn batches_of_steps(case in linear_free_case(), count in 1usize..50) {
+        let Case { oscillator, device, initial, .. } = &case;
+        let (step, observed) = (oscillator.grid.step(), case.series(0));
+        let direction = [case.series(1), case.series(2), case.series(3)];
+        let ray = Ray {
+            functions: [&device.mass, &device.coefficients[0], &device.coefficients[1]]
+                .map(Vec::as_slice),
+            direction: direction.each_ref().map(Vec::as_slice),
+            initial: *initial,
+            readings: &observed,
+            step,
+        };
+        let lengths: Vec<f64> = (1..=count).map(|i| 1.0 / (i * i) as f64).collect();
+        let layout = Layout::new(ray, &lengths);
+        let mut batch = [Trials::default(), Trials::default()];
+        let middle = layout.rows().div_ceil(2);
+        batch[0].run(ray, &layout, 0..middle);
+        batch[1].run(ray, &layout, middle..layout.rows());
+        let costs = batch.each_ref().map(Trials::costs).concat();
+        let mut alone = Vec::new();
+        for (which, a) in lengths.iter().enumerate() {
+            let mut device = device.clone();
+            for (values, direction) in device.functions_mut().zip(&direction) {
+                values.iter_mut().zip(direction).for_each(|(p, g)| *p -= a * g);
+            }
+            let Ok(motion) = reference::forward(oscillator, &device, *initial, None) else {
+                alone.push(f64::INFINITY);
+                continue;
+            };
+            let pairs = motion.displacement.iter().zip(&observed);
+            let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
+            alone.push(trapezoid(&squares, step));
+            let (row, lane) = layout.place(which);
+            case.agree(&[step * costs[row][lane]], &[alone[which]])?;
+            let states = batch.iter().find_map(|batch| batch.states((row, lane)));
+            let mut again = Trajectory::zeros(case.nodes());
+            if replay(&device, *initial, states.expect("its states"), step, &mut again) {
+                prop_assert_eq!(again, motion);
+            }
+        }
+        let best = (0..count).min_by(|a, b| alone[*a].total_cmp(&alone[*b])).expect("a trial");
+        prop_assert!(!alone[best].is_finite() || layout.lowest(&costs).contains(&best));
+    }
+}

@@ -1,0 +1,45 @@
+//! Responses, their linearisation and their adjoints.
+//!
+//! [`reference`] has the equations, one plain function each; [`fast`] has specialisations, each equal to a reference
+//! function to a stated tolerance; [`Engine`] chooses among them.
+
+mod breakdown;
+mod engine;
+pub(crate) mod fast;
+mod gradient;
+pub mod reference;
+mod trajectory;
+
+pub use breakdown::{Breakdown, Cause};
+pub use engine::{Engine, Purpose, continuous_adjoint};
+pub(crate) use engine::{is_linear_midpoint, least_squares};
+pub use gradient::Slopes;
+pub use reference::{Sensed, StateChange, StepJacobian};
+pub use trajectory::Trajectory;
+
+use crate::system::{Device, Excitation, Oscillator, State};
+
+/// The vector instructions of responses, adjoints and tangents: `AVX-512`, `AVX2` or `scalar`, the widest that this
+/// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the
+/// same bits.
+pub fn arithmetic() -> &'static str {
+    crate::simd::name()
+}
+
+impl Oscillator {
+    /// [`reference::forward`].
+    ///
+    /// # Errors
+    /// A [`Breakdown`] if the mass is not positive at some node or the response overflows.
+    ///
+    /// # Panics
+    /// If `device` or `excitation` does not fit the grid and the terms.
+    pub fn forward(
+        &self,
+        device: &Device,
+        initial: State,
+        excitation: Option<&Excitation>,
+    ) -> Result<Trajectory, Breakdown> {
+        reference::forward(self, device, initial, excitation)
+    }
+}

@@ -1,0 +1,150 @@
+//! The equation of motion at the stages of one step.
+
+use crate::system::{Device, Excitation, Oscillator, Position, Tableau, Term};
+
+/// The equation of motion of one device in one experiment.
+#[derive(Clone, Copy)]
+pub(crate) struct EquationOfMotion<'a> {
+    pub terms: &'a [Term],
+    pub device: &'a Device,
+    pub excitation: Option<&'a Excitation>,
+    pub dt: f64,
+}
+
+/// Displacement, velocity and acceleration at the stages of one step.
+pub(crate) struct Stages<const S: usize> {
+    pub y: [f64; S],
+    pub v: [f64; S],
+    pub a: [f64; S],
+}
+
+/// Derivatives of the acceleration at one stage.
+pub(crate) struct Partials {
+    pub mass: f64,
+    pub da_dy: f64,
+    pub da_dv: f64,
+}
+
+impl<'a> EquationOfMotion<'a> {
+    /// # Panics
+    /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
+    pub fn new(
+        oscillator: &'a Oscillator,
+        device: &'a Device,
+        excitation: Option<&'a Excitation>,
+        nodes: usize,
+    ) -> Self {
+        let Oscillator { grid, terms, .. } = oscillator;
+        assert_eq!(
+            device.coefficients.len(),
+            terms.len(),
+            "one function per term"
+        );
+        assert!(
+            device.functions().all(|f| f.len() == grid.nodes()),
+            "functions on the nodes"
+        );
+        assert!(
+            (1..=grid.nodes()).contains(&nodes),
+            "a response within the grid"
+        );
+        assert!(
+            excitation.is_none_or(|e| e.covers(nodes)),
+            "an excitation as long as the response"
+        );
+        Self {
+            terms,
+            device,
+            excitation,
+            dt: grid.step(),
+        }
+    }
+
+    /// `y'' = f/m - sum_j p_j phi_j / m - b''`.
+    ///
+    /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
+    /// these are the paper's operations in the paper's order, and its run depends on every bit.
+    #[inline(always)]
+    pub fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
+        let mass = position.of(&self.device.mass, i);
+        let force = self.excitation.and_then(|e| e.force.as_ref());
+        let mut a = force.map_or(0.0, |f| f.at(i, position) / mass);
+        for (term, p) in self.terms.iter().zip(&self.device.coefficients).rev() {
+            a -= position.of(p, i) * term.phi(y, v) / mass;
+        }
+        match self.excitation.and_then(|e| e.base.as_ref()) {
+            Some(base) => a - base.at(i, position),
+            None => a,
+        }
+    }
+
+    /// The absolute acceleration `y'' + b''` for the acceleration `y'' = a`.
+    #[inline(always)]
+    pub fn absolute(&self, i: usize, position: Position, a: f64) -> f64 {
+        match self.excitation.and_then(|e| e.base.as_ref()) {
+            Some(base) => a + base.at(i, position),
+            None => a,
+        }
+    }
+
+    /// Mass and partial derivatives of [`EquationOfMotion::acceleration`].
+    #[inline(always)]
+    pub fn partials(&self, i: usize, position: Position, y: f64, v: f64) -> Partials {
+        let mass = position.of(&self.device.mass, i);
+        let (mut da_dy, mut da_dv) = (0.0, 0.0);
+        for (term, p) in self.terms.iter().zip(&self.device.coefficients) {
+            let (phi_y, phi_v) = term.partials(y, v);
+            let p = position.of(p, i);
+            da_dy -= p * phi_y / mass;
+            da_dv -= p * phi_v / mass;
+        }
+        Partials { mass, da_dy, da_dv }
+    }
+
+    /// The stages of step `i` from the state `(y, v)` at its left node.
+    #[inline(always)]
+    pub fn stages<const S: usize>(
+        &self,
+        tableau: &Tableau<S>,
+        i: usize,
+        y: f64,
+        v: f64,
+    ) -> Stages<S> {
+        let mut stages = Stages {
+            y: [y; S],
+            v: [v; S],
+            a: [0.0; S],
+        };
+        for s in 0..S {
+            for r in 0..s {
+                let a = tableau.a[s][r];
+                if a != 0.0 {
+                    stages.y[s] += self.dt * stages.v[r] * a;
+                    stages.v[s] += self.dt * stages.a[r] * a;
+                }
+            }
+            stages.a[s] = self.acceleration(i, tableau.position[s], stages.y[s], stages.v[s]);
+        }
+        stages
+    }
+}
+
+/// The state at the right node: `x + sum_s b_s dt x'_s`.
+#[inline(always)]
+pub(crate) fn advance<const S: usize>(
+    tableau: &Tableau<S>,
+    dt: f64,
+    stages: &Stages<S>,
+    y: f64,
+    v: f64,
+) -> (f64, f64) {
+    let (mut y, mut v) = (y, v);
+    for s in 0..S {
+        let b = tableau.b[s];
+        if b != 0.0 {
+            y += dt * stages.v[s] * b;
+            v += dt * stages.a[s] * b;
+        }
+    }
+    (y, v)
+}

@@ -1,0 +1,65 @@
+//! Eq. 2: the response.
+
+use super::equation::{EquationOfMotion, advance};
+use crate::simulate::Trajectory;
+use crate::simulate::breakdown::{Breakdown, require_finite, require_positive_mass};
+use crate::system::{Device, Excitation, MIDPOINT, Method, Oscillator, RK4, State, Tableau};
+
+/// The response of `device` from `initial` under `excitation` (`None` is free motion), over the whole grid:
+/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, step by step in the paper's order of operations.
+///
+/// # Errors
+/// A [`Breakdown`] if the mass is not positive at some node or the response overflows.
+///
+/// # Panics
+/// If `device` or `excitation` does not fit the grid and the terms.
+pub fn forward(
+    oscillator: &Oscillator,
+    device: &Device,
+    initial: State,
+    excitation: Option<&Excitation>,
+) -> Result<Trajectory, Breakdown> {
+    let mut trajectory = Trajectory::zeros(oscillator.grid.nodes());
+    forward_into(oscillator, device, initial, excitation, &mut trajectory)?;
+    Ok(trajectory)
+}
+
+/// [`forward`] into existing storage, over as many nodes as `trajectory` has: a record may end before the grid
+/// does.
+///
+/// # Errors
+/// As [`forward`].
+pub fn forward_into(
+    oscillator: &Oscillator,
+    device: &Device,
+    initial: State,
+    excitation: Option<&Excitation>,
+    trajectory: &mut Trajectory,
+) -> Result<(), Breakdown> {
+    let grid = &oscillator.grid;
+    require_positive_mass(grid, device)?;
+    let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
+    match oscillator.method {
+        Method::Midpoint => sweep(&MIDPOINT, equation, initial, trajectory),
+        Method::Rk4 => sweep(&RK4, equation, initial, trajectory),
+    }
+    require_finite(grid, trajectory)
+}
+
+fn sweep<const S: usize>(
+    tableau: &Tableau<S>,
+    equation: EquationOfMotion,
+    initial: State,
+    trajectory: &mut Trajectory,
+) {
+    let (mut y, mut v) = (initial.displacement, initial.velocity);
+    let nodes = trajectory.nodes();
+    trajectory.displacement[0] = y;
+    trajectory.velocity[0] = v;
+    for i in 0..nodes - 1 {
+        let stages = equation.stages(tableau, i, y, v);
+        (y, v) = advance(tableau, equation.dt, &stages, y, v);
+        trajectory.displacement[i + 1] = y;
+        trajectory.velocity[i + 1] = v;
+    }
+}

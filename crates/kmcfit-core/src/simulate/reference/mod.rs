@@ -1,0 +1,29 @@
+//! The equations, plainly: scalar arithmetic, one step after the other, any stepper.
+//!
+//! | function | equation |
+//! |---|---|
+//! | [`forward`] | Eq. 2, the response |
+//! | [`tangent`] | its linearisation |
+//! | [`discrete_adjoint`] | the exact transpose of the linearisation |
+//! | [`continuous_adjoint`] | Eq. 13, with the gradients of Eqs. 15-17 |
+//! | [`step_jacobians`] | the linearisation of each step by itself |
+//! | [`observe`] | displacement, velocity or acceleration at any time |
+//!
+//! The order of operations is the paper's. Everything in [`fast`](super::fast) equals one of these functions to a
+//! stated tolerance.
+
+mod continuous_adjoint;
+mod discrete_adjoint;
+pub(crate) mod equation;
+mod forward;
+mod observation;
+mod step_jacobian;
+mod tangent;
+
+pub use continuous_adjoint::continuous_adjoint;
+pub(crate) use continuous_adjoint::{Adjoint, AdjointEquation};
+pub use discrete_adjoint::discrete_adjoint;
+pub use forward::{forward, forward_into};
+pub use observation::{Sensed, observe};
+pub use step_jacobian::{StateChange, StepJacobian, step_jacobians};
+pub use tangent::tangent;

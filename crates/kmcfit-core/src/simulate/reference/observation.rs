@@ -1,0 +1,193 @@
+//! Observations of a response at any time, and their derivatives with respect to states and functions.
+//!
+//! Between nodes displacement and velocity are cubic Hermite polynomials, of order 4 in the step: the
+//! displacement from its values and the velocities at both nodes, the velocity from its values and
+//! the accelerations there. The acceleration is the equation of motion's own, at the interpolated
+//! state, with the functions linear between nodes as in the stepper.
+
+use super::equation::EquationOfMotion;
+use crate::record::ChannelKind;
+use crate::simulate::Trajectory;
+use crate::system::{
+    Device, Excitation, FUNCTIONS, Oscillator, Place, Position, Stepwise, Surroundings,
+};
+
+/// A value observed by a sensor, and its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensed {
+    /// The value itself, in the SI unit of its kind.
+    pub value: f64,
+    /// Derivatives with respect to displacement and velocity at the left node, then at the right.
+    pub states: [f64; 4],
+    /// Derivatives with respect to the value of each function, mass first, at the left node and at
+    /// the right.
+    pub functions: [[f64; FUNCTIONS]; 2],
+}
+
+impl Sensed {
+    const NOTHING: Self = Self {
+        value: 0.0,
+        states: [0.0; 4],
+        functions: [[0.0; FUNCTIONS]; 2],
+    };
+
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.value += factor * other.value;
+        for (a, b) in self.states.iter_mut().zip(&other.states) {
+            *a += factor * b;
+        }
+        for (side, from) in self.functions.iter_mut().zip(&other.functions) {
+            side.iter_mut()
+                .zip(from)
+                .for_each(|(a, b)| *a += factor * b);
+        }
+    }
+
+    /// One of the four states of a step, as a value with derivatives.
+    fn state(index: usize, value: f64) -> Self {
+        let mut sensed = Self::NOTHING;
+        sensed.value = value;
+        sensed.states[index] = 1.0;
+        sensed
+    }
+}
+
+/// The observation of `kind` at `place` of the response `states` of `device`.
+///
+/// `around` is the force and the base's acceleration at that very time; `excitation` is that of
+/// the whole response. An acceleration is that of `y`, relative to the base.
+///
+/// # Panics
+/// If `place` is not within `states`.
+pub fn observe(
+    oscillator: &Oscillator,
+    kind: ChannelKind,
+    device: &Device,
+    excitation: Option<&Excitation>,
+    states: &Trajectory,
+    place: Place,
+    around: Surroundings,
+) -> Sensed {
+    let equation = EquationOfMotion {
+        terms: &oscillator.terms,
+        device,
+        excitation,
+        dt: oscillator.grid.step(),
+    };
+    match kind {
+        ChannelKind::Displacement => displacement(equation.dt, states, place),
+        ChannelKind::Velocity => velocity(equation, states, place),
+        ChannelKind::Acceleration => {
+            let y = displacement(equation.dt, states, place);
+            let v = velocity(equation, states, place);
+            acceleration(equation, place.step, place.fraction, around, &y, &v)
+        }
+    }
+}
+
+/// Cubic Hermite weights at `x` of a step of length `h`: value and slope on the left, on the right.
+fn hermite(x: f64, h: f64) -> [f64; 4] {
+    let (x2, x3) = (x * x, x * x * x);
+    [
+        1.0 - 3.0 * x2 + 2.0 * x3,
+        h * (x - 2.0 * x2 + x3),
+        3.0 * x2 - 2.0 * x3,
+        h * (x3 - x2),
+    ]
+}
+
+fn displacement(h: f64, states: &Trajectory, place: Place) -> Sensed {
+    let (y, v, i) = (&states.displacement, &states.velocity, place.step);
+    match place.fraction {
+        0.0 => Sensed::state(0, y[i]),
+        1.0 => Sensed::state(2, y[i + 1]),
+        x => {
+            let weights = hermite(x, h);
+            let ends = [y[i], v[i], y[i + 1], v[i + 1]];
+            Sensed {
+                value: weights.iter().zip(ends).map(|(w, e)| w * e).sum(),
+                states: weights,
+                ..Sensed::NOTHING
+            }
+        }
+    }
+}
+
+fn velocity(equation: EquationOfMotion, states: &Trajectory, place: Place) -> Sensed {
+    let (y, v, i) = (&states.displacement, &states.velocity, place.step);
+    match place.fraction {
+        0.0 => Sensed::state(1, v[i]),
+        1.0 => Sensed::state(3, v[i + 1]),
+        x => {
+            let at_end = |right: usize| {
+                let position = [Position::Left, Position::Right][right];
+                let part = |p: &Option<Stepwise>| p.as_ref().map_or(0.0, |p| p.at(i, position));
+                let around =
+                    equation
+                        .excitation
+                        .map_or(Surroundings::default(), |e| Surroundings {
+                            force: part(&e.force),
+                            base: part(&e.base),
+                        });
+                let here = Sensed::state(2 * right, y[i + right]);
+                let speed = Sensed::state(2 * right + 1, v[i + right]);
+                (
+                    speed,
+                    acceleration(equation, i, right as f64, around, &here, &speed),
+                )
+            };
+            let [(v0, a0), (v1, a1)] = [at_end(0), at_end(1)];
+            let mut sensed = Sensed::NOTHING;
+            for (weight, end) in hermite(x, equation.dt).into_iter().zip([v0, a0, v1, a1]) {
+                sensed.add(weight, &end);
+            }
+            sensed
+        }
+    }
+}
+
+/// `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
+fn acceleration(
+    equation: EquationOfMotion,
+    i: usize,
+    x: f64,
+    around: Surroundings,
+    y: &Sensed,
+    v: &Sensed,
+) -> Sensed {
+    let blend = |f: &[f64]| match x {
+        0.0 => f[i],
+        1.0 => f[i + 1],
+        x => f[i] * (1.0 - x) + f[i + 1] * x,
+    };
+    let mass = blend(&equation.device.mass);
+    let mut inertia = around.force / mass;
+    let (mut by_y, mut by_v) = (0.0, 0.0);
+    let mut by_function = [0.0; FUNCTIONS];
+    for (j, (term, p)) in equation
+        .terms
+        .iter()
+        .zip(&equation.device.coefficients)
+        .enumerate()
+        .rev()
+    {
+        let p = blend(p);
+        let phi = term.phi(y.value, v.value);
+        let (phi_y, phi_v) = term.partials(y.value, v.value);
+        inertia -= p * phi / mass;
+        by_y -= p * phi_y / mass;
+        by_v -= p * phi_v / mass;
+        by_function[j + 1] = -phi / mass;
+    }
+    by_function[0] = -inertia / mass;
+    let mut sensed = Sensed::NOTHING;
+    sensed.add(by_y, y);
+    sensed.add(by_v, v);
+    for (side, share) in sensed.functions.iter_mut().zip([1.0 - x, x]) {
+        for (f, slope) in side.iter_mut().zip(by_function) {
+            *f += share * slope;
+        }
+    }
+    sensed.value = inertia - around.base;
+    sensed
+}

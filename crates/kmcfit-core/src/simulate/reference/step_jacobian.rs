@@ -1,0 +1,115 @@
+//! The linearisation of single steps, for methods that keep the states as unknowns.
+
+use super::equation::{EquationOfMotion, Stages, advance};
+use crate::simulate::Trajectory;
+use crate::system::{
+    Device, Excitation, MIDPOINT, Method, Oscillator, Position, RK4, State, Tableau,
+};
+
+/// Change of the state `(y, v)` at the right node of a step.
+pub type StateChange = [f64; 2];
+
+/// One step `x_{i+1} = Phi_i(x_i, p)` and its derivatives; functions in the order of
+/// [`Device::functions`], mass first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepJacobian {
+    /// `Phi_i` itself: displacement and velocity at the right node.
+    pub end: State,
+    /// Derivatives with respect to the displacement and to the velocity at the left node.
+    pub state: [StateChange; 2],
+    /// Derivatives with respect to each function's value at the left node.
+    pub left: Vec<StateChange>,
+    /// Derivatives with respect to each function's value at the right node.
+    pub right: Vec<StateChange>,
+}
+
+/// What one column of a step's Jacobian differentiates with respect to.
+#[derive(Clone, Copy)]
+enum Seed {
+    Displacement,
+    Velocity,
+    Function(usize, Position),
+}
+
+/// All steps linearised about the node states `states`, which need not be a response.
+pub fn step_jacobians(
+    oscillator: &Oscillator,
+    device: &Device,
+    excitation: Option<&Excitation>,
+    states: &Trajectory,
+) -> Vec<StepJacobian> {
+    let equation = EquationOfMotion::new(oscillator, device, excitation, states.nodes());
+    let steps = 0..states.nodes() - 1;
+    match oscillator.method {
+        Method::Midpoint => steps
+            .map(|i| step(&MIDPOINT, equation, states, i))
+            .collect(),
+        Method::Rk4 => steps.map(|i| step(&RK4, equation, states, i)).collect(),
+    }
+}
+
+fn step<const S: usize>(
+    tableau: &Tableau<S>,
+    equation: EquationOfMotion,
+    states: &Trajectory,
+    i: usize,
+) -> StepJacobian {
+    let (y, v) = (states.displacement[i], states.velocity[i]);
+    let base = equation.stages(tableau, i, y, v);
+    let (displacement, velocity) = advance(tableau, equation.dt, &base, y, v);
+    let column = |seed: Seed| column(tableau, equation, i, &base, seed);
+    let functions = 0..=equation.terms.len();
+    let side = |position: Position| {
+        let each = functions.clone();
+        each.map(|f| column(Seed::Function(f, position))).collect()
+    };
+    StepJacobian {
+        end: State {
+            displacement,
+            velocity,
+        },
+        state: [column(Seed::Displacement), column(Seed::Velocity)],
+        left: side(Position::Left),
+        right: side(Position::Right),
+    }
+}
+
+fn column<const S: usize>(
+    tableau: &Tableau<S>,
+    equation: EquationOfMotion,
+    i: usize,
+    base: &Stages<S>,
+    seed: Seed,
+) -> StateChange {
+    let (dy, dv) = match seed {
+        Seed::Displacement => (1.0, 0.0),
+        Seed::Velocity => (0.0, 1.0),
+        Seed::Function(..) => (0.0, 0.0),
+    };
+    let mut change = Stages {
+        y: [dy; S],
+        v: [dv; S],
+        a: [0.0; S],
+    };
+    for s in 0..S {
+        for r in 0..s {
+            let a = tableau.a[s][r];
+            change.y[s] += equation.dt * change.v[r] * a;
+            change.v[s] += equation.dt * change.a[r] * a;
+        }
+        let position = tableau.position[s];
+        let (y, v) = (base.y[s], base.v[s]);
+        let partials = equation.partials(i, position, y, v);
+        let force = match seed {
+            Seed::Function(0, node) => {
+                position.share(node) * equation.absolute(i, position, base.a[s])
+            }
+            Seed::Function(f, node) => position.share(node) * equation.terms[f - 1].phi(y, v),
+            _ => 0.0,
+        };
+        change.a[s] =
+            partials.da_dy * change.y[s] + partials.da_dv * change.v[s] - force / partials.mass;
+    }
+    let (y, v) = advance(tableau, equation.dt, &change, dy, dv);
+    [y, v]
+}

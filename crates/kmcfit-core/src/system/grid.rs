@@ -1,0 +1,121 @@
+//! Equally spaced time nodes, and times between them.
+
+/// `nodes` equally spaced times from `start` to `start + duration`: `t_i = start + i dt`,
+/// `dt = duration / (nodes - 1)`. `nodes` counts nodes, so there are `nodes - 1` steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    start: f64,
+    duration: f64,
+    nodes: usize,
+}
+
+impl Grid {
+    /// The fewest nodes that second differences can be taken on.
+    pub const FEWEST_NODES: usize = 3;
+
+    /// A grid of `nodes` nodes over `[start, start + duration]` (s), or `None` unless the numbers
+    /// are finite, the duration is positive and there are at least [`Grid::FEWEST_NODES`] nodes.
+    pub fn new(start: f64, duration: f64, nodes: usize) -> Option<Self> {
+        let usable = start.is_finite()
+            && duration.is_finite()
+            && duration > 0.0
+            && nodes >= Self::FEWEST_NODES
+            && duration / (nodes - 1) as f64 > 0.0;
+        usable.then_some(Self {
+            start,
+            duration,
+            nodes,
+        })
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// Step `dt` in s.
+    pub fn step(&self) -> f64 {
+        self.duration / (self.nodes - 1) as f64
+    }
+
+    /// First time in s.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Length in s.
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    /// Time of node `i` in s.
+    pub fn time(&self, i: usize) -> f64 {
+        self.start + i as f64 * self.step()
+    }
+
+    /// All times in s.
+    pub fn times(&self) -> Vec<f64> {
+        (0..self.nodes).map(|i| self.time(i)).collect()
+    }
+
+    /// The same interval with another number of nodes; `None` as in [`Grid::new`].
+    pub fn with_nodes(&self, nodes: usize) -> Option<Self> {
+        Self::new(self.start, self.duration, nodes)
+    }
+}
+
+/// A time on a grid: `fraction` of a step after the left node of step `step`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Step, from 0.
+    pub step: usize,
+    /// From 0 at the left node to 1 at the right one.
+    pub fraction: f64,
+}
+
+impl Place {
+    /// How near a time must be to a node, in steps, to be taken as the node itself.
+    pub const SAME_TIME: f64 = 1e-6;
+
+    /// The place of `time` (s) on `grid`; `None` outside it.
+    pub fn of(grid: &Grid, time: f64) -> Option<Self> {
+        let x = (time - grid.start()) / grid.step();
+        let last = grid.nodes() - 1;
+        let nearest = x.round();
+        if !(nearest >= 0.0 && nearest <= last as f64) {
+            return None;
+        }
+        if (x - nearest).abs() <= Self::SAME_TIME {
+            return Some(Self::node(nearest as usize, grid.nodes()));
+        }
+        let step = x.floor();
+        let inside = step >= 0.0 && step < last as f64;
+        inside.then_some(Self {
+            step: step as usize,
+            fraction: x - step,
+        })
+    }
+
+    /// Node `node` of a motion over `nodes` nodes: the left node of a step, but for the last.
+    pub fn node(node: usize, nodes: usize) -> Self {
+        match node + 1 < nodes {
+            true => Self {
+                step: node,
+                fraction: 0.0,
+            },
+            false => Self {
+                step: node.saturating_sub(1),
+                fraction: 1.0,
+            },
+        }
+    }
+
+    /// The node that this place is, if it is one.
+    pub fn as_node(self) -> Option<usize> {
+        match self.fraction {
+            0.0 => Some(self.step),
+            1.0 => Some(self.step + 1),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The input of a record: force and motion of the base.
+
+use super::Place;
+use super::integrator::Position;
+
+/// A function of time at the left end, the middle and the right end of every step. The value at a
+/// right end is the limit from the left, so that a jump at a node belongs to the step after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stepwise(Vec<[f64; 3]>);
+
+impl Stepwise {
+    /// Values at the left end, middle and right end of each step.
+    pub fn new(steps: Vec<[f64; 3]>) -> Self {
+        Self(steps)
+    }
+
+    /// The piecewise linear function through `nodes`.
+    pub fn linear(nodes: &[f64]) -> Self {
+        let step = |w: &[f64]| [w[0], (w[1] + w[0]) * 0.5, w[1]];
+        Self(nodes.windows(2).map(step).collect())
+    }
+
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The values of each step.
+    pub fn values(&self) -> &[[f64; 3]] {
+        &self.0
+    }
+
+    /// Whether it is zero at all times that the stepper sees.
+    pub fn is_zero(&self) -> bool {
+        self.0.iter().flatten().all(|value| *value == 0.0)
+    }
+
+    /// The values at the nodes, each as the step after it sees it; the last as the last step does.
+    pub fn at_nodes(&self) -> Vec<f64> {
+        let last = self.0.last().map(|step| step[2]);
+        self.0.iter().map(|step| step[0]).chain(last).collect()
+    }
+
+    #[inline(always)]
+    pub(crate) fn at(&self, i: usize, position: Position) -> f64 {
+        self.0[i][match position {
+            Position::Left => 0,
+            Position::Middle => 1,
+            Position::Right => 2,
+        }]
+    }
+}
+
+/// Force and motion of the base in one experiment.
+///
+/// Under base excitation `y` is the motion relative to the base `b(t)`, so the equation of motion is
+/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`: the base pushes with `-m b''`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Excitation {
+    /// Force, N; `None` is no force.
+    pub force: Option<Stepwise>,
+    /// Acceleration `b''` of the base, m/s^2; `None` is a base at rest.
+    pub base: Option<Stepwise>,
+}
+
+impl Excitation {
+    /// A force that is linear between its values at the nodes (N), and a base at rest.
+    pub fn force_at_nodes(nodes: &[f64]) -> Self {
+        Self {
+            force: Some(Stepwise::linear(nodes)),
+            base: None,
+        }
+    }
+
+    /// Whether nothing drives the motion.
+    pub fn is_zero(&self) -> bool {
+        let zero = |part: &Option<Stepwise>| part.as_ref().is_none_or(Stepwise::is_zero);
+        zero(&self.force) && zero(&self.base)
+    }
+
+    /// On steps of half the length, each stage of the old step being the end of a new one; linear in
+    /// between.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let halves = |part: &Stepwise| {
+            let halves = part.0.iter().flat_map(|&[left, middle, right]| {
+                [
+                    [left, 0.5 * (left + middle), middle],
+                    [middle, 0.5 * (middle + right), right],
+                ]
+            });
+            Stepwise(halves.collect())
+        };
+        Self {
+            force: self.force.as_ref().map(halves),
+            base: self.base.as_ref().map(halves),
+        }
+    }
+
+    /// Both at any place, linear between the ends of its step.
+    pub fn around(&self, place: Place) -> Surroundings {
+        let at = |part: &Option<Stepwise>| {
+            part.as_ref().map_or(0.0, |p| {
+                let [left, _, right] = p.0[place.step];
+                left * (1.0 - place.fraction) + right * place.fraction
+            })
+        };
+        Surroundings {
+            force: at(&self.force),
+            base: at(&self.base),
+        }
+    }
+
+    /// Whether it covers the steps of a motion over `nodes` nodes.
+    pub(crate) fn covers(&self, nodes: usize) -> bool {
+        let parts = [&self.force, &self.base];
+        parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)
+    }
+}
+
+/// Force and acceleration of the base at one time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Surroundings {
+    /// Force, N.
+    pub force: f64,
+    /// Acceleration of the base, m/s^2.
+    pub base: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_steps_meet_the_old_stages_and_are_linear_between() {
+        let whole = Excitation {
+            force: Some(Stepwise::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
+            base: Some(Stepwise::new(vec![[0.5, 0.25, 1.0]])),
+        };
+        let halves = whole.halved();
+        let force = halves.force.unwrap();
+        let expected = [
+            [1.0, 2.5, 4.0],
+            [4.0, 3.5, 3.0],
+            [-2.0, -1.0, 0.0],
+            [0.0, 4.0, 8.0],
+        ];
+        assert_eq!(force.values(), expected);
+        let base = halves.base.unwrap();
+        assert_eq!(base.values(), [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]]);
+        assert_eq!(Excitation::default().halved(), Excitation::default());
+    }
+}

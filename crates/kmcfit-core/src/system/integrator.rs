@@ -1,0 +1,102 @@
+//! Explicit Runge–Kutta tableaux whose stages sit on nodes or half-way between them.
+
+/// Which explicit Runge–Kutta method steps the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Explicit midpoint rule, order 2: the paper's.
+    Midpoint,
+    /// Classical Runge–Kutta method, order 4.
+    Rk4,
+}
+
+impl Method {
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Midpoint => "midpoint",
+            Method::Rk4 => "rk4",
+        }
+    }
+
+    /// Order of the error in the step.
+    pub fn order(self) -> u32 {
+        match self {
+            Method::Midpoint => 2,
+            Method::Rk4 => 4,
+        }
+    }
+}
+
+/// Where in a step a stage sits. Coefficients there: a node's value, or the mean of two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Position {
+    Left,
+    Middle,
+    Right,
+}
+
+impl Position {
+    /// The piecewise linear function `f` at this position of step `i`.
+    #[inline(always)]
+    pub fn of(self, f: &[f64], i: usize) -> f64 {
+        match self {
+            Position::Left => f[i],
+            Position::Middle => (f[i + 1] + f[i]) * 0.5,
+            Position::Right => f[i + 1],
+        }
+    }
+
+    /// How much of a node's value, at either end of a step, is seen at this position.
+    #[inline(always)]
+    pub fn share(self, node: Position) -> f64 {
+        match (self, node) {
+            (Position::Middle, _) => 0.5,
+            (here, node) if here == node => 1.0,
+            _ => 0.0,
+        }
+    }
+
+    /// Transpose of [`Position::of`]: adds `value` to the nodes that the position reads.
+    #[inline(always)]
+    pub fn spread(self, f: &mut [f64], i: usize, value: f64) {
+        match self {
+            Position::Left => f[i] += value,
+            Position::Middle => {
+                f[i] += 0.5 * value;
+                f[i + 1] += 0.5 * value;
+            }
+            Position::Right => f[i + 1] += value,
+        }
+    }
+}
+
+/// Coefficients of an explicit method with `S` stages: stage `s` starts from `x + sum_r a[s][r] k_r`
+/// with `k_r = dt x'_r`, and the step ends at `x + sum_s b[s] k_s`.
+#[derive(Debug)]
+pub(crate) struct Tableau<const S: usize> {
+    pub a: [[f64; S]; S],
+    pub b: [f64; S],
+    pub position: [Position; S],
+}
+
+pub(crate) const MIDPOINT: Tableau<2> = Tableau {
+    a: [[0.0, 0.0], [0.5, 0.0]],
+    b: [0.0, 1.0],
+    position: [Position::Left, Position::Middle],
+};
+
+pub(crate) const RK4: Tableau<4> = Tableau {
+    a: [
+        [0.0, 0.0, 0.0, 0.0],
+        [0.5, 0.0, 0.0, 0.0],
+        [0.0, 0.5, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+    ],
+    b: [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+    position: [
+        Position::Left,
+        Position::Middle,
+        Position::Middle,
+        Position::Right,
+    ],
+};

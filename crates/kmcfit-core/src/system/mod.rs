@@ -1,0 +1,42 @@
+//! The oscillator: time grid, integrator, force terms, coefficient functions and input.
+//!
+//! `m(t) (y'' + b''(t)) + sum_j p_j(t) phi_j(y, y') = f(t)` with `y(0)`, `y'(0)` given, stepped by an explicit
+//! Runge-Kutta method ([`Method`]) on an equally spaced [`Grid`]. Coefficient functions live on the
+//! nodes and are linear in between, so a stage at mid-step has the mean of two nodes.
+
+mod coefficients;
+mod elements;
+mod grid;
+mod input;
+mod integrator;
+pub mod quadrature;
+
+pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
+
+pub use coefficients::{Device, DeviceTangent, State};
+pub use elements::{MOST_TERMS, Term};
+pub use grid::{Grid, Place};
+pub use input::{Excitation, Stepwise, Surroundings};
+pub use integrator::Method;
+
+/// Most functions of a device: the mass and one for each term.
+pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
+
+/// Grid, stepper and force terms of an oscillator. The values of the coefficient functions are a [`Device`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Oscillator {
+    /// Time nodes.
+    pub grid: Grid,
+    /// Stepper.
+    pub method: Method,
+    /// Force terms, in the order of [`Device::coefficients`].
+    pub terms: Vec<Term>,
+}
+
+impl Oscillator {
+    /// Whether the response is linear in the initial state and nothing drives it.
+    pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
+        let is_free = || excitation.is_none_or(Excitation::is_zero);
+        self.terms.iter().all(|term| term.is_linear()) && is_free()
+    }
+}
