@@ -63,7 +63,7 @@ impl Unit {
                 self.kept = Some(CheckpointUnit::Search(rows, standing));
             }
             Entry::Piece(piece) if self.rows.is_empty() => {
-                self.kept = Some(CheckpointUnit::Piece(piece.0))
+                self.kept = Some(CheckpointUnit::Piece(piece.0));
             }
             Entry::Nothing if self.rows.is_empty() => self.kept = Some(CheckpointUnit::Nothing),
             _ => return false,

@@ -34,7 +34,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         let halfway = problem
             .problem
             .filter(|_| needs_jacobians)
-            .and_then(|p| halfway(p));
+            .and_then(halfway);
         let has_paper_order = settings.solver == Solver::SteepestDescent
             || settings.gradient == GradientKind::Continuous;
         Self {

@@ -103,7 +103,7 @@ pub(super) fn search_prepared(
     result.solver.finish(counts)
 }
 
-/// One search from `start` alone, without the ladder of [`fit`](super::fit): for fits whose start is
+/// One search from `start` alone, without the ladder of [`fit`](super::fit()): for fits whose start is
 /// near an optimum, or whose start is the question.
 ///
 /// # Errors

@@ -18,7 +18,7 @@ const SETTLED: f64 = 1e-6;
 /// From the median of the absolute residuals to the standard deviation of Gaussian noise.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
-/// [`fit`](super::fit), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
+/// [`fit`](super::fit()), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
 /// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
 /// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
 /// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
@@ -27,7 +27,7 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// residuals.
 ///
 /// # Errors
-/// As [`fit`](super::fit).
+/// As [`fit`](super::fit()).
 pub fn fit_with_noise(
     problem: &Problem,
     start: &[f64],
