@@ -191,6 +191,8 @@ impl Run<'_, '_> {
         let (rows, standing) = self.kept.take()?;
         let progress = self.stand_again(work, rows, standing);
         if progress.is_none() {
+            // The search begins anew, with nothing of a state that does not fit the problem.
+            self.method = step_rule(self.settings.solver);
             self.watch.refuse();
         }
         progress

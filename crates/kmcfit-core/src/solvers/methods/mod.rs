@@ -57,7 +57,8 @@ pub(crate) trait StepRule {
         MethodState::Nothing
     }
 
-    /// Takes up a memory at `point`; whether it is one of this method and this problem.
+    /// Restores a state at `point`; `false` where it belongs to another method or problem, and the method is then not used any
+    /// more.
     fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
         let _ = (problem, point);
         memory == MethodState::Nothing
@@ -86,5 +87,63 @@ pub(super) fn no_step(problem: &Problem, point: &Iterate, status: ConicStatus) -
     match status == ConicStatus::Infeasible && !inside {
         true => Step::Infeasible(reason),
         false => Step::Stuck(reason),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, Part, Record};
+    use crate::objective::GradientKind;
+    use crate::solvers::checkpoint::ExactF64s;
+
+    /// A state with vectors of another length, as a damaged checkpoint has it, is refused by every method.
+    #[test]
+    fn states_of_another_length_are_refused() {
+        let times: Vec<f64> = (0..21).map(|i| 0.1 * f64::from(i)).collect();
+        let motion: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let system = [Part::constant(2.0), Part::constant(0.1), Part::fixed(1.0)];
+        let record = Record::new("r")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &motion);
+        let problem = Builder::new(system)
+            .record(record)
+            .build()
+            .expect("a problem");
+        let start = problem.start();
+        let evaluation = problem.evaluate(&start).expect("a response");
+        let gradient = problem.gradient(&start, &evaluation, GradientKind::Discrete);
+        let mut point = Iterate::new(start, evaluation, gradient);
+        for length in [0, 1, 3, 9] {
+            let vector = || ExactF64s(vec![1.0; length]);
+            let states = [
+                (
+                    Solver::ProjectedGradient,
+                    MethodState::ProjectedGradient {
+                        metric: vector(),
+                        lengths: ExactF64s(vec![1.0; 2]),
+                    },
+                ),
+                (
+                    Solver::Lbfgs { memory: 5 },
+                    MethodState::Lbfgs {
+                        x: vector(),
+                        logarithmic: vec![false; length],
+                        pairs: Vec::new(),
+                    },
+                ),
+                (
+                    Solver::GaussNewton,
+                    MethodState::GaussNewton {
+                        numbers: ExactF64s(vec![1.0]),
+                        made_at: Some(vector()),
+                    },
+                ),
+            ];
+            for (solver, state) in states {
+                let is_restored = step_rule(solver).restore(state, &problem, &mut point);
+                assert!(!is_restored, "{solver:?}, {length}");
+            }
+        }
     }
 }

@@ -85,12 +85,15 @@ impl StepRule for ProjectedGradient {
         let [first_length, length] = *lengths.0.as_slice() else {
             return false;
         };
+        if metric.0.len() != point.parameters.len() {
+            return false;
+        }
         *self = Self {
             metric: metric.0,
             first_length,
             length,
         };
-        self.metric.len() == point.parameters.len()
+        true
     }
 }
 
