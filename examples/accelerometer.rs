@@ -1,9 +1,9 @@
 // A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness, and how sure.
 
 use kmcfit::observations::Table;
-use kmcfit_core::internals::builder::{Builder, Part, Record};
-use kmcfit_core::internals::identifiability::{BandSettings, Bands};
-use kmcfit_core::internals::signal::Interpolation;
+use kmcfit_core::Interpolation;
+use kmcfit_core::{BandSettings, Bands};
+use kmcfit_core::{Builder, Part, Record};
 use std::error::Error;
 
 /// Value and standard error of mass (kg), damping (N s/m) and stiffness (N/m).

@@ -1,6 +1,6 @@
 // A free decay from arrays: which damping and stiffness, if the mass is known?
 
-use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::{Builder, Part, Record};
 use std::error::Error;
 
 /// Damping (N s/m) and stiffness (N/m).

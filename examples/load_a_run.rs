@@ -1,7 +1,7 @@
 // Results load back: what `kmcfit fit models/linear-mass.yaml` wrote, and the motion from another start.
 
 use kmcfit::Run;
-use kmcfit_core::internals::system::State;
+use kmcfit_core::State;
 use std::error::Error;
 use std::path::Path;
 

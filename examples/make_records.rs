@@ -4,7 +4,7 @@
 //! `cargo run --example make_records -- data`
 
 use kmcfit::results::write_whole;
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::ChannelKind;
 use kmcfit_core::internals::simulate::{Trajectory, reference};
 use kmcfit_core::internals::system::{
     Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,

@@ -1,10 +1,10 @@
 // The paper's record: what turns an optimum that matches the data into the device that made them.
 
 use kmcfit::observations::Table;
-use kmcfit_core::internals::builder::{Builder, Part, Record};
-use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::functions::Quantity;
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::Method;
+use kmcfit_core::Quantity;
+use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Shape, Statement};
 use std::error::Error;
 
 /// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.

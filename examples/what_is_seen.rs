@@ -1,8 +1,8 @@
 // Before measuring: what can a record show? One free decay, and the same with a shaker run.
 
-use kmcfit_core::internals::builder::{Builder, Part, Record};
 use kmcfit_core::internals::identifiability::{Symmetry, count};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Device, Excitation, Grid, Method, Oscillator, State, Term};
 use std::error::Error;
 
 /// For one free record and for the pair: directions seen at most, and whether a factor of all functions

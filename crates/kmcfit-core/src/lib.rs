@@ -24,12 +24,12 @@
 //! A device whose mass falls along a line is simulated, and found again from its motion:
 //!
 //! ```
-//! use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
-//! use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
-//! use kmcfit_core::internals::objective::GradientKind;
-//! use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-//! use kmcfit_core::internals::problem::Problem;
-//! use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+//! use kmcfit_core::{Device, Grid, Method, Oscillator, State, Term};
+//! use kmcfit_core::{Basis, CoefficientFunction, Functions, Quantity};
+//! use kmcfit_core::GradientKind;
+//! use kmcfit_core::{Channel, Experiment, Weighting};
+//! use kmcfit_core::Problem;
+//! use kmcfit_core::{FitSettings, Initial, Solver, Status, Stopping, fit};
 //!
 //! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
 //! let grid = Grid::new(0.0, 25.0, 1001).expect("a grid");

@@ -6,7 +6,7 @@
 //! bands, weights chosen by a rule, functions of single experiments) is there in the modules below.
 //!
 //! ```
-//! use kmcfit_core::internals::builder::{Builder, Part, Record};
+//! use kmcfit_core::{Builder, Part, Record};
 //!
 //! // A free decay of one second: m = 1 kg, c = 2 N s/m, k = 2500 N/m, so 8 Hz.
 //! let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();

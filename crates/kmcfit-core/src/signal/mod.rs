@@ -2,7 +2,7 @@
 //! excitation, filters, spectra.
 //!
 //! ```
-//! use kmcfit_core::internals::signal::{Interpolation, Signal};
+//! use kmcfit_core::{Interpolation, Signal};
 //! let times: Vec<f64> = (0..11).map(|i| 0.1 * f64::from(i)).collect();
 //! let values = times.iter().map(|t| t * t * t).collect();
 //! let signal = Signal::new(times, values, Interpolation::Cubic).expect("increasing times");
