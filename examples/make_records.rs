@@ -7,7 +7,8 @@ use kmcfit::results::write_whole;
 use kmcfit_core::ChannelKind;
 use kmcfit_core::internals::simulate::{Trajectory, reference};
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
+    TimePoint,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -46,11 +47,11 @@ impl Run<'_> {
         let nodes = FINE * (self.count - 1) + 1;
         let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
         let at_nodes = |f: Function| grid.times().iter().map(|t| f(*t)).collect();
-        let device = Device {
+        let device = NodalCoefficients {
             mass: vec![self.mass; nodes],
             coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
         };
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid,
             method: Method::Rk4,
             terms: self.terms.iter().map(|(term, _)| *term).collect(),
@@ -60,7 +61,7 @@ impl Run<'_> {
                 let (a, b) = (grid.time(i), grid.time(i + 1));
                 [f(a), f(0.5 * (a + b)), f(b)]
             };
-            Stepwise::new((0..nodes - 1).map(step).collect())
+            StageSamples::new((0..nodes - 1).map(step).collect())
         };
         let excitation = Excitation {
             force: self.force.map(steps),
@@ -71,11 +72,11 @@ impl Run<'_> {
             .expect("a motion");
         let readings = 0..self.count;
         let acceleration = readings.clone().map(|i| {
-            let around = Surroundings {
+            let around = InputSample {
                 force: self.force.map_or(0.0, |f| f(self.time(i))),
                 base: self.base.map_or(0.0, |b| b(self.time(i))),
             };
-            let place = Place::node(FINE * i, nodes);
+            let place = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
             reference::observe(

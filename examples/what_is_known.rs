@@ -1,8 +1,8 @@
 // The paper's record: what turns an optimum that matches the data into the device that made them.
 
 use kmcfit::observations::Table;
+use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
-use kmcfit_core::Quantity;
 use kmcfit_core::{Builder, Part, Record};
 use kmcfit_core::{Shape, Statement};
 use std::error::Error;
@@ -24,7 +24,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
         .record(record)
         .method(Method::Midpoint)
         .demand(Statement::Shape {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             shape: Shape::NonIncreasing,
         })
         .build()?;

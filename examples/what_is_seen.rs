@@ -2,7 +2,7 @@
 
 use kmcfit_core::internals::identifiability::{Symmetry, count};
 use kmcfit_core::{Builder, Part, Record};
-use kmcfit_core::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 use std::error::Error;
 
 /// For one free record and for the pair: directions seen at most, and whether a factor of all functions
@@ -10,13 +10,13 @@ use std::error::Error;
 pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     // Any motion will do: what can be counted depends on the records, not on what they read.
     let grid = Grid::new(0.0, 20.0, 401).ok_or("a grid")?;
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let nodes = grid.nodes();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.1; nodes], vec![4.0; nodes]],
     };

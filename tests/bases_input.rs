@@ -3,7 +3,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit_core::internals::functions::{Basis, Functions};
+use kmcfit_core::internals::functions::{Basis, Parameterization};
 use std::path::PathBuf;
 
 const COLUMN: &str = "t_s,m_kg\n0,1\n2.5,0.8\n10,0.2\n";
@@ -35,7 +35,7 @@ fn message(mass: &str) -> String {
     read(mass).map_or_else(|error| error, |_| "no error".to_owned())
 }
 
-fn functions(mass: &str) -> Functions {
+fn functions(mass: &str) -> Parameterization {
     read(mass).unwrap().problem.functions
 }
 

@@ -4,7 +4,7 @@ use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{Builder, Part, Record};
 use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::functions::{Basis, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::system::Method;
 use std::path::Path;
@@ -65,12 +65,12 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
         .smooth(0, 0.01)
         .smooth(1, 0.1);
     let stiffness = Part::polynomial(&[1.5, -0.01]).max(4.0);
-    let of = Quantity::Mass;
+    let of = CoefficientKind::Mass;
     let built = Builder::new([mass, damping, stiffness])
         .record(paper_record())
         .method(Method::Midpoint)
         .demand(Statement::Value {
-            of: Quantity::Stiffness,
+            of: CoefficientKind::Stiffness,
             at: 0.0,
             value: 1.0,
         })
@@ -134,7 +134,7 @@ fn what_cannot_be_meant_is_refused() {
     let values = [1.0, 0.5, 0.2];
     let short = || Record::new("short").from_state(1.0, 0.0);
     let mass = |part: Part| Builder::new([part, one(), one()]).record(record());
-    let of = Quantity::Mass;
+    let of = CoefficientKind::Mass;
     let cases: Vec<(Builder, &str)> = vec![
         (Builder::new(device()), "records: there are none"),
         (

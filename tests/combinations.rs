@@ -2,7 +2,9 @@
 
 use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit_core::internals::solvers::{Status, fit};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -36,12 +38,12 @@ const METHODS: [&str; 6] = [
 /// A forced record of all channels.
 fn readings() -> String {
     let grid = Grid::new(0.0, 9.0, NODES).unwrap();
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.2; NODES],
         coefficients: vec![vec![0.2; NODES], vec![2.0; NODES]],
     };

@@ -7,15 +7,17 @@ use kmcfit::config::{Model, ModelFile, Purpose, build};
 use kmcfit::report::{CostKind, cost_definition};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
-use kmcfit_core::internals::objective::{GradientKind, View};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
+};
+use kmcfit_core::internals::objective::{GradientKind, SimulatedRecord};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
 };
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, Term,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -44,8 +46,8 @@ const NODES: usize = 6001;
 const WAVES: usize = 200;
 
 /// A minute at 100 readings per s.
-fn oscillator() -> Oscillator {
-    Oscillator {
+fn oscillator() -> System {
+    System {
         grid: Grid::new(0.0, 60.0, NODES).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -54,7 +56,7 @@ fn oscillator() -> Oscillator {
 
 /// A smooth random function of time with energy from 0.3 Hz to 8 Hz, of about unit variance: at the left
 /// end, middle and right end of every step.
-fn random_function(grid: &Grid, seed: u64) -> Stepwise {
+fn random_function(grid: &Grid, seed: u64) -> StageSamples {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let waves: Vec<[f64; 2]> = (0..WAVES)
         .map(|_| [random.random_range(0.3..8.0), random.random_range(0.0..TAU)])
@@ -68,20 +70,20 @@ fn random_function(grid: &Grid, seed: u64) -> Stepwise {
     };
     let half = 0.5 * grid.step();
     let step = |i: usize| [0.0, half, 2.0 * half].map(|d| at(grid.time(i) + d));
-    Stepwise::new((0..grid.nodes() - 1).map(step).collect())
+    StageSamples::new((0..grid.nodes() - 1).map(step).collect())
 }
 
 /// What a sensor of `kind` reads at every node of a device at rest in the beginning.
 fn readings(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: &Excitation,
     kind: ChannelKind,
 ) -> Channel {
     let grid = &oscillator.grid;
     let excitation = Some(excitation);
     let motion = oscillator.forward(device, REST, excitation).unwrap();
-    let view = View {
+    let view = SimulatedRecord {
         oscillator,
         device,
         excitation,
@@ -102,12 +104,12 @@ fn channel(kind: ChannelKind, grid: &Grid, values: Vec<f64>) -> Channel {
 /// One experiment, mass first among the functions, with the rule `period` of order 1 for those that
 /// are nodal.
 fn problem_of(
-    oscillator: Oscillator,
+    oscillator: System,
     list: Vec<CoefficientFunction>,
     experiment: Experiment,
 ) -> Problem {
     let grid = oscillator.grid;
-    let functions = Functions::new(list, grid.nodes(), grid.step()).unwrap();
+    let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
     let mut problem = Problem::new(oscillator, functions, vec![experiment]);
     let measurements = Measurements::of(&problem).unwrap();
     let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();
@@ -133,9 +135,9 @@ fn rms(values: &[f64]) -> f64 {
 /// Mass known, damping and stiffness free at every node.
 fn free_at_nodes(nodes: usize) -> Vec<CoefficientFunction> {
     vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
-        CoefficientFunction::nodal(Quantity::Damping, vec![0.0; nodes]),
-        CoefficientFunction::nodal(Quantity::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ]
 }
 
@@ -147,7 +149,7 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
     let k: Vec<f64> = (oscillator.grid.times().iter())
         .map(|t| base * (1.0 + 0.25 * (TAU * t / 15.0).sin()))
         .collect();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.005 * 2.0 * base.sqrt(); NODES], k.clone()],
     };
@@ -188,11 +190,11 @@ fn constants(mass: Option<f64>) -> Vec<CoefficientFunction> {
     let constant = |quantity, start| CoefficientFunction::constant(quantity, start, NODES);
     vec![
         match mass {
-            Some(mass) => CoefficientFunction::fixed(Quantity::Mass, vec![mass; NODES]),
-            None => constant(Quantity::Mass, 1.0),
+            Some(mass) => CoefficientFunction::fixed(CoefficientKind::Mass, vec![mass; NODES]),
+            None => constant(CoefficientKind::Mass, 1.0),
         },
-        constant(Quantity::Damping, 0.0),
-        constant(Quantity::Stiffness, 1.0),
+        constant(CoefficientKind::Damping, 0.0),
+        constant(CoefficientKind::Stiffness, 1.0),
     ]
 }
 
@@ -208,7 +210,7 @@ fn close(found: &[f64], expected: &[f64], within: f64) {
 /// m = 2, c = 1.5, k = 300 under a known force or base.
 fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Problem {
     let oscillator = oscillator();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
@@ -388,9 +390,9 @@ fn constraints_and_soft_constraints() {
             CoefficientFunction::free(quantity, basis.clone(), &grid, vec![start; 41])
         };
         vec![
-            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-            free(Quantity::Damping, 0.0),
-            free(Quantity::Stiffness, 150.0),
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+            free(CoefficientKind::Damping, 0.0),
+            free(CoefficientKind::Stiffness, 150.0),
         ]
     };
     let (plain, _) = shaken(2, list());
@@ -467,13 +469,13 @@ fn bounds_on_functions_of_unlike_size() {
 #[test]
 fn readings_without_a_motion() {
     let grid = Grid::new(0.0, 1.0, 21).unwrap();
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         ..oscillator()
     };
     let still = channel(ChannelKind::Acceleration, &grid, vec![1.0; 21]);
     let experiment = Experiment::free("still", REST, 21).with_channel(still);
-    let functions = Functions::new(free_at_nodes(21), 21, grid.step()).unwrap();
+    let functions = Parameterization::new(free_at_nodes(21), 21, grid.step()).unwrap();
     let problem = Problem::new(oscillator, functions, vec![experiment]);
     let found = run(&problem);
     assert_eq!(found.outcome.status, Status::Failed);
@@ -495,7 +497,7 @@ fn readings_without_a_motion() {
         base: None,
     };
     let oscillator = self::oscillator();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
@@ -503,7 +505,7 @@ fn readings_without_a_motion() {
     let experiment = Experiment::free("driven", REST, NODES)
         .with_excitation(excitation)
         .with_channel(channel);
-    let functions = Functions::new(constants(None), NODES, oscillator.grid.step()).unwrap();
+    let functions = Parameterization::new(constants(None), NODES, oscillator.grid.step()).unwrap();
     let problem = Problem::new(oscillator, functions, vec![experiment]);
     assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations");
 }
@@ -618,7 +620,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
     let duration = 20.0;
     for stride in [1, 4] {
         let nodes = 100 * stride + 1;
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid: Grid::new(0.0, duration, nodes).unwrap(),
             ..oscillator()
         };
@@ -632,9 +634,9 @@ fn the_cost_is_the_integral_of_the_squared_error() {
             velocity: 0.0,
         };
         let list = vec![
-            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
-            CoefficientFunction::fixed(Quantity::Damping, vec![0.0; nodes]),
-            CoefficientFunction::constant(Quantity::Stiffness, 1.5, nodes),
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+            CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; nodes]),
+            CoefficientFunction::constant(CoefficientKind::Stiffness, 1.5, nodes),
         ];
         let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
         let found = run(&problem_of(oscillator, list, experiment));

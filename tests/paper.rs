@@ -6,7 +6,7 @@ use kmcfit::report::predict;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
 use kmcfit_core::internals::system::quadrature::trapezoid;
-use kmcfit_core::internals::system::{Oscillator, State};
+use kmcfit_core::internals::system::{State, System};
 use std::sync::OnceLock;
 
 /// Iteration, J/J0 after it, G^2/G0^2 before it: computed from the formulas of the paper in plain
@@ -176,7 +176,7 @@ fn the_paper_s_optimum_does_not_predict() {
         (-1.0, 0.0, 0.91209, 10.89),
         (-3.3, 1.0, 39.730, 126.9),
     ];
-    let oscillator: Oscillator =
+    let oscillator: System =
         common::oscillator(2000, kmcfit_core::internals::system::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()

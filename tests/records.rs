@@ -4,7 +4,7 @@ use kmcfit::config::{Model, ModelFile, Purpose, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, Term,
 };
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -25,11 +25,11 @@ fn motion(
 ) -> Vec<f64> {
     let nodes = FINE * (count - 1) + 1;
     let grid = Grid::new(0.0, (count - 1) as f64 / rate, nodes).unwrap();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![MASS; nodes],
         coefficients: vec![vec![DAMPING; nodes], vec![STIFFNESS; nodes]],
     };
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -41,7 +41,7 @@ fn motion(
             let inside = b - 1e-9 * (b - a);
             [f(a + 1e-9 * (b - a)), f(0.5 * (a + b)), f(inside)]
         };
-        Stepwise::new((0..nodes - 1).map(step).collect())
+        StageSamples::new((0..nodes - 1).map(step).collect())
     };
     let excitation = Excitation {
         force: Some(steps(force)),

@@ -2,13 +2,15 @@
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
 use kmcfit::config::{Model, ModelFile, Purpose, build};
-use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
 use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -25,7 +27,7 @@ const SPREAD: f64 = 3.0;
 /// The paper's problem on `nodes` nodes: one free value per node for mass, damping and stiffness, the
 /// midpoint rule, the start (2, 1, 1), and readings that the same stepper made.
 pub fn paper(nodes: usize) -> Problem {
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -37,18 +39,18 @@ pub fn paper(nodes: usize) -> Problem {
     let readings = paper_readings(&oscillator);
     let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
     let list = vec![
-        CoefficientFunction::nodal(Quantity::Mass, vec![2.0; nodes]),
-        CoefficientFunction::nodal(Quantity::Damping, vec![1.0; nodes]),
-        CoefficientFunction::nodal(Quantity::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Mass, vec![2.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Damping, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
+    let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
     let record = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     Problem::new(oscillator, functions, vec![record])
 }
 
-fn paper_readings(oscillator: &Oscillator) -> Vec<f64> {
+fn paper_readings(oscillator: &System) -> Vec<f64> {
     let nodes = oscillator.grid.nodes();
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: (1..=nodes)
             .map(|i| 1.0 - 0.5 * i as f64 / nodes as f64)
             .collect(),
@@ -134,7 +136,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         .map(|t| 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin() + 2.0 * (9.7 * t + 2.0).sin())
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
@@ -143,7 +145,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         displacement: 0.0,
         velocity: 0.0,
     };
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; samples],
         coefficients: [1.2, 20.0, 15.0].map(|p| vec![p; samples]).to_vec(),
     };
@@ -156,12 +158,13 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         })
         .collect();
     let list = vec![
-        CoefficientFunction::constant(Quantity::Mass, 1.2, samples),
-        CoefficientFunction::constant(Quantity::Damping, 1.0, samples),
-        CoefficientFunction::constant(Quantity::Stiffness, 18.0, samples),
-        CoefficientFunction::constant(Quantity::CubicStiffness, 12.0, samples),
+        CoefficientFunction::constant(CoefficientKind::Mass, 1.2, samples),
+        CoefficientFunction::constant(CoefficientKind::Damping, 1.0, samples),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 18.0, samples),
+        CoefficientFunction::constant(CoefficientKind::CubicStiffness, 12.0, samples),
     ];
-    let functions = Functions::new(list, samples, grid.step()).expect("independent functions");
+    let functions =
+        Parameterization::new(list, samples, grid.step()).expect("independent functions");
     let channel = |kind, values, sigma| {
         let weighting = Weighting::Sigma(sigma);
         Channel::new(kind, times.clone(), values, weighting, &grid, samples).expect("readings")

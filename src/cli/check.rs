@@ -6,7 +6,7 @@ use crate::report::figures::{self, GradientCurve};
 use crate::report::{CsvTable, render};
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::simulate::Breakdown;
+use kmcfit_core::internals::simulate::SimulationError;
 use std::path::PathBuf;
 
 /// Read and validate a model, then test its gradient against differences.
@@ -42,7 +42,7 @@ fn steps(model: &Model) -> Result<Option<Vec<f64>>, Failure> {
     Ok((norm_squared > 0.0).then(|| (0..=20).map(step).collect()))
 }
 
-fn no_motion(breakdown: Breakdown) -> Failure {
+fn no_motion(breakdown: SimulationError) -> Failure {
     Failure::Numerical(format!("the start has no motion: {breakdown}"))
 }
 

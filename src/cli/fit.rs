@@ -10,7 +10,7 @@ use crate::report::{
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
-use kmcfit_core::internals::simulate::Breakdown;
+use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
     choose_weight_watched, fit_with_noise_watched, without_motion,
@@ -269,7 +269,8 @@ pub(super) fn search(
         let fit = without_motion(problem, &model.given_start, settings, breakdown)?;
         Ok((None, None, fit))
     });
-    result.map_err(|breakdown: Breakdown| format!("the start cannot be evaluated: {breakdown}"))
+    result
+        .map_err(|breakdown: SimulationError| format!("the start cannot be evaluated: {breakdown}"))
 }
 
 /// The predictions that the model asks for; one without a motion says so and harms no other.

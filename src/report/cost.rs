@@ -1,7 +1,7 @@
 //! What the cost J of a problem is, in words and by its kind.
 
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{Penalty, Quantity};
+use kmcfit_core::internals::functions::{CoefficientKind, Penalty};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::Solver;
@@ -62,7 +62,7 @@ impl CostKind {
 /// [`Solver::EquationError`] the fit itself: the misfit and every penalty that the problem has, with
 /// its weight.
 pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
-    let quantities: Vec<Quantity> = problem.functions.iter().map(|f| f.quantity).collect();
+    let quantities: Vec<CoefficientKind> = problem.functions.iter().map(|f| f.quantity).collect();
     let misfit = CostKind::of(problem, solver).misfit().to_string() + &robust(problem);
     let scalars = problem.functions.scalars().iter();
     let priors = scalars.filter_map(|s| {

@@ -6,9 +6,9 @@ use crate::error::InputError;
 use crate::input::{JSON, read_text_within};
 use crate::memory;
 use crate::results;
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::system::{Device, Method, Oscillator, Term};
+use kmcfit_core::internals::system::{Method, NodalCoefficients, System, Term};
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -47,11 +47,11 @@ pub struct Run {
     /// The same with every key that is there, those of later versions included.
     pub value: Value,
     /// Grid, stepper and terms of the run.
-    pub oscillator: Oscillator,
+    pub oscillator: System,
     /// The device that was found.
-    pub device: Device,
+    pub device: NodalCoefficients,
     /// The true device, where the model named it.
-    pub truth: Option<Device>,
+    pub truth: Option<NodalCoefficients>,
     /// `history.csv`: one row per iteration.
     pub history: Vec<IterationRecord>,
     /// `functions.csv`: one row per node; not a number where a field is empty.
@@ -108,7 +108,7 @@ impl Run {
 fn oscillator(
     folder: &Path,
     document: &ResultDocument,
-) -> Result<(Oscillator, Vec<Quantity>), InputError> {
+) -> Result<(System, Vec<CoefficientKind>), InputError> {
     let model = &document.model;
     let unusable = |found: String| {
         InputError::file(
@@ -124,15 +124,15 @@ fn oscillator(
     let method = steppers.find(|m| m.name() == model.stepper);
     let method = method.ok_or_else(|| unusable(format!("stepper `{}`", model.stepper)))?;
     let width = model.friction_width.unwrap_or(f64::NAN);
-    let known = |name: &String| Quantity::ALL.into_iter().find(|q| q.name() == name);
-    let quantities: Option<Vec<Quantity>> = model.terms.iter().map(known).collect();
+    let known = |name: &String| CoefficientKind::ALL.into_iter().find(|q| q.name() == name);
+    let quantities: Option<Vec<CoefficientKind>> = model.terms.iter().map(known).collect();
     let no_terms = || unusable(format!("terms {:?}", model.terms));
     let quantities = quantities.ok_or_else(no_terms)?;
     let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
     if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
         return Err(no_terms());
     }
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method,
         terms,
@@ -200,19 +200,26 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, Input
 }
 
 /// The mass and the functions of the terms `quantities`, which are finite at every node.
-fn device(table: &Columns, prefix: &str, quantities: &[Quantity]) -> Result<Device, InputError> {
+fn device(
+    table: &Columns,
+    prefix: &str,
+    quantities: &[CoefficientKind],
+) -> Result<NodalCoefficients, InputError> {
     let is_rotation = table
-        .column(&format!("{prefix}{}", Quantity::Mass.angular_column()))
+        .column(&format!(
+            "{prefix}{}",
+            CoefficientKind::Mass.angular_column()
+        ))
         .is_some();
-    let column = |quantity: Quantity| {
+    let column = |quantity: CoefficientKind| {
         let name = match is_rotation {
             true => quantity.angular_column(),
             false => quantity.column(),
         };
         table.finite(&format!("{prefix}{name}"))
     };
-    Ok(Device {
-        mass: column(Quantity::Mass)?,
+    Ok(NodalCoefficients {
+        mass: column(CoefficientKind::Mass)?,
         coefficients: quantities
             .iter()
             .map(|q| column(*q))

@@ -6,7 +6,7 @@ use kmcfit_core::internals::assessment::{FitAssessment, StepCheck};
 use kmcfit_core::internals::identifiability::{Bands, Judgement};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::simulate::Breakdown;
+use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{Fit, Solver, predict_held_out};
 use nalgebra::DMatrix;
 
@@ -56,7 +56,7 @@ pub(super) struct HeldOut {
     /// The record.
     pub out: HoldOut,
     /// The problem of that record alone and its point; what the record leaves open is found from its own readings.
-    pub found: Result<(Problem, Evaluation), Breakdown>,
+    pub found: Result<(Problem, Evaluation), SimulationError>,
 }
 
 impl HeldOut {

@@ -1,9 +1,9 @@
 //! The motion of a found device from other initial states, against the true device's.
 
 use super::document::Prediction;
-use kmcfit_core::internals::simulate::{Breakdown, Trajectory};
+use kmcfit_core::internals::simulate::{SimulationError, Trajectory};
 use kmcfit_core::internals::system::quadrature::trapezoid;
-use kmcfit_core::internals::system::{Device, Oscillator, State};
+use kmcfit_core::internals::system::{NodalCoefficients, State, System};
 
 /// A prediction and the motions that it sums up.
 #[derive(Debug, Clone)]
@@ -20,13 +20,13 @@ pub struct PredictedMotion {
 /// cost is `integral (y - y_true)^2 dt`, the energy `integral y_true^2 dt`, by the trapezoid rule.
 ///
 /// # Errors
-/// A [`Breakdown`] if a motion does not exist.
+/// A [`SimulationError`] if a motion does not exist.
 pub fn predict(
-    oscillator: &Oscillator,
-    device: &Device,
-    truth: Option<&Device>,
+    oscillator: &System,
+    device: &NodalCoefficients,
+    truth: Option<&NodalCoefficients>,
     states: &[State],
-) -> Result<Vec<PredictedMotion>, Breakdown> {
+) -> Result<Vec<PredictedMotion>, SimulationError> {
     states
         .iter()
         .map(|&state| {
@@ -44,7 +44,7 @@ pub fn predict(
 }
 
 fn summarise(
-    oscillator: &Oscillator,
+    oscillator: &System,
     state: State,
     motion: &Trajectory,
     truth: Option<&Trajectory>,

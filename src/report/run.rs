@@ -310,7 +310,7 @@ impl FittedModel<'_> {
         let problem = &self.model.problem;
         let list = self.named_functions().into_iter().enumerate();
         let best = &self.fit.best;
-        let sizes = problem.natural_sizes(&best.evaluation);
+        let sizes = problem.natural_scales(&best.evaluation);
         let assessment = self.known.assessment.as_ref();
         let is_white = assessment.is_some_and(|a| !a.plausibility.is_coloured);
         let is_minimum = self.fit.outcome.status == Status::Converged;

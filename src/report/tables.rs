@@ -3,7 +3,7 @@
 use super::FittedModel;
 use super::csv::CsvTable;
 use super::drawn::ends;
-use kmcfit_core::internals::functions::{Quantity, Ratios};
+use kmcfit_core::internals::functions::{CoefficientKind, Ratios};
 use kmcfit_core::internals::solvers::IterationRecord;
 
 impl FittedModel<'_> {
@@ -22,7 +22,7 @@ impl FittedModel<'_> {
     }
 
     /// Column header of a quantity.
-    fn column(&self, quantity: Quantity) -> &'static str {
+    fn column(&self, quantity: CoefficientKind) -> &'static str {
         match self.is_rotation() {
             true => quantity.angular_column(),
             false => quantity.column(),

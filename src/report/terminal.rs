@@ -3,7 +3,7 @@
 use super::columns::Columns;
 use super::document::ResultDocument;
 use crate::error::InputError;
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use std::path::Path;
 
 /// Columns for the numbers beside a chart.
@@ -44,7 +44,9 @@ pub fn charts(
     let table = Columns::read(&folder.join("functions.csv"))?;
     let times = table.required("t_s")?;
     let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
-    for quantity in names.filter_map(|name| Quantity::ALL.into_iter().find(|q| q.name() == name)) {
+    for quantity in
+        names.filter_map(|name| CoefficientKind::ALL.into_iter().find(|q| q.name() == name))
+    {
         let values =
             (table.column(quantity.column())).or_else(|| table.column(quantity.angular_column()));
         let (Some(values), Some(function)) = (values, document.functions.get(quantity.name()))

@@ -24,8 +24,8 @@ pub mod diagnostics {
 }
 pub mod functions {
     pub use crate::functions::{
-        Basis, CoefficientFunction, Design, Functions, Gram, Penalty, Prior, Quantity, Ratios,
-        Scalar, Value, Variation, basis,
+        Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization, Penalty,
+        Prior, Ratios, ScalarParameter, Value, Variation, basis,
     };
 }
 pub mod host {
@@ -39,7 +39,7 @@ pub mod identifiability {
     };
 }
 pub mod objective {
-    pub use crate::objective::{Evaluation, GradientKind, View, state_sizes};
+    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
 }
 pub mod problem {
     pub use crate::problem::Problem;
@@ -49,7 +49,7 @@ pub mod qp {
 }
 pub mod record {
     pub use crate::record::{
-        BaseMotion, Channel, ChannelKind, Drive, Experiment, Loss, Sensor, Waveform, Weighting,
+        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, Sensor, Waveform, Weighting,
         integral_over,
     };
 }
@@ -65,7 +65,8 @@ pub mod simd {
 }
 pub mod simulate {
     pub use crate::simulate::{
-        Breakdown, Cause, Engine, Purpose, Trajectory, arithmetic, continuous_adjoint, reference,
+        Cause, Engine, Purpose, SimulationError, Trajectory, arithmetic, continuous_adjoint,
+        reference,
     };
 }
 pub mod solvers {
@@ -86,8 +87,8 @@ pub mod study {
 }
 pub mod system {
     pub use crate::system::{
-        Device, DeviceTangent, Excitation, Grid, Method, Oscillator, Place, State, Stepwise,
-        Surroundings, Term, quadrature,
+        Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
+        SystemTangent, Term, TimePoint, quadrature,
     };
 }
 pub mod threads {

@@ -24,8 +24,8 @@
 //! A device whose mass falls along a line is simulated, and found again from its motion:
 //!
 //! ```
-//! use kmcfit_core::{Device, Grid, Method, Oscillator, State, Term};
-//! use kmcfit_core::{Basis, CoefficientFunction, Functions, Quantity};
+//! use kmcfit_core::{NodalCoefficients, Grid, Method, System, State, Term};
+//! use kmcfit_core::{Basis, CoefficientFunction, Parameterization, CoefficientKind};
 //! use kmcfit_core::GradientKind;
 //! use kmcfit_core::{Channel, Experiment, Weighting};
 //! use kmcfit_core::Problem;
@@ -34,11 +34,11 @@
 //! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
 //! let grid = Grid::new(0.0, 25.0, 1001).expect("a grid");
 //! let nodes = grid.nodes();
-//! let truth = Device {
+//! let truth = NodalCoefficients {
 //!     mass: grid.times().iter().map(|t| 1.0 - t / 50.0).collect(),
 //!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
 //! };
-//! let oscillator = Oscillator {
+//! let oscillator = System {
 //!     grid,
 //!     method: Method::Rk4,
 //!     terms: vec![Term::Damping, Term::Stiffness],
@@ -50,11 +50,11 @@
 //! let line = Basis::Polynomial { degree: 1 };
 //! let start = line.constant(&grid, 2.0);
 //! let list = vec![
-//!     CoefficientFunction::free(Quantity::Mass, line, &grid, start),
-//!     CoefficientFunction::constant(Quantity::Damping, 1.0, nodes),
-//!     CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+//!     CoefficientFunction::free(CoefficientKind::Mass, line, &grid, start),
+//!     CoefficientFunction::constant(CoefficientKind::Damping, 1.0, nodes),
+//!     CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
 //! ];
-//! let functions = Functions::new(list, nodes, grid.step()).expect("independent functions");
+//! let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
 //! let weighting = Weighting::Integral { spacing: grid.step() };
 //! let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
 //! let record = Experiment::free("free decay", initial, nodes).with_channel(channel);
@@ -103,15 +103,16 @@ mod threads;
 pub use builder::{BuildError, Builder, Part, Record};
 pub use constraints::{Limit, Shape, Statement};
 pub use functions::{
-    Basis, CoefficientFunction, Functions, Penalty, Prior, Quantity, Scalar, Variation,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
+    Variation,
 };
 pub use problem::Problem;
 pub use record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 pub use signal::{Interpolation, Signal};
-pub use system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
-pub use simulate::{Breakdown, Cause, Engine, Purpose, Trajectory};
+pub use simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
     Attempt, Counts, Fit, FitSettings, Initial, Optimality, Outcome, Reason, Solver, StartStrategy,

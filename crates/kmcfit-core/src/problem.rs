@@ -1,17 +1,17 @@
 //! The validated, immutable problem that everything below the configuration works on.
 
 use crate::constraints::{Constraints, RowGroup};
-use crate::functions::{Functions, Penalty, Variation};
+use crate::functions::{Parameterization, Penalty, Variation};
 use crate::record::{Channel, Experiment, Weighting};
-use crate::system::Oscillator;
+use crate::system::System;
 
 /// What is fitted: an oscillator, how its functions are represented, and the records.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Grid, stepper and terms.
-    pub oscillator: Oscillator,
+    pub oscillator: System,
     /// Mass and one function per term.
-    pub functions: Functions,
+    pub functions: Parameterization,
     /// The records.
     pub experiments: Vec<Experiment>,
     /// What the functions pay for being rough.
@@ -26,7 +26,11 @@ pub struct Problem {
 
 impl Problem {
     /// A problem without regularisation or constraints.
-    pub fn new(oscillator: Oscillator, functions: Functions, experiments: Vec<Experiment>) -> Self {
+    pub fn new(
+        oscillator: System,
+        functions: Parameterization,
+        experiments: Vec<Experiment>,
+    ) -> Self {
         Self {
             oscillator,
             functions,
@@ -64,7 +68,7 @@ impl Problem {
     }
 
     /// The misfit of no motion at all: what there is to explain.
-    pub fn misfit_of_silence(&self) -> f64 {
+    pub fn zero_response_misfit(&self) -> f64 {
         let silence = |c: &Channel| c.cost(&vec![0.0; c.len()]);
         self.channels().map(silence).sum()
     }
@@ -72,7 +76,7 @@ impl Problem {
     /// The same problem with only the first part of the readings, `share` of the time of each
     /// record.
     #[must_use]
-    pub fn first_part(&self, share: f64) -> Self {
+    pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
         let grid = &self.oscillator.grid;
         for experiment in &mut part.experiments {

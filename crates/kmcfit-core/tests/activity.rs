@@ -3,32 +3,32 @@
 mod common;
 
 use kmcfit_core::internals::constraints::{RowGroup, Statement};
-use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, FitSettings, Initial, Solver, Status, Stopping, active_constraints, fit, fit_from,
 };
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 
 /// m = k = 1 known, a constant c sought from the motion of c = 0.8, its damping ratio capped.
 fn capped(cap: f64) -> Problem {
     let oscillator = common::oscillator(NODES, Method::Rk4);
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.8; NODES], vec![1.0; NODES]],
     };
     let observed = oscillator.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(oscillator, list, observed.displacement, None);
     let statement = Statement::DampingRatio { max: cap };
-    let functions: &Functions = &problem.functions;
+    let functions: &Parameterization = &problem.functions;
     problem.constraints = statement
         .build(&problem.oscillator.grid, functions)
         .unwrap();
@@ -130,9 +130,9 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
 fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup> {
     let plain = capped(0.2);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, c, NODES),
-        CoefficientFunction::constant(Quantity::Stiffness, k, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, c, NODES),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, k, NODES),
     ];
     let observed = plain.experiments[0].channels[0].observed().to_vec();
     let mut problem = common::problem_of(plain.oscillator, list, observed, Some(sigma));
@@ -224,11 +224,11 @@ fn a_bound_that_the_data_pull_away_from_is_not_pushed() {
 fn with_sum_below(cap: f64) -> Problem {
     let mut problem = capped(0.2);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, 0.4, NODES),
-        CoefficientFunction::constant(Quantity::Stiffness, 0.4, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.4, NODES),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 0.4, NODES),
     ];
-    problem.functions = Functions::new(list, NODES, problem.oscillator.grid.step()).unwrap();
+    problem.functions = Parameterization::new(list, NODES, problem.oscillator.grid.step()).unwrap();
     let mut group = RowGroup::new("sum");
     let times = [0.0, common::DURATION];
     group.push([(0, 1.0), (1, 1.0)], [f64::NEG_INFINITY, cap], times);
@@ -268,9 +268,9 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
     let observed = problem.experiments[0].channels[0].observed().to_vec();
     let observed = common::synthetic::with_noise(&observed, 0.5, 3);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![unit; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1 * unit, NODES),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![unit; NODES]),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![unit; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1 * unit, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![unit; NODES]),
     ];
     problem = common::problem_of(problem.oscillator, list, observed, None);
     let statement = Statement::DampingRatio { max: cap };
@@ -315,9 +315,9 @@ fn whether_a_push_counts_is_no_matter_of_units() {
 fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     let mut problem = capped_in_units(1.0, 10.0);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, 0.5, NODES),
-        CoefficientFunction::constant(Quantity::Stiffness, 0.9, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 0.9, NODES),
     ];
     let (grid, observed) = (problem.oscillator.grid, &problem.experiments[0].channels[0]);
     let observed = observed.observed().to_vec();

@@ -4,7 +4,7 @@ use kmcfit_core::internals::functions::basis::{
     from_physical_powers, physical_powers, uniform_knots,
 };
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Design, Functions, Gram, Quantity,
+    Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization,
 };
 use kmcfit_core::internals::system::Grid;
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
@@ -524,19 +524,19 @@ fn coefficient_functions_of_every_basis() {
         .into_iter()
         .map(|(basis, _, _)| {
             let start = basis.constant(&grid, 2.0);
-            CoefficientFunction::free(Quantity::Mass, basis, &grid, start)
+            CoefficientFunction::free(CoefficientKind::Mass, basis, &grid, start)
         })
         .collect();
-    let functions = Functions::new(list, 41, grid.step()).unwrap();
+    let functions = Parameterization::new(list, 41, grid.step()).unwrap();
     let device = functions.device(&functions.start());
     for values in device.functions() {
         assert_close(values, &[2.0; 41], 1e-15, "start");
     }
-    let nodal = CoefficientFunction::nodal(Quantity::Mass, vec![1.0; 41]);
+    let nodal = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 41]);
     assert_eq!(nodal.basis, Some(Basis::Nodal));
-    let constant = CoefficientFunction::constant(Quantity::Mass, 1.0, 41);
+    let constant = CoefficientFunction::constant(CoefficientKind::Mass, 1.0, 41);
     assert_eq!(constant.basis, Some(Basis::Constant));
-    let fixed = CoefficientFunction::fixed(Quantity::Mass, vec![1.0; 41]);
+    let fixed = CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; 41]);
     assert_eq!(fixed.basis, None);
 }
 

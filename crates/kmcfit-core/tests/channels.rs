@@ -5,13 +5,13 @@ mod common;
 
 use common::sensed::{Record, Response, cost};
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
 };
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
+    Excitation, Grid, InputSample, Method, StageSamples, State, System, Term,
 };
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
@@ -19,25 +19,29 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const WIDTH: f64 = 0.3;
-const TERMS: [(Response, Term, Quantity); 6] = [
-    (Response::Damping, Term::Damping, Quantity::Damping),
-    (Response::Stiffness, Term::Stiffness, Quantity::Stiffness),
+const TERMS: [(Response, Term, CoefficientKind); 6] = [
+    (Response::Damping, Term::Damping, CoefficientKind::Damping),
+    (
+        Response::Stiffness,
+        Term::Stiffness,
+        CoefficientKind::Stiffness,
+    ),
     (
         Response::Cubic,
         Term::CubicStiffness,
-        Quantity::CubicStiffness,
+        CoefficientKind::CubicStiffness,
     ),
     (
         Response::Quadratic,
         Term::QuadraticDamping,
-        Quantity::QuadraticDamping,
+        CoefficientKind::QuadraticDamping,
     ),
     (
         Response::Coulomb(WIDTH),
         Term::CoulombFriction { width: WIDTH },
-        Quantity::CoulombFriction,
+        CoefficientKind::CoulombFriction,
     ),
-    (Response::Offset, Term::Offset, Quantity::Offset),
+    (Response::Offset, Term::Offset, CoefficientKind::Offset),
 ];
 const LOSSES: [Loss; 3] = [
     Loss::Squares,
@@ -164,17 +168,17 @@ impl Case {
         let nodes = self.nodes();
         let grid = Grid::new(0.0, self.dt * (nodes - 1) as f64, nodes).unwrap();
         let mut list = vec![CoefficientFunction::nodal(
-            Quantity::Mass,
+            CoefficientKind::Mass,
             self.mass.clone(),
         )];
         for ((_, _, quantity), values) in TERMS.iter().zip(&self.coefficients) {
             list.push(CoefficientFunction::nodal(*quantity, values.clone()));
         }
         let theta = self.theta();
-        let scalars: Vec<Scalar> = theta[nodes * (1 + TERMS.len())..]
+        let scalars: Vec<ScalarParameter> = theta[nodes * (1 + TERMS.len())..]
             .iter()
             .enumerate()
-            .map(|(i, start)| Scalar {
+            .map(|(i, start)| ScalarParameter {
                 name: format!("scalar {i}"),
                 unit: String::new(),
                 start: *start,
@@ -182,7 +186,7 @@ impl Case {
                 prior: (i == 1).then_some(PRIOR),
             })
             .collect();
-        let functions = Functions::new(list, nodes, grid.step())
+        let functions = Parameterization::new(list, nodes, grid.step())
             .unwrap()
             .with_scalars(scalars);
         let initial = State {
@@ -190,15 +194,15 @@ impl Case {
             velocity: self.initial[1],
         };
         let mut experiment = Experiment::free("all", initial, nodes).with_excitation(Excitation {
-            force: Some(Stepwise::new(self.force.clone())),
-            base: Some(Stepwise::new(self.base.clone())),
+            force: Some(StageSamples::new(self.force.clone())),
+            base: Some(StageSamples::new(self.base.clone())),
         });
         experiment.sought = [Some(0), Some(1)];
         for (n, readings) in self.channels.iter().enumerate() {
             let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();
             let times = readings.places.iter().map(time).collect();
             let weighting = Weighting::Sigmas(readings.sigmas.clone());
-            let around = readings.around.iter().map(|(force, base)| Surroundings {
+            let around = readings.around.iter().map(|(force, base)| InputSample {
                 force: *force,
                 base: *base,
             });
@@ -223,7 +227,7 @@ impl Case {
                 });
             experiment = experiment.with_channel(channel);
         }
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid,
             method: self.method,
             terms: TERMS.iter().map(|(_, term, _)| *term).collect(),
@@ -379,7 +383,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
             _ => CoefficientFunction::constant(nodal.quantity, start, grid.nodes()),
         }
     });
-    let functions = Functions::new(list.collect(), grid.nodes(), grid.step()).unwrap();
+    let functions = Parameterization::new(list.collect(), grid.nodes(), grid.step()).unwrap();
     Problem {
         functions: functions.with_scalars(problem.functions.scalars().to_vec()),
         ..problem.clone()

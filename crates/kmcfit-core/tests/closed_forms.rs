@@ -3,10 +3,10 @@
 mod common;
 
 use common::closed_form::{Bessel, constant_coefficients};
-use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
 
-fn oscillator(nodes: usize, duration: f64, method: Method) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize, duration: f64, method: Method) -> System {
+    System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -18,7 +18,7 @@ fn bessel_error(nodes: usize, method: Method) -> f64 {
     let oscillator = oscillator(nodes, common::DURATION, method);
     let exact = Bessel::PAPER;
     let times = oscillator.grid.times();
-    let device = Device {
+    let device = NodalCoefficients {
         mass: times.iter().map(|t| exact.mass(*t)).collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
@@ -79,7 +79,7 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
         for method in [Method::Midpoint, Method::Rk4] {
             let error = |nodes: usize| {
                 let oscillator = oscillator(nodes, 10.0, method);
-                let device = Device {
+                let device = NodalCoefficients {
                     mass: vec![m; nodes],
                     coefficients: vec![vec![c; nodes], vec![k; nodes]],
                 };

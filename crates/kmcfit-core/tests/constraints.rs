@@ -5,19 +5,21 @@ use kmcfit_core::internals::constraints::{
     Constraints, Impossible, Limit, RowGroup, Shape, Statement,
 };
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization,
+};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::{ConicStatus, project};
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::StartProjection;
-use kmcfit_core::internals::system::{Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{Grid, Method, State, System, Term};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
-const MASS: Quantity = Quantity::Mass;
-const DAMPING: Quantity = Quantity::Damping;
-const STIFFNESS: Quantity = Quantity::Stiffness;
+const MASS: CoefficientKind = CoefficientKind::Mass;
+const DAMPING: CoefficientKind = CoefficientKind::Damping;
+const STIFFNESS: CoefficientKind = CoefficientKind::Stiffness;
 const NODES: usize = 41;
 
 fn grid() -> Grid {
@@ -53,17 +55,17 @@ fn is_piecewise(basis: &Basis) -> bool {
     )
 }
 
-fn free(quantity: Quantity, basis: &Basis, value: f64) -> CoefficientFunction {
+fn free(quantity: CoefficientKind, basis: &Basis, value: f64) -> CoefficientFunction {
     let start = basis.constant(&grid(), value);
     CoefficientFunction::free(quantity, basis.clone(), &grid(), start)
 }
 
-fn collect(list: Vec<CoefficientFunction>) -> Functions {
-    Functions::new(list, NODES, grid().step()).unwrap()
+fn collect(list: Vec<CoefficientFunction>) -> Parameterization {
+    Parameterization::new(list, NODES, grid().step()).unwrap()
 }
 
 /// Mass, damping and stiffness of these bases.
-fn functions(bases: [&Basis; 3]) -> Functions {
+fn functions(bases: [&Basis; 3]) -> Parameterization {
     let list = [MASS, DAMPING, STIFFNESS].into_iter().zip(bases);
     collect(list.map(|(q, basis)| free(q, basis, 1.0)).collect())
 }
@@ -74,7 +76,13 @@ fn random(count: usize, seed: u64) -> Vec<f64> {
 }
 
 /// A derivative of function `j` at `times`, straight from the basis.
-fn dense(functions: &Functions, theta: &[f64], j: usize, q: usize, times: &[f64]) -> Vec<f64> {
+fn dense(
+    functions: &Parameterization,
+    theta: &[f64],
+    j: usize,
+    q: usize,
+    times: &[f64],
+) -> Vec<f64> {
     let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
     let part = &theta[functions.ranges()[j].clone()];
     let rows = basis.rows(&grid(), times, q);
@@ -92,12 +100,12 @@ fn fine() -> Vec<f64> {
     grid().with_nodes(count).unwrap().times()
 }
 
-fn built(statement: &Statement, functions: &Functions) -> Constraints {
+fn built(statement: &Statement, functions: &Parameterization) -> Constraints {
     statement.build(&grid(), functions).unwrap()
 }
 
 /// The nearest point inside.
-fn inside(constraints: &Constraints, functions: &Functions, seed: u64) -> Vec<f64> {
+fn inside(constraints: &Constraints, functions: &Parameterization, seed: u64) -> Vec<f64> {
     let start = random(functions.parameters(), seed);
     let metric = functions.relative_metric(&[1.0; 3], 10.0);
     let projection = project(constraints, &start, &metric);
@@ -108,7 +116,7 @@ fn inside(constraints: &Constraints, functions: &Functions, seed: u64) -> Vec<f6
     projection.theta
 }
 
-fn bounds(of: Quantity, min: f64, max: f64) -> Statement {
+fn bounds(of: CoefficientKind, min: f64, max: f64) -> Statement {
     Statement::Bounds {
         of,
         min: Some(Limit::Number(min)),
@@ -116,12 +124,12 @@ fn bounds(of: Quantity, min: f64, max: f64) -> Statement {
     }
 }
 
-fn shape(of: Quantity, shape: Shape) -> Statement {
+fn shape(of: CoefficientKind, shape: Shape) -> Statement {
     Statement::Shape { of, shape }
 }
 
 /// Whether a derivative of function `j` nowhere rises, or for smooth bases at no node.
-fn falls(functions: &Functions, theta: &[f64], j: usize, q: usize) -> bool {
+fn falls(functions: &Parameterization, theta: &[f64], j: usize, q: usize) -> bool {
     let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
     let slack = 1e-6;
     if is_piecewise(&basis) {
@@ -423,7 +431,7 @@ fn the_cone_is_the_cap_on_the_damping_ratio() {
 
 #[test]
 fn fixed_functions_move_to_the_bounds() {
-    let known = |q: Quantity, f: &dyn Fn(f64) -> f64| {
+    let known = |q: CoefficientKind, f: &dyn Fn(f64) -> f64| {
         CoefficientFunction::fixed(q, grid().times().into_iter().map(f).collect())
     };
     let with = |k: CoefficientFunction| {
@@ -444,7 +452,7 @@ fn fixed_functions_move_to_the_bounds() {
         assert_eq!(groups[0].bounds(i), [f64::NEG_INFINITY, -2.0]);
     }
     // Only what is about free functions is left of passivity.
-    let names = |f: &Functions| {
+    let names = |f: &Parameterization| {
         let groups = built(&Statement::Passive, f).groups;
         groups.into_iter().map(|g| g.name).collect::<Vec<_>>()
     };
@@ -508,8 +516,8 @@ fn bounds_and_fixed_values_hold_exactly() {
     }
 }
 
-fn problem(functions: Functions) -> Problem {
-    let oscillator = Oscillator {
+fn problem(functions: Parameterization) -> Problem {
+    let oscillator = System {
         grid: grid(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],

@@ -9,19 +9,19 @@ use kmcfit_core::internals::simulate::{
 };
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use kmcfit_core::internals::system::{
-    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, State, Term,
+    Excitation, Grid, Method, NodalCoefficients, State, System, SystemTangent, Term,
 };
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
 
 /// The discrete adjoint as fits compute it.
 fn discrete_adjoint(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     motion: &Trajectory,
     source: &Trajectory,
-) -> DeviceTangent {
+) -> SystemTangent {
     let engine = Engine::choose(oscillator, excitation, motion.nodes(), Purpose::Estimation);
     engine.discrete_adjoint(oscillator, device, excitation, motion, source)
 }
@@ -30,7 +30,7 @@ fn discrete_adjoint(
 #[derive(Debug, Clone)]
 struct Case {
     method: Method,
-    device: Device,
+    device: NodalCoefficients,
     force: Vec<f64>,
     initial: State,
     /// Weight and target of displacement and velocity at each node.
@@ -38,9 +38,9 @@ struct Case {
 }
 
 impl Case {
-    fn oscillator(&self) -> Oscillator {
+    fn oscillator(&self) -> System {
         let nodes = self.force.len();
-        Oscillator {
+        System {
             grid: Grid::new(0.0, 0.1 * (nodes - 1) as f64, nodes).unwrap(),
             method: self.method,
             terms: vec![Term::Damping, Term::Stiffness],
@@ -71,7 +71,7 @@ impl Case {
         }
     }
 
-    fn adjoint_gradient(&self) -> DeviceTangent {
+    fn adjoint_gradient(&self) -> SystemTangent {
         let oscillator = self.oscillator();
         let excitation = Excitation::force_at_nodes(&self.force);
         let force = Some(&excitation);
@@ -102,7 +102,7 @@ impl Case {
     }
 }
 
-fn flatten(gradient: &DeviceTangent) -> Vec<f64> {
+fn flatten(gradient: &SystemTangent) -> Vec<f64> {
     let mut flat: Vec<f64> = gradient.device.functions().flatten().copied().collect();
     flat.extend([gradient.initial.displacement, gradient.initial.velocity]);
     flat
@@ -123,7 +123,7 @@ fn case() -> impl Strategy<Value = Case> {
         )
             .prop_map(move |(mass, c, k, force, (y0, v0), weights)| Case {
                 method,
-                device: Device {
+                device: NodalCoefficients {
                     mass,
                     coefficients: vec![c, k],
                 },
@@ -160,8 +160,8 @@ proptest! {
         let cut = |f: &[f64]| -> Vec<f64> {
             f.iter().cycle().take(case.force.len()).copied().collect()
         };
-        let direction = DeviceTangent {
-            device: Device {
+        let direction = SystemTangent {
+            device: NodalCoefficients {
                 mass: cut(&other.device.coefficients[0]),
                 coefficients: vec![cut(&other.device.mass), cut(&other.force)],
             },
@@ -299,7 +299,7 @@ fn initial_gradients(nodes: usize) -> [State; 2] {
     let oscillator = common::oscillator(nodes, Method::Midpoint);
     let times = oscillator.grid.times();
     let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
-    let device = Device {
+    let device = NodalCoefficients {
         mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
         coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
     };

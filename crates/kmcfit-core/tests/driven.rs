@@ -7,7 +7,8 @@ use common::closed_form::constant_coefficients;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::simulate::{Trajectory, reference};
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Surroundings, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
+    TimePoint,
 };
 use std::f64::consts::PI;
 
@@ -20,32 +21,32 @@ const REST: State = State {
     velocity: 0.0,
 };
 
-fn oscillator(nodes: usize, duration: f64, method: Method) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize, duration: f64, method: Method) -> System {
+    System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
         terms: vec![Term::Damping, Term::Stiffness],
     }
 }
 
-fn constants(nodes: usize, values: &[f64]) -> Device {
+fn constants(nodes: usize, values: &[f64]) -> NodalCoefficients {
     let [mass, rest @ ..] = values else {
         panic!("a mass")
     };
-    Device {
+    NodalCoefficients {
         mass: vec![*mass; nodes],
         coefficients: rest.iter().map(|p| vec![*p; nodes]).collect(),
     }
 }
 
 /// A function of time as the stepper sees it: exact at both ends and in the middle of each step.
-fn sampled(grid: &Grid, f: impl Fn(f64) -> f64) -> Stepwise {
+fn sampled(grid: &Grid, f: impl Fn(f64) -> f64) -> StageSamples {
     let h = grid.step();
     let step = |i: usize| [0.0, 0.5, 1.0].map(|x| f(grid.time(i) + x * h));
-    Stepwise::new((0..grid.nodes() - 1).map(step).collect())
+    StageSamples::new((0..grid.nodes() - 1).map(step).collect())
 }
 
-fn pushed(force: Stepwise) -> Excitation {
+fn pushed(force: StageSamples) -> Excitation {
     Excitation {
         force: Some(force),
         base: None,
@@ -144,7 +145,7 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
-                        let place = Place::node(*i, nodes);
+                        let place = TimePoint::node(*i, nodes);
                         let around = excitation.around(place);
                         let sensed = reference::observe(
                             &oscillator,
@@ -187,7 +188,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
             let oscillator = oscillator(nodes, 8.0, method);
             let (first, last) = ((nodes - 1) / 8, (nodes - 1) / 2);
             let on = |i: usize| [f64::from(u8::from((first..last).contains(&i))); 3];
-            let force = Stepwise::new((0..nodes - 1).map(on).collect());
+            let force = StageSamples::new((0..nodes - 1).map(on).collect());
             let motion = oscillator
                 .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                 .unwrap();
@@ -356,9 +357,9 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
                 let mut most = 0.0f64;
                 for step in 0..nodes - 1 {
                     for fraction in [0.0, 0.1, 0.31, 0.5, 0.77, 0.99] {
-                        let place = Place { step, fraction };
+                        let place = TimePoint { step, fraction };
                         let t = grid.time(step) + fraction * grid.step();
-                        let around = Surroundings {
+                        let around = InputSample {
                             force: (w * t).cos(),
                             base: 0.0,
                         };

@@ -6,11 +6,11 @@ mod common;
 use common::synthetic::Truth;
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Penalty};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::equation_error;
-use kmcfit_core::internals::system::{Device, Excitation, Method, Term};
+use kmcfit_core::internals::system::{Excitation, Method, NodalCoefficients, Term};
 
 const NODES: usize = 401;
 const START: f64 = 2.0;
@@ -19,19 +19,19 @@ const START: f64 = 2.0;
 /// found from a mass of 2, c is fixed at `damping`, or sought if that is `None`.
 fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     let oscillator = common::oscillator(NODES, Method::Rk4);
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
     };
     let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
     let damping = match damping {
-        Some(value) => CoefficientFunction::fixed(Quantity::Damping, vec![value; NODES]),
-        None => CoefficientFunction::constant(Quantity::Damping, 0.5, NODES),
+        Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
+        None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
     };
     let list = vec![
-        CoefficientFunction::constant(Quantity::Mass, START, NODES),
+        CoefficientFunction::constant(CoefficientKind::Mass, START, NODES),
         damping,
-        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
     let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
     if silent_force {
@@ -104,14 +104,14 @@ fn a_fixed_function_or_value_sets_the_scale() {
 fn a_spring_alone_has_an_equation_too() {
     let mut oscillator = common::oscillator(NODES, Method::Rk4);
     oscillator.terms = vec![Term::Stiffness];
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![1.5; NODES]],
     };
     let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Stiffness, 1.0, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
     let problem = common::problem_of(oscillator, list, motion.displacement, None);
     let found = equation_error(&problem, &problem.functions.start()).unwrap();
@@ -126,7 +126,7 @@ fn irregular_velocities_are_integrated() {
     let grid = problem.oscillator.grid;
     let late = |i: usize| 0.4 * (1.0 + (1.7 * i as f64).sin() * (0.3 * i as f64).cos());
     let times: Vec<f64> = (0..100).map(|i| 0.25 * (i as f64 + late(i))).collect();
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.1; NODES], vec![1.5; NODES]],
     };
@@ -161,10 +161,10 @@ fn the_start_knows_no_unit_of_mass_or_length() {
         let rows = basis.roughness(&plain.oscillator.grid, 1);
         let stiffness = vec![unit; 6];
         let list = vec![
-            CoefficientFunction::fixed(Quantity::Mass, vec![unit; NODES]),
-            CoefficientFunction::fixed(Quantity::Damping, vec![0.0; NODES]),
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![unit; NODES]),
+            CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; NODES]),
             CoefficientFunction::free(
-                Quantity::Stiffness,
+                CoefficientKind::Stiffness,
                 basis,
                 &plain.oscillator.grid,
                 stiffness,
@@ -205,9 +205,9 @@ fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
         };
         let rows = basis.roughness(&grid, 1);
         let list = vec![
-            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-            CoefficientFunction::constant(Quantity::Damping, damping, NODES),
-            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, vec![1.0; 6]),
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+            CoefficientFunction::constant(CoefficientKind::Damping, damping, NODES),
+            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, vec![1.0; 6]),
         ];
         let observed = observed.clone();
         let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);

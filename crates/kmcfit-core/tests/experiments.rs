@@ -5,17 +5,23 @@ mod common;
 use common::synthetic::{Truth, run, settings, weighted_jacobian};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Functions, Penalty, Quantity, Ratios,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Ratios,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use nalgebra::DMatrix;
 
 const NODES: usize = 401;
 const DURATION: f64 = 25.0;
-const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+const QUANTITIES: [CoefficientKind; 3] = [
+    CoefficientKind::Mass,
+    CoefficientKind::Damping,
+    CoefficientKind::Stiffness,
+];
 const STATES: [State; 3] = [
     State {
         displacement: 3.3,
@@ -31,8 +37,8 @@ const STATES: [State; 3] = [
     },
 ];
 
-fn oscillator(nodes: usize) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize) -> System {
+    System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -40,10 +46,10 @@ fn oscillator(nodes: usize) -> Oscillator {
 }
 
 /// No line and no constant, so that smoothness does not know it beforehand; k(0) = 1.
-fn truth(grid: &Grid) -> Device {
+fn truth(grid: &Grid) -> NodalCoefficients {
     let times = grid.times();
     let each = |f: &dyn Fn(f64) -> f64| times.iter().map(|t| f(*t)).collect();
-    Device {
+    NodalCoefficients {
         mass: each(&|t| 1.0 - 0.2 * (0.25 * t).sin()),
         coefficients: vec![
             each(&|t| 0.08 + 0.03 * (0.3 * t).cos()),
@@ -64,12 +70,12 @@ fn force(grid: &Grid) -> Excitation {
 type Records<'a> = &'a [(State, bool)];
 
 /// One value per step for each function, from (2, 1, 1), with readings at all nodes.
-fn problem(nodes: usize, device: &Device, records: Records) -> Problem {
+fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Problem {
     let oscillator = oscillator(nodes);
     let grid = oscillator.grid;
     let list = QUANTITIES.into_iter().zip([2.0, 1.0, 1.0]);
     let list = list.map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]));
-    let functions = Functions::new(list.collect(), nodes, grid.step()).unwrap();
+    let functions = Parameterization::new(list.collect(), nodes, grid.step()).unwrap();
     let records = records.iter().map(|&(initial, forced)| {
         let excitation = forced.then(|| force(&grid));
         let truth = Truth {
@@ -117,7 +123,7 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Largest errors of k/m and c/m.
-fn ratio_errors(found: &Fit, truth: &Device) -> [f64; 2] {
+fn ratio_errors(found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
     let (found, exact) = (Ratios::of(&found.best.evaluation.device), Ratios::of(truth));
     [
         largest(&found.k_over_m, &exact.k_over_m),
@@ -126,10 +132,10 @@ fn ratio_errors(found: &Fit, truth: &Device) -> [f64; 2] {
 }
 
 /// A fit of one record that explains it, but with another device.
-fn another_device(records: Records, scale_fixed: bool, truth: &Device) -> Fit {
+fn another_device(records: Records, scale_fixed: bool, truth: &NodalCoefficients) -> Fit {
     let problem = smooth(problem(NODES, truth, records), scale_fixed);
     let found = fit(&problem, &problem.start(), &settings(), &mut |_| {}).unwrap();
-    let misfit = found.best.evaluation.misfit / problem.misfit_of_silence();
+    let misfit = found.best.evaluation.misfit / problem.zero_response_misfit();
     println!("one record: misfit {misfit:.1e} of silence");
     assert!(misfit < 1e-5, "{misfit} {:#?}", found.attempts);
     found

@@ -6,14 +6,15 @@ mod common;
 use common::synthetic::{Truth, rms, run, settings};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Functions, Penalty, Prior, Quantity, Scalar, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
+    Value,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::signal::{SecondOrder, band_pass};
 use kmcfit_core::internals::solvers::fit;
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Surroundings, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,8 +31,8 @@ const INITIAL: State = State {
     velocity: -0.5,
 };
 
-fn oscillator(terms: &[Term]) -> Oscillator {
-    Oscillator {
+fn oscillator(terms: &[Term]) -> System {
+    System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
         terms: terms.to_vec(),
@@ -51,13 +52,13 @@ fn line() -> Basis {
 /// A function to be found: its basis, the true parameters, and the start.
 #[derive(Clone)]
 struct Sought {
-    quantity: Quantity,
+    quantity: CoefficientKind,
     basis: Basis,
     truth: Vec<f64>,
     start: Vec<f64>,
 }
 
-fn constant(quantity: Quantity, truth: f64, start: f64) -> Sought {
+fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> Sought {
     Sought {
         quantity,
         basis: Basis::Constant,
@@ -66,7 +67,7 @@ fn constant(quantity: Quantity, truth: f64, start: f64) -> Sought {
     }
 }
 
-fn lines(quantity: Quantity, truth: [f64; 5], start: f64) -> Sought {
+fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> Sought {
     Sought {
         quantity,
         basis: line(),
@@ -92,11 +93,11 @@ impl Sought {
 
 /// Damping and stiffness of the linear device, which most tests look for; the mass is known.
 fn damping() -> Sought {
-    constant(Quantity::Damping, 0.25, 0.4)
+    constant(CoefficientKind::Damping, 0.25, 0.4)
 }
 
 fn stiffness() -> Sought {
-    lines(Quantity::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
+    lines(CoefficientKind::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
 }
 
 const LINEAR: [Term; 2] = [Term::Damping, Term::Stiffness];
@@ -126,7 +127,7 @@ struct Reading {
     /// True gain, offset and drift, and which scalars they are where they are sought.
     sensor: [f64; 3],
     sought: [Option<usize>; 3],
-    around: Vec<Surroundings>,
+    around: Vec<InputSample>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
     loss: Loss,
@@ -221,9 +222,9 @@ impl Record {
 }
 
 /// A number beside the functions.
-fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, Scalar) {
+fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) {
     let prior = prior.map(|sigma| Prior { mean: truth, sigma });
-    let scalar = Scalar {
+    let scalar = ScalarParameter {
         name: "a number".into(),
         unit: String::new(),
         start,
@@ -241,7 +242,7 @@ struct Case {
     functions: Vec<Sought>,
     /// Functions that replace one of the main device in the other devices: which one of its list.
     own: Vec<(usize, Sought)>,
-    scalars: Vec<(f64, Scalar)>,
+    scalars: Vec<(f64, ScalarParameter)>,
     records: Vec<Record>,
 }
 
@@ -257,7 +258,7 @@ impl Case {
         }
     }
 
-    fn with_scalars(mut self, scalars: Vec<(f64, Scalar)>) -> Self {
+    fn with_scalars(mut self, scalars: Vec<(f64, ScalarParameter)>) -> Self {
         self.scalars = scalars;
         self
     }
@@ -271,10 +272,10 @@ impl Case {
             .collect()
     }
 
-    fn device(&self, which: usize) -> Device {
+    fn device(&self, which: usize) -> NodalCoefficients {
         let mass = self.mass.as_ref().map_or_else(known_mass, Sought::values);
         let mut coefficients: Vec<Vec<f64>> = self.functions.iter().map(Sought::values).collect();
-        let mut device = Device {
+        let mut device = NodalCoefficients {
             mass,
             coefficients: std::mem::take(&mut coefficients),
         };
@@ -289,7 +290,7 @@ impl Case {
         let oscillator = oscillator(&self.terms);
         let mass = match &self.mass {
             Some(sought) => sought.function(),
-            None => CoefficientFunction::fixed(Quantity::Mass, known_mass()),
+            None => CoefficientFunction::fixed(CoefficientKind::Mass, known_mass()),
         };
         let mut list = vec![mass];
         list.extend(self.functions.iter().map(Sought::function));
@@ -301,9 +302,10 @@ impl Case {
             devices.push(device);
             list.push(sought.function());
         }
-        let functions = Functions::with_devices(list, devices, NODES, oscillator.grid.step())
-            .unwrap()
-            .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
+        let functions =
+            Parameterization::with_devices(list, devices, NODES, oscillator.grid.step())
+                .unwrap()
+                .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
         let records = self.records.iter().map(|record| {
             // A record ends with its last reading, at the next node.
             let ends = record.readings.iter().map(|r| r.times[r.times.len() - 1]);
@@ -345,7 +347,7 @@ impl Case {
         // The data are in the model class: to rounding, nothing is left at the truth.
         let misfit = problem.evaluate(&truth).unwrap().misfit;
         assert!(
-            misfit <= 1e-18 * problem.misfit_of_silence(),
+            misfit <= 1e-18 * problem.zero_response_misfit(),
             "{words}: {misfit:e} at the truth"
         );
         let found = run(&problem);
@@ -371,18 +373,18 @@ impl Case {
     }
 }
 
-fn force() -> Stepwise {
+fn force() -> StageSamples {
     let force: Vec<f64> = (grid().times().iter())
         .map(|t| 2.0 * (1.3 * t).sin() + (3.1 * t).cos())
         .collect();
-    Stepwise::linear(&force)
+    StageSamples::linear(&force)
 }
 
-fn base() -> Stepwise {
+fn base() -> StageSamples {
     let base: Vec<f64> = (grid().times().iter())
         .map(|t| 1.5 * (0.9 * t).cos() - (2.6 * t).sin())
         .collect();
-    Stepwise::linear(&base)
+    StageSamples::linear(&base)
 }
 
 fn forced() -> Excitation {
@@ -468,7 +470,7 @@ fn a_measured_force_gives_the_mass_too() {
             forced(),
             vec![Reading::of(kind, scattered(200, 6))],
         )]);
-        case.mass = Some(constant(Quantity::Mass, 1.2, 1.6));
+        case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
         case.check(&format!("forced, {}", kind.name()));
     }
 }
@@ -488,7 +490,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
         for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
             let mut reading = Reading::of(kind, times.clone());
             reading.around = (times.iter())
-                .map(|t| Surroundings {
+                .map(|t| InputSample {
                     force: 0.0,
                     base: base_at(t),
                 })
@@ -528,9 +530,9 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
         third,
     ])
     .with_scalars(vec![scalar(-0.4, 0.0, None), scalar(2.0, 1.5, None)]);
-    case.mass = Some(constant(Quantity::Mass, 1.2, 1.6));
+    case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
     case.check("three experiments");
-    case.own = vec![(2, constant(Quantity::Stiffness, 5.2, 4.0))];
+    case.own = vec![(2, constant(CoefficientKind::Stiffness, 5.2, 4.0))];
     case.records[0].device = 1;
     case.check("a stiffness of its own");
 }
@@ -540,27 +542,31 @@ fn each_nonlinear_term() {
     let others = [
         (
             Term::CubicStiffness,
-            constant(Quantity::CubicStiffness, 1.4, 0.0),
+            constant(CoefficientKind::CubicStiffness, 1.4, 0.0),
         ),
         (
             Term::QuadraticDamping,
-            constant(Quantity::QuadraticDamping, 0.3, 0.0),
+            constant(CoefficientKind::QuadraticDamping, 0.3, 0.0),
         ),
         (
             Term::CoulombFriction { width: WIDTH },
-            constant(Quantity::CoulombFriction, 0.35, 0.0),
+            constant(CoefficientKind::CoulombFriction, 0.35, 0.0),
         ),
-        (Term::Offset, constant(Quantity::Offset, -0.6, 0.0)),
+        (Term::Offset, constant(CoefficientKind::Offset, -0.6, 0.0)),
         (
             Term::CubicStiffness,
-            lines(Quantity::CubicStiffness, [1.0, 1.4, 2.0, 1.2, 0.7], 0.5),
+            lines(
+                CoefficientKind::CubicStiffness,
+                [1.0, 1.4, 2.0, 1.2, 0.7],
+                0.5,
+            ),
         ),
     ];
     for (term, sought) in others {
         let readings = vec![Reading::of(ChannelKind::Displacement, scattered(250, 9))];
         let mut case = Case::linear(vec![Record::driven(forced(), readings)]);
         case.terms.push(term);
-        case.functions[1] = constant(Quantity::Stiffness, 4.0, 3.6);
+        case.functions[1] = constant(CoefficientKind::Stiffness, 4.0, 3.6);
         case.functions.push(sought);
         case.check(&format!("{term:?}"));
     }
@@ -617,16 +623,20 @@ fn all_together() {
             Term::CoulombFriction { width: WIDTH },
             Term::Offset,
         ],
-        mass: Some(lines(Quantity::Mass, [1.2, 1.1, 1.15, 1.0, 0.9], 1.3)),
+        mass: Some(lines(
+            CoefficientKind::Mass,
+            [1.2, 1.1, 1.15, 1.0, 0.9],
+            1.3,
+        )),
         functions: vec![
             damping(),
             stiffness(),
-            constant(Quantity::CubicStiffness, 0.8, 0.5),
-            constant(Quantity::QuadraticDamping, 0.1, 0.0),
-            constant(Quantity::CoulombFriction, 0.2, 0.0),
-            constant(Quantity::Offset, -0.3, 0.0),
+            constant(CoefficientKind::CubicStiffness, 0.8, 0.5),
+            constant(CoefficientKind::QuadraticDamping, 0.1, 0.0),
+            constant(CoefficientKind::CoulombFriction, 0.2, 0.0),
+            constant(CoefficientKind::Offset, -0.3, 0.0),
         ],
-        own: vec![(2, constant(Quantity::Stiffness, 5.0, 4.2))],
+        own: vec![(2, constant(CoefficientKind::Stiffness, 5.0, 4.2))],
         scalars: vec![
             scalar(INITIAL.displacement, 1.0, Some(0.1)),
             scalar(INITIAL.velocity, -0.2, None),
@@ -662,11 +672,11 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
         mass: None,
         functions: vec![
-            nodal(Quantity::Damping, 0.25, 0.01, 0.4),
-            nodal(Quantity::Stiffness, 4.0, 0.05, 3.6),
-            constant(Quantity::CubicStiffness, 0.5, 0.2),
+            nodal(CoefficientKind::Damping, 0.25, 0.01, 0.4),
+            nodal(CoefficientKind::Stiffness, 4.0, 0.05, 3.6),
+            constant(CoefficientKind::CubicStiffness, 0.5, 0.2),
         ],
-        own: vec![(2, nodal(Quantity::Stiffness, 5.0, -0.03, 4.5))],
+        own: vec![(2, nodal(CoefficientKind::Stiffness, 5.0, -0.03, 4.5))],
         scalars: vec![
             scalar(INITIAL.displacement, 1.0, None),
             scalar(INITIAL.velocity, -0.2, None),
@@ -713,7 +723,7 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
         functions: vec![
             damping(),
             lines(
-                Quantity::Stiffness,
+                CoefficientKind::Stiffness,
                 [400.0, 460.0, 430.0, 370.0, 410.0],
                 130.0,
             ),
@@ -721,7 +731,7 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
         own: vec![(
             2,
             lines(
-                Quantity::Stiffness,
+                CoefficientKind::Stiffness,
                 [380.0, 350.0, 390.0, 420.0, 440.0],
                 130.0,
             ),
@@ -777,9 +787,9 @@ fn a_part_of_a_filtered_record_is_a_record() {
     let mut reading = Reading::at_nodes(ChannelKind::Displacement);
     reading.filter = band_pass(2, 0.1, 2.0, 1.0 / grid().step()).unwrap();
     let case = Case::linear(vec![Record::free(vec![reading])]);
-    let part = case.problem().first_part(0.3);
+    let part = case.problem().truncated(0.3);
     let misfit = part.evaluate(&case.truth()).unwrap().misfit;
-    assert!(misfit < 1e-18 * part.misfit_of_silence(), "{misfit:e}");
+    assert!(misfit < 1e-18 * part.zero_response_misfit(), "{misfit:e}");
     assert!(rms(part.experiments[0].channels[0].observed()) > 0.1);
     let found = fit(&part, &case.truth(), &settings(), &mut |_| {}).unwrap();
     assert_eq!(found.attempts.len(), 1);

@@ -4,11 +4,13 @@ mod common;
 
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{CoefficientFunction, Prior, Quantity, Scalar, Value};
+use kmcfit_core::internals::functions::{
+    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, Value,
+};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Sensor, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Stopping, fit_from};
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 use nalgebra::{Matrix2, Vector2};
 
 const NODES: usize = 101;
@@ -36,7 +38,7 @@ const PLAIN: Units = Units {
 /// both. The noise is as large, so that a step leaves half of the cost.
 fn problem(units: Units) -> Problem {
     let oscillator = common::oscillator(NODES, Method::Rk4);
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.1; NODES], vec![1.0; NODES]],
     };
@@ -49,13 +51,13 @@ fn problem(units: Units) -> Problem {
         .map(|y| units.length * y)
         .collect();
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, device.mass.clone()),
-        CoefficientFunction::fixed(Quantity::Damping, device.coefficients[0].clone()),
-        CoefficientFunction::fixed(Quantity::Stiffness, device.coefficients[1].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Damping, device.coefficients[0].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, device.coefficients[1].clone()),
     ];
     let sigma = units.length * units.sigma;
     let mut problem = common::problem_of(oscillator, list, observed, Some(sigma));
-    let scalar = |size: f64| Scalar {
+    let scalar = |size: f64| ScalarParameter {
         name: "a number".into(),
         unit: String::new(),
         start: 0.0,

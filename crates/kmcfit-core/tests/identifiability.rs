@@ -5,7 +5,9 @@ mod common;
 use common::synthetic::{run, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Penalty, Quantity};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
+};
 use kmcfit_core::internals::identifiability::{
     Band, BandSettings, Bands, Candidate, CandidateChannel, Gauge, Sensitivity, Side, Spectrum,
     Symmetry, Verdict, count, rank_experiments, verdicts,
@@ -13,11 +15,15 @@ use kmcfit_core::internals::identifiability::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::system::{
-    Device, Excitation, Grid, Method, Oscillator, State, Stepwise, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, Term,
 };
 use proptest::prelude::*;
 
-const QUANTITIES: [Quantity; 3] = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+const QUANTITIES: [CoefficientKind; 3] = [
+    CoefficientKind::Mass,
+    CoefficientKind::Damping,
+    CoefficientKind::Stiffness,
+];
 const STATES: [State; 3] = [state(3.3, 1.0), state(-0.5, 3.0), state(2.0, -2.5)];
 
 const fn state(displacement: f64, velocity: f64) -> State {
@@ -45,14 +51,14 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
 
 /// Displacement of `device` at all nodes, for each record; sigma 1e-3.
 fn with_records(
-    oscillator: &Oscillator,
+    oscillator: &System,
     list: Vec<CoefficientFunction>,
-    device: &Device,
+    device: &NodalCoefficients,
     records: &[Record],
 ) -> Problem {
     let grid = oscillator.grid;
     let nodes = grid.nodes();
-    let functions = Functions::new(list, nodes, grid.step()).unwrap();
+    let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let records = records.iter().map(|(initial, force)| {
         let excitation = force.as_ref().map(|f| Excitation::force_at_nodes(f));
         let motion = oscillator
@@ -68,7 +74,7 @@ fn with_records(
 }
 
 /// One value per node for each function, starting at the device itself.
-fn nodal(oscillator: &Oscillator, device: &Device, records: &[Record]) -> Problem {
+fn nodal(oscillator: &System, device: &NodalCoefficients, records: &[Record]) -> Problem {
     let list = QUANTITIES.into_iter().zip(device.functions());
     let list = list.map(|(q, p)| CoefficientFunction::nodal(q, p.to_vec()));
     with_records(oscillator, list.collect(), device, records)
@@ -80,20 +86,20 @@ fn spectrum(problem: &Problem) -> Spectrum {
 }
 
 /// A linear mass beside a constant damping and a constant stiffness.
-fn linear_mass(oscillator: &Oscillator, record: Record) -> Problem {
+fn linear_mass(oscillator: &System, record: Record) -> Problem {
     let grid = oscillator.grid;
     let nodes = grid.nodes();
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let degree_1 = Basis::Polynomial { degree: 1 };
-    let device = Device {
+    let device = NodalCoefficients {
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
         mass: mass.clone(),
     };
     let start = degree_1.project(&grid, &mass).unwrap();
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, degree_1, &grid, start),
-        CoefficientFunction::constant(Quantity::Damping, 0.05, nodes),
-        CoefficientFunction::constant(Quantity::Stiffness, 1.0, nodes),
+        CoefficientFunction::free(CoefficientKind::Mass, degree_1, &grid, start),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
     with_records(oscillator, list, &device, &[record])
 }
@@ -208,7 +214,7 @@ proptest! {
         rk4 in any::<bool>(),
     ) {
         let nodes = 30;
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid: Grid::new(0.0, 4.0, nodes).unwrap(),
             method: if rk4 { Method::Rk4 } else { Method::Midpoint },
             terms: vec![Term::Damping, Term::Stiffness],
@@ -218,7 +224,7 @@ proptest! {
             grid.times().iter().map(|t| base + swing * (pace * t).sin()).collect()
         };
         let [mass, damping, stiffness] = shape.map(function);
-        let device = Device { mass, coefficients: vec![damping, stiffness] };
+        let device = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
         let records: Vec<Record> = states.iter().map(|&(y, v, drive)| {
             let mut force = forced(0, &grid, 0).1.unwrap();
             force[from..from + pause].fill(0.0);
@@ -283,7 +289,7 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
                 let factors = times.iter().map(|t| 1.0 + 0.4 * (0.5 * t).sin());
                 values.iter_mut().zip(factors).for_each(|(p, s)| *p *= s);
             }
-            let motion = |d: &Device| oscillator.forward(d, STATES[0], None).unwrap();
+            let motion = |d: &NodalCoefficients| oscillator.forward(d, STATES[0], None).unwrap();
             largest(&motion(&device).displacement, &motion(&scaled).displacement)
         };
         let rate = (off(401) / off(801)).log2();
@@ -325,11 +331,11 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
 
     let mut fixed = open.clone();
     let list = vec![
-        CoefficientFunction::nodal(Quantity::Mass, device.mass.clone()),
-        CoefficientFunction::nodal(Quantity::Damping, vec![0.0; nodes]),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    fixed.functions = Functions::new(list, nodes, oscillator.grid.step()).unwrap();
+    fixed.functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
     assert!(gauge(&fixed).is_empty());
     assert_eq!(count(&fixed).symmetry, Symmetry::None);
 
@@ -408,7 +414,7 @@ impl Coverage {
 }
 
 /// Fits of 200 records with noise: the coverage of every function that is sought, and of the ratios.
-fn coverage(problem: &Problem, truth: &Device, sigma: f64) {
+fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     let clean = (problem.oscillator)
         .forward(truth, problem.experiments[0].initial, None)
         .unwrap();
@@ -463,16 +469,16 @@ fn bands_of_a_linear_mass_cover_the_truth() {
     let oscillator = common::oscillator(500, Method::Rk4);
     let grid = oscillator.grid;
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass,
         coefficients: vec![vec![0.02; 500], vec![1.0; 500]],
     };
     let degree_1 = Basis::Polynomial { degree: 1 };
     let start = degree_1.project(&grid, &truth.mass).unwrap();
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, degree_1, &grid, start),
-        CoefficientFunction::constant(Quantity::Damping, 0.02, 500),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; 500]),
+        CoefficientFunction::free(CoefficientKind::Mass, degree_1, &grid, start),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.02, 500),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
     ];
     coverage(
         &with_records(&oscillator, list, &truth, &[free(0)]),
@@ -494,15 +500,15 @@ fn bands_of_functions_on_knots_cover_the_truth() {
         vec![0.03, 0.05, 0.04, 0.02],
     ];
     let values = |b: &Basis, p: &[f64]| b.design(&grid).multiply(p, 500);
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: values(&mass, &starts[0]),
         coefficients: vec![values(&damping, &starts[1]), vec![1.0; 500]],
     };
     let [m, c] = starts;
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, mass.clone(), &grid, m),
-        CoefficientFunction::free(Quantity::Damping, damping.clone(), &grid, c),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; 500]),
+        CoefficientFunction::free(CoefficientKind::Mass, mass.clone(), &grid, m),
+        CoefficientFunction::free(CoefficientKind::Damping, damping.clone(), &grid, c),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
     ];
     let mut problem = with_records(&oscillator, list, &truth, &[free(0)]);
     // So light that the bias is a small part of the standard error: sandwich bands leave it out.
@@ -583,9 +589,9 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     let oscillator = common::oscillator(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, device.mass.clone()),
-        CoefficientFunction::constant(Quantity::Damping, 0.0, nodes),
-        CoefficientFunction::constant(Quantity::Stiffness, 1.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
     let mut problem = with_records(&oscillator, list, &device, &[free(0)]);
     let theta = problem.start();
@@ -678,7 +684,7 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
         found
     };
     let short = Excitation {
-        force: Some(Stepwise::linear(&[1.0, 1.0])),
+        force: Some(StageSamples::linear(&[1.0, 1.0])),
         base: None,
     };
     let broken = [
@@ -759,14 +765,14 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, basis, &grid, vec![1.0; 11]),
-        CoefficientFunction::constant(Quantity::Damping, 0.05, nodes),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::free(CoefficientKind::Mass, basis, &grid, vec![1.0; 11]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
     let mut problem = with_records(&oscillator, list, &device, &[free(0)]);
     let record = &mut problem.experiments[0];
@@ -805,14 +811,14 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 9),
     };
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, basis.clone(), &grid, vec![1.0; 9]),
-        CoefficientFunction::fixed(Quantity::Damping, vec![0.05; nodes]),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, vec![1.0; 9]),
+        CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
     let bare = with_records(&oscillator, list, &device, &[free(0)]);
     let mut problem = bare.clone();
@@ -867,7 +873,7 @@ fn the_scale_by_bases_and_drives() {
     let nodes = 61;
     let oscillator = common::oscillator(nodes, Method::Rk4);
     let grid = oscillator.grid;
-    let device = Device {
+    let device = NodalCoefficients {
         mass: grid.times().iter().map(|t| 1.0 - 0.02 * t).collect(),
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
@@ -937,7 +943,7 @@ fn the_scale_by_bases_and_drives() {
     let mut problem = nodal(&oscillator, &device, &[free(0)]);
     problem.experiments[0].excitation = Some(Excitation {
         force: None,
-        base: Some(Stepwise::linear(&vec![1.5; nodes])),
+        base: Some(StageSamples::linear(&vec![1.5; nodes])),
     });
     assert_eq!(count(&problem).symmetry, Symmetry::Function);
     assert_eq!(

@@ -5,14 +5,14 @@ mod common;
 
 use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::project;
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;
@@ -21,16 +21,16 @@ const UNBOUNDED: f64 = f64::INFINITY;
 fn problem(basis: &Basis) -> Problem {
     let oscillator = common::oscillator(NODES, Method::Rk4);
     let grid = oscillator.grid;
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     };
     let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, basis.clone(), &grid, start),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     common::problem_of(oscillator, list, motion.displacement, None)
 }

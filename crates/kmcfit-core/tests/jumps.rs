@@ -4,12 +4,12 @@ mod common;
 
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Design, Penalty, Quantity, Variation,
+    Basis, CoefficientFunction, CoefficientKind, Design, Penalty, Variation,
 };
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping, fit};
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 const SIGMA: f64 = 0.02;
@@ -22,7 +22,7 @@ fn problem() -> (Problem, Vec<f64>) {
     let nodes = grid.nodes();
     let level = |t: f64| if t < JUMP { 2.0 } else { 1.6 };
     let stiffness: Vec<f64> = grid.times().iter().map(|t| level(*t)).collect();
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], stiffness],
     };
@@ -34,10 +34,10 @@ fn problem() -> (Problem, Vec<f64>) {
         .collect();
     let basis = Basis::PiecewiseConstant { knots };
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, nodes),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
         CoefficientFunction::free(
-            Quantity::Stiffness,
+            CoefficientKind::Stiffness,
             basis.clone(),
             &grid,
             vec![1.8; KNOTS - 1],

@@ -2,14 +2,16 @@
 
 mod common;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
 };
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 
 /// Nodes from one reading to the next.
 const STRIDE: usize = 20;
@@ -21,12 +23,12 @@ const STIFFNESS: f64 = 101.0;
 /// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
 fn problem() -> Problem {
     let nodes = STRIDE * (READINGS - 1) + 1;
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let truth = Device {
+    let truth = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
@@ -36,13 +38,13 @@ fn problem() -> Problem {
     // Known to be free of noise: so few readings look like noise to a rule that does not know.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
-        CoefficientFunction::fixed(Quantity::Damping, vec![0.05; nodes]),
-        CoefficientFunction::constant(Quantity::Stiffness, 130.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 130.0, nodes),
     ];
     let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
-    let functions = Functions::new(list, nodes, step).unwrap();
+    let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }
 
@@ -68,7 +70,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
         .collect();
     println!("{:#?}", found.attempts);
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
-    let silence = problem.misfit_of_silence();
+    let silence = problem.zero_response_misfit();
     let costs: Vec<f64> = found.attempts.iter().map(|rung| rung.cost).collect();
     // The first two end in minima that leave per cents of the record, the last at the answer.
     assert!(
@@ -109,13 +111,13 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
 /// that is looked at, seen every fourth step.
 fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let nodes = 40_001;
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid: Grid::new(0.0, 40.0, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
-    let device = Device {
+    let device = NodalCoefficients {
         mass: vec![truth[0]; nodes],
         coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
     };
@@ -141,15 +143,15 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         .with_excitation(excitation)
         .with_channel(channel);
     let quantities = [
-        Quantity::Mass,
-        Quantity::Damping,
-        Quantity::Stiffness,
-        Quantity::CubicStiffness,
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+        CoefficientKind::CubicStiffness,
     ];
     let list = quantities.into_iter().zip([1.2, 1.0, 18.0, 12.0]);
     let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
     let step = oscillator.grid.step();
-    let functions = Functions::new(list.collect(), nodes, step).unwrap();
+    let functions = Parameterization::new(list.collect(), nodes, step).unwrap();
     (Problem::new(oscillator, functions, vec![experiment]), truth)
 }
 
@@ -205,7 +207,7 @@ fn a_silent_beginning_says_nothing() {
 #[test]
 fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
     let nodes = 401;
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -217,14 +219,14 @@ fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
     };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; nodes]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, nodes),
-        CoefficientFunction::constant(Quantity::Stiffness, 2.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 2.0, nodes),
     ];
-    let functions = Functions::new(list, nodes, oscillator.grid.step()).unwrap();
+    let functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
     let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
     let problem = Problem::new(oscillator, functions, vec![experiment]);
-    assert!(problem.supports_continuous() && !problem.first_part(0.5).supports_continuous());
+    assert!(problem.supports_continuous() && !problem.truncated(0.5).supports_continuous());
     let settings = FitSettings {
         solver: Solver::GaussNewton,
         initial: Initial::Functions,

@@ -5,7 +5,9 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::simulate::Trajectory;
 use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -56,9 +58,9 @@ impl Case {
         mean * share * omega * (omega * t).cos()
     }
 
-    fn device(&self, grid: &Grid) -> Device {
+    fn device(&self, grid: &Grid) -> NodalCoefficients {
         let values = |f: usize| grid.times().iter().map(|t| self.value(f, *t)).collect();
-        Device {
+        NodalCoefficients {
             mass: values(0),
             coefficients: vec![values(1), values(2)],
         }
@@ -81,8 +83,8 @@ impl Case {
     }
 }
 
-fn oscillator(nodes: usize, method: Method) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize, method: Method) -> System {
+    System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -152,7 +154,7 @@ fn time_can_be_turned_round_to_the_order_of_the_stepper() {
                 let oscillator = oscillator(nodes, method);
                 // Constant functions: sampled ones are lines between nodes, of order 2 whatever the stepper.
                 let constant = |f: usize| vec![case.functions[f][0]; nodes];
-                let device = |sign: f64| Device {
+                let device = |sign: f64| NodalCoefficients {
                     mass: constant(0),
                     coefficients: vec![constant(1).iter().map(|c| sign * c).collect(), constant(2)],
                 };

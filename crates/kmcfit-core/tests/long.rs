@@ -5,11 +5,13 @@ mod common;
 
 use common::synthetic::{Truth, cramer_rao, rms, settings, with_noise};
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter,
+};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
-use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
 use std::f64::consts::{PI, TAU};
 
 /// From 1 Hz to 2 Hz in 200 s: 300 periods.
@@ -23,8 +25,8 @@ const INITIAL: State = State {
     velocity: 2.0,
 };
 
-fn oscillator() -> Oscillator {
-    Oscillator {
+fn oscillator() -> System {
+    System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -44,13 +46,13 @@ fn line(grid: &Grid) -> Basis {
 }
 
 /// The function of `basis` nearest to a frequency that goes from 1 to 2 Hz in an S.
-fn truth(grid: &Grid, basis: &Basis) -> Device {
+fn truth(grid: &Grid, basis: &Basis) -> NodalCoefficients {
     let frequency = |t: &f64| 1.5 - 0.5 * (PI * t / DURATION).cos();
     let stiffness: Vec<f64> = (grid.times().iter())
         .map(|t| (TAU * frequency(t)).powi(2))
         .collect();
     let theta = basis.project(grid, &stiffness).unwrap();
-    Device {
+    NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![
             vec![DAMPING; NODES],
@@ -91,7 +93,12 @@ impl Reading {
 }
 
 /// Mass known, damping constant, stiffness in `basis`; the start is a constant.
-fn problem(basis: &Basis, reading: Reading, factor: f64, seed: u64) -> (Problem, Device) {
+fn problem(
+    basis: &Basis,
+    reading: Reading,
+    factor: f64,
+    seed: u64,
+) -> (Problem, NodalCoefficients) {
     let Reading { kind, noise, .. } = reading;
     let oscillator = oscillator();
     let grid = oscillator.grid;
@@ -110,18 +117,18 @@ fn problem(basis: &Basis, reading: Reading, factor: f64, seed: u64) -> (Problem,
     let mut experiment = Experiment::free("free", INITIAL, NODES).with_channel(channel.unwrap());
     let middle = truth.coefficients[1][NODES / 2];
     let list = vec![
-        CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::free(
-            Quantity::Stiffness,
+            CoefficientKind::Stiffness,
             basis.clone(),
             &grid,
             basis.constant(&grid, factor * middle),
         ),
     ];
-    let mut functions = Functions::new(list, NODES, grid.step()).unwrap();
+    let mut functions = Parameterization::new(list, NODES, grid.step()).unwrap();
     if kind == ChannelKind::Acceleration {
-        let scalar = |name: &str, size: f64| Scalar {
+        let scalar = |name: &str, size: f64| ScalarParameter {
             name: name.into(),
             unit: String::new(),
             start: 0.0,
@@ -140,7 +147,7 @@ fn problem(basis: &Basis, reading: Reading, factor: f64, seed: u64) -> (Problem,
 
 /// Largest error of the stiffness relative to the truth there, and relative to its standard deviation
 /// by Cramer and Rao.
-fn errors(problem: &Problem, found: &Fit, truth: &Device) -> [f64; 2] {
+fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
     let covariance = cramer_rao(problem, &found.best.parameters);
     let functions = &problem.functions;
     let (range, design) = (functions.ranges()[2].clone(), &functions.get(2).design);
@@ -178,7 +185,7 @@ fn check(basis: &Basis, reading: Reading, limit: f64) -> Vec<&'static str> {
             basis.name()
         );
         // The start values alone lead to a wrong period: they explain next to nothing.
-        assert!(found.attempts[0].cost > 0.5 * problem.misfit_of_silence());
+        assert!(found.attempts[0].cost > 0.5 * problem.zero_response_misfit());
         assert!(relative < limit, "{relative} {:#?}", found.attempts);
         // The largest of some ten independent values: beyond 4 by chance once in a thousand times.
         assert!(standard < 4.0, "{standard} {:#?}", found.attempts);

@@ -3,11 +3,13 @@
 mod common;
 
 use common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
-use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::simulate::Trajectory;
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 
 const NOISE: f64 = 0.01;
 const REST: State = State {
@@ -16,19 +18,19 @@ const REST: State = State {
 };
 
 /// A constant: what it is, its truth and its start.
-type Constant = (Quantity, f64, f64);
+type Constant = (CoefficientKind, f64, f64);
 
 struct Case {
-    oscillator: Oscillator,
+    oscillator: System,
     excitation: Excitation,
     constants: Vec<Constant>,
 }
 
 impl Case {
-    fn device(&self) -> Device {
+    fn device(&self) -> NodalCoefficients {
         let nodes = self.oscillator.grid.nodes();
         let values = |c: &Constant| vec![c.1; nodes];
-        Device {
+        NodalCoefficients {
             mass: values(&self.constants[0]),
             coefficients: self.constants[1..].iter().map(values).collect(),
         }
@@ -56,7 +58,7 @@ impl Case {
         let channel = Channel::new(kind, grid.times(), values, weighting, &grid, nodes).unwrap();
         let list = self.constants.iter();
         let list = list.map(|(q, _, start)| CoefficientFunction::constant(*q, *start, nodes));
-        let functions = Functions::new(list.collect(), nodes, grid.step()).unwrap();
+        let functions = Parameterization::new(list.collect(), nodes, grid.step()).unwrap();
         let experiment = Experiment::free("driven", REST, nodes)
             .with_excitation(self.excitation.clone())
             .with_channel(channel);
@@ -93,8 +95,8 @@ impl Case {
     }
 }
 
-fn oscillator(nodes: usize, duration: f64, terms: &[Term]) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize, duration: f64, terms: &[Term]) -> System {
+    System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
         terms: terms.to_vec(),
@@ -111,10 +113,10 @@ fn duffing(factors: [f64; 4]) -> Case {
     // 30 to 60 steps in a period of the device, which is 2 to 4 s.
     let oscillator = oscillator(1501, 100.0, &terms);
     let truth = [
-        (Quantity::Mass, 1.0),
-        (Quantity::Damping, 0.2),
-        (Quantity::Stiffness, 2.5),
-        (Quantity::CubicStiffness, 1.2),
+        (CoefficientKind::Mass, 1.0),
+        (CoefficientKind::Damping, 0.2),
+        (CoefficientKind::Stiffness, 2.5),
+        (CoefficientKind::CubicStiffness, 1.2),
     ];
     let constants = truth.into_iter().zip(factors);
     Case {
@@ -154,9 +156,9 @@ fn stick_slip() -> Case {
     Case {
         excitation: push(&oscillator.grid, |t| 1.5 * (w * t).cos()),
         constants: vec![
-            (Quantity::Mass, 1.0, 2.0),
-            (Quantity::Stiffness, 2.0, 1.0),
-            (Quantity::CoulombFriction, FRICTION, 0.25),
+            (CoefficientKind::Mass, 1.0, 2.0),
+            (CoefficientKind::Stiffness, 2.0, 1.0),
+            (CoefficientKind::CoulombFriction, FRICTION, 0.25),
         ],
         oscillator,
     }

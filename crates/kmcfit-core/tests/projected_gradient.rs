@@ -3,11 +3,13 @@
 mod common;
 
 use common::synthetic::{settings, with_noise};
-use kmcfit_core::internals::functions::{CoefficientFunction, Quantity, Scalar, Value};
+use kmcfit_core::internals::functions::{
+    CoefficientFunction, CoefficientKind, ScalarParameter, Value,
+};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Sensor;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Stopping, fit_from};
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 /// The share of the slope by which the method has J fall at least.
@@ -17,17 +19,21 @@ const DECREASE: f64 = 1e-4;
 fn problem(sigma: f64) -> Problem {
     let oscillator = common::oscillator(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
-    let device = Device {
+    let device = NodalCoefficients {
         mass: values[0].clone(),
         coefficients: values[1..].to_vec(),
     };
     let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
     let observed = with_noise(&motion.displacement, 1.0, 7);
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities.into_iter().zip(values);
     let list = list.map(|(q, values)| CoefficientFunction::fixed(q, values));
     let mut problem = common::problem_of(oscillator, list.collect(), observed, Some(sigma));
-    let offset = Scalar {
+    let offset = ScalarParameter {
         name: "offset".into(),
         unit: "m".into(),
         start: 0.0,

@@ -5,13 +5,13 @@ mod common;
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Penalty};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
-use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator};
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -34,18 +34,18 @@ fn bases(grid: &Grid) -> [Basis; 6] {
 
 /// The answer: the mass of `basis` nearest to `m = 1 - 0.02 t`, c = 0.05, k = 1; the stiffness is
 /// known. Its smoothness costs nothing in any basis.
-fn truth(oscillator: &Oscillator, basis: &Basis) -> Device {
+fn truth(oscillator: &System, basis: &Basis) -> NodalCoefficients {
     let grid = oscillator.grid;
     let line: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let theta = basis.project(&grid, &line).unwrap();
-    Device {
+    NodalCoefficients {
         mass: basis.design(&grid).multiply(&theta, NODES),
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     }
 }
 
 /// The mass in `basis`, a constant damping, a known stiffness, started at `(m, c)`.
-fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Device) {
+fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, NodalCoefficients) {
     let oscillator = common::oscillator(NODES, Method::Rk4);
     let truth = truth(&oscillator, basis);
     let observed = oscillator
@@ -55,13 +55,13 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Dev
     let grid = oscillator.grid;
     let list = vec![
         CoefficientFunction::free(
-            Quantity::Mass,
+            CoefficientKind::Mass,
             basis.clone(),
             &grid,
             basis.constant(&grid, start.0),
         ),
-        CoefficientFunction::constant(Quantity::Damping, start.1, NODES),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::Damping, start.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(oscillator, list, observed, None);
     // Weak enough not to move the answer, which it does not charge; it makes it the only one.

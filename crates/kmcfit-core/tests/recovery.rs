@@ -4,12 +4,12 @@ mod common;
 
 use common::closed_form::Bessel;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity, Ratios};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Ratios};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::reference;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::system::{Device, Method, Oscillator};
+use kmcfit_core::internals::system::{Method, NodalCoefficients, System};
 
 fn settings(initial: Initial) -> FitSettings {
     FitSettings {
@@ -37,23 +37,23 @@ fn run(problem: &Problem, initial: Initial) -> Fit {
 }
 
 /// Degree 1 for the mass, constant damping, stiffness fixed at 1; start (2, 1).
-fn linear_mass(oscillator: Oscillator, observed: Vec<f64>, sigma: Option<f64>) -> Problem {
+fn linear_mass(oscillator: System, observed: Vec<f64>, sigma: Option<f64>) -> Problem {
     let grid = oscillator.grid;
     let degree_1 = Basis::Polynomial { degree: 1 };
     let list = vec![
         CoefficientFunction::free(
-            Quantity::Mass,
+            CoefficientKind::Mass,
             degree_1.clone(),
             &grid,
             degree_1.constant(&grid, 2.0),
         ),
-        CoefficientFunction::constant(Quantity::Damping, 1.0, grid.nodes()),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; grid.nodes()]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 1.0, grid.nodes()),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; grid.nodes()]),
     ];
     common::problem_of(oscillator, list, observed, sigma)
 }
 
-fn paper_data(nodes: usize) -> (Oscillator, Device, Vec<f64>) {
+fn paper_data(nodes: usize) -> (System, NodalCoefficients, Vec<f64>) {
     let oscillator = common::oscillator(nodes, Method::Midpoint);
     let truth = common::paper_device(nodes);
     let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
@@ -78,7 +78,11 @@ fn knots_recover_all_three_functions_to_1e_6() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities
         .into_iter()
         .zip([2.0, 1.0, 1.0])
@@ -93,9 +97,13 @@ fn knots_recover_all_three_functions_to_1e_6() {
     }
 }
 
-fn smooth_nodal(nodes: usize) -> (Problem, Device) {
+fn smooth_nodal(nodes: usize) -> (Problem, NodalCoefficients) {
     let (oscillator, truth, observed) = paper_data(nodes);
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities
         .into_iter()
         .zip([2.0, 1.0, 1.0])
@@ -175,7 +183,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
         .map(|j| {
             let mut unit = vec![0.0; theta.len()];
             unit[j] = 1.0;
-            let direction = kmcfit_core::internals::system::DeviceTangent {
+            let direction = kmcfit_core::internals::system::SystemTangent {
                 device: problem.functions.direction(&unit, 0),
                 initial: kmcfit_core::internals::system::State {
                     displacement: 0.0,
@@ -233,7 +241,11 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
 fn positivity_alone_does_not_find_the_device() {
     let (oscillator, truth, observed) = paper_data(2000);
     let nodes = oscillator.grid.nodes();
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities
         .into_iter()
         .zip([2.0, 1.0, 1.0])

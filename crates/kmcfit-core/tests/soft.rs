@@ -4,7 +4,7 @@ mod common;
 
 use kmcfit_core::internals::constraints::{RowGroup, TOLERANCE};
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
@@ -21,9 +21,9 @@ fn problem() -> Problem {
         knots: uniform_knots(&grid, 6),
     };
     let list = vec![
-        CoefficientFunction::free(Quantity::Mass, basis, &grid, vec![0.9; 6]),
-        CoefficientFunction::constant(Quantity::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(Quantity::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::free(CoefficientKind::Mass, basis, &grid, vec![0.9; 6]),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     common::problem_of(oscillator, list, observed, None)
 }

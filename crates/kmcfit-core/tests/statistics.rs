@@ -6,12 +6,14 @@ mod common;
 use common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Functions, Quantity, Scalar, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, Value,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::solvers::fit_with_noise;
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -31,7 +33,7 @@ type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
 
 /// A device of constants that is read through one channel at all nodes.
 struct Setup {
-    terms: Vec<(Term, Quantity)>,
+    terms: Vec<(Term, CoefficientKind)>,
     /// Mass first; `None` for what is known.
     start: Vec<Option<f64>>,
     truth: Vec<f64>,
@@ -48,8 +50,8 @@ impl Setup {
     fn free(kind: ChannelKind) -> Self {
         Self {
             terms: vec![
-                (Term::Damping, Quantity::Damping),
-                (Term::Stiffness, Quantity::Stiffness),
+                (Term::Damping, CoefficientKind::Damping),
+                (Term::Stiffness, CoefficientKind::Stiffness),
             ],
             truth: vec![1.0, 0.2, 4.0],
             start: vec![None, Some(0.25), Some(3.8)],
@@ -73,8 +75,8 @@ impl Setup {
         }
     }
 
-    fn oscillator(&self) -> Oscillator {
-        Oscillator {
+    fn oscillator(&self) -> System {
+        System {
             grid: Grid::new(0.0, DURATION, NODES).unwrap(),
             method: Method::Rk4,
             terms: self.terms.iter().map(|t| t.0).collect(),
@@ -95,7 +97,7 @@ impl Setup {
     fn clean(&self) -> Vec<f64> {
         let oscillator = self.oscillator();
         let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
-        let device = Device {
+        let device = NodalCoefficients {
             mass: each[0].clone(),
             coefficients: each[1..].to_vec(),
         };
@@ -113,7 +115,8 @@ impl Setup {
     fn problem(&self, values: Vec<f64>, sigma: f64) -> Problem {
         let oscillator = self.oscillator();
         let grid = oscillator.grid;
-        let quantities = std::iter::once(Quantity::Mass).chain(self.terms.iter().map(|t| t.1));
+        let quantities =
+            std::iter::once(CoefficientKind::Mass).chain(self.terms.iter().map(|t| t.1));
         let list = quantities.zip(self.start.iter().zip(&self.truth));
         let list = list
             .map(|(quantity, (start, truth))| match start {
@@ -121,7 +124,7 @@ impl Setup {
                 None => CoefficientFunction::fixed(quantity, vec![*truth; NODES]),
             })
             .collect();
-        let scalar = |start: f64| Scalar {
+        let scalar = |start: f64| ScalarParameter {
             name: "a number".into(),
             unit: String::new(),
             start,
@@ -147,7 +150,7 @@ impl Setup {
             scalars.extend([scalar(1.0), scalar(0.0)]);
         }
         channel = channel.with_loss(self.loss);
-        let functions = Functions::new(list, NODES, grid.step())
+        let functions = Parameterization::new(list, NODES, grid.step())
             .unwrap()
             .with_scalars(scalars);
         Problem::new(
@@ -215,7 +218,7 @@ fn a_cubic_stiffness() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup
         .terms
-        .push((Term::CubicStiffness, Quantity::CubicStiffness));
+        .push((Term::CubicStiffness, CoefficientKind::CubicStiffness));
     setup.truth.push(1.5);
     setup.start.push(Some(1.0));
     setup.check("c, k, cubic k");
@@ -326,11 +329,11 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             knots: uniform_knots(&grid, knots),
         };
         let list = vec![
-            CoefficientFunction::fixed(Quantity::Mass, vec![1.0; NODES]),
-            CoefficientFunction::fixed(Quantity::Damping, vec![0.2; NODES]),
-            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, vec![4.0; knots]),
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
+            CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.2; NODES]),
+            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, vec![4.0; knots]),
         ];
-        problem.functions = Functions::new(list, NODES, grid.step()).unwrap();
+        problem.functions = Parameterization::new(list, NODES, grid.step()).unwrap();
         let times = grid.times()[..readings].to_vec();
         let values = setup.clean()[..readings].to_vec();
         let weighting = Weighting::Sigma(0.1);
@@ -369,7 +372,7 @@ fn what_the_readings_do_not_see_has_no_covariance() {
 /// Readings of a known motion by a sensor whose offset is sought, with an unknown sigma.
 fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
     let mut problem = setup.problem(values, 1.0);
-    let offset = Scalar {
+    let offset = ScalarParameter {
         name: "offset".into(),
         unit: "m".into(),
         start: 0.0,

@@ -2,21 +2,27 @@
 
 mod common;
 
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity, Ratios};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Penalty, Ratios,
+};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Stopping, WeightPath, WeightRule, choose_weight,
 };
-use kmcfit_core::internals::system::{Device, Method};
+use kmcfit_core::internals::system::{Method, NodalCoefficients};
 use std::ops::RangeInclusive;
 
 const SIGMA: f64 = 0.1;
 
-fn nodal_problem(truth: &Device, nodes: usize, bounded: bool, seed: u64) -> Problem {
+fn nodal_problem(truth: &NodalCoefficients, nodes: usize, bounded: bool, seed: u64) -> Problem {
     let oscillator = common::oscillator(nodes, Method::Midpoint);
     let observed = common::noisy(&oscillator, truth, SIGMA, seed);
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities
         .into_iter()
         .zip([2.0, 1.0, 1.0])
@@ -40,7 +46,7 @@ fn settings() -> FitSettings {
     }
 }
 
-fn relative_errors(problem: &Problem, theta: &[f64], truth: &Device) -> [f64; 2] {
+fn relative_errors(problem: &Problem, theta: &[f64], truth: &NodalCoefficients) -> [f64; 2] {
     let device = problem.functions.device(theta);
     let relative = |a: &[f64], b: &[f64]| {
         a.iter()
@@ -90,12 +96,12 @@ fn the_weight_by_discrepancy_finds_the_device_without_bounds_for_twenty_seeds() 
 }
 
 /// m = 1 - 0.25 (1 - cos(pi t/T)) has curvature, so the penalty does not favour it.
-fn curved_device(nodes: usize) -> Device {
+fn curved_device(nodes: usize) -> NodalCoefficients {
     let mass = (0..nodes).map(|i| {
         let phase = std::f64::consts::PI * i as f64 / (nodes - 1) as f64;
         1.0 - 0.25 * (1.0 - phase.cos())
     });
-    Device {
+    NodalCoefficients {
         mass: mass.collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     }

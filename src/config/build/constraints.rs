@@ -12,7 +12,7 @@ use crate::config::ModelFile;
 use crate::config::spec::ConstraintSpec;
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Constraints, Impossible, Statement};
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 
 /// The name of a group of rows, and the key of the model that it comes from.
@@ -116,21 +116,21 @@ fn add(
 fn leaves_a_mass(file: &ModelFile, key: &str, statement: &Statement) -> Result<(), InputError> {
     let held = match statement {
         Statement::Bounds {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             max: Some(max),
             ..
         } => max.least(),
         Statement::Value {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             value,
             ..
         }
         | Statement::Mean {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             value,
         }
         | Statement::Integral {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             value,
         } => *value,
         _ => return Ok(()),

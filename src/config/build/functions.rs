@@ -10,15 +10,15 @@ use crate::config::NumberOrColumn;
 use crate::config::scalar::Start;
 use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, OwnFunctionsSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::functions::{self, CoefficientFunction, Quantity};
-use kmcfit_core::internals::system::{Device, Grid, Term};
+use kmcfit_core::internals::functions::{self, CoefficientFunction, CoefficientKind};
+use kmcfit_core::internals::system::{Grid, NodalCoefficients, Term};
 
 /// A function as the model gives it, and where.
 pub(super) struct Slot<'a> {
     /// Its key, such as `functions.mass` or `experiments[1].functions.damping`.
     pub key: String,
     /// Which function it is.
-    pub quantity: Quantity,
+    pub quantity: CoefficientKind,
     /// What the model says about it.
     pub spec: &'a FunctionSpec,
     /// The experiment that has it for itself.
@@ -29,7 +29,7 @@ pub(super) struct Slot<'a> {
 /// those of single experiments.
 pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
     let mut slots: Vec<Slot> = Vec::new();
-    let main = Quantity::ALL.into_iter().filter_map(|quantity| {
+    let main = CoefficientKind::ALL.into_iter().filter_map(|quantity| {
         Some(Slot {
             key: format!("functions.{}", quantity.name()),
             quantity,
@@ -42,7 +42,7 @@ pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
         let Some(own) = &experiment.functions else {
             continue;
         };
-        slots.extend(Quantity::ALL.into_iter().filter_map(|quantity| {
+        slots.extend(CoefficientKind::ALL.into_iter().filter_map(|quantity| {
             Some(Slot {
                 key: format!("experiments[{i}].functions.{}", quantity.name()),
                 quantity,
@@ -55,7 +55,7 @@ pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
 }
 
 /// The quantities of the device, mass first.
-pub(super) fn quantities(file: &ModelFile) -> Vec<Quantity> {
+pub(super) fn quantities(file: &ModelFile) -> Vec<CoefficientKind> {
     let shared = |slot: &Slot| slot.owner.is_none().then_some(slot.quantity);
     slots(file).iter().filter_map(shared).collect()
 }
@@ -74,12 +74,12 @@ pub(super) fn terms(file: &ModelFile) -> Result<Vec<Term>, InputError> {
 fn width(file: &ModelFile, slot: &Slot) -> Result<f64, InputError> {
     let key = format!("{}.width", slot.key);
     match (slot.quantity, slot.spec.width) {
-        (Quantity::CoulombFriction, Some(width)) if width.0 > 0.0 => Ok(width.0),
-        (Quantity::CoulombFriction, Some(width)) => Err(file
+        (CoefficientKind::CoulombFriction, Some(width)) if width.0 > 0.0 => Ok(width.0),
+        (CoefficientKind::CoulombFriction, Some(width)) => Err(file
             .error_at(&key, "the width must be positive")
             .found(width.0)
             .expected("a speed in m/s, greater than 0, well below those of the motion")),
-        (Quantity::CoulombFriction, None) => Err(file
+        (CoefficientKind::CoulombFriction, None) => Err(file
             .error_at(&slot.key, "Coulomb friction needs a width")
             .expected(
                 "`width`: the speed in m/s over which the sign of v is smoothed, well below those \
@@ -130,7 +130,7 @@ pub(super) fn assemblies(file: &ModelFile) -> Result<Assemblies, InputError> {
                          `fixed: 0` where they have none"
                     )));
             };
-            if slot.quantity == Quantity::CoulombFriction {
+            if slot.quantity == CoefficientKind::CoulombFriction {
                 return Err(file
                     .error_at(&slot.key, "Coulomb friction is shared by all experiments")
                     .expected("it under `functions` alone"));
@@ -205,28 +205,28 @@ pub(super) fn build(
     Ok(list)
 }
 
-fn main_spec(file: &ModelFile, quantity: Quantity) -> Option<&FunctionSpec> {
+fn main_spec(file: &ModelFile, quantity: CoefficientKind) -> Option<&FunctionSpec> {
     let functions = &file.spec.functions;
     match quantity {
-        Quantity::Mass => Some(&functions.mass),
-        Quantity::Damping => Some(&functions.damping),
-        Quantity::Stiffness => Some(&functions.stiffness),
-        Quantity::CubicStiffness => functions.cubic_stiffness.as_ref(),
-        Quantity::QuadraticDamping => functions.quadratic_damping.as_ref(),
-        Quantity::CoulombFriction => functions.coulomb_friction.as_ref(),
-        Quantity::Offset => functions.offset.as_ref(),
+        CoefficientKind::Mass => Some(&functions.mass),
+        CoefficientKind::Damping => Some(&functions.damping),
+        CoefficientKind::Stiffness => Some(&functions.stiffness),
+        CoefficientKind::CubicStiffness => functions.cubic_stiffness.as_ref(),
+        CoefficientKind::QuadraticDamping => functions.quadratic_damping.as_ref(),
+        CoefficientKind::CoulombFriction => functions.coulomb_friction.as_ref(),
+        CoefficientKind::Offset => functions.offset.as_ref(),
     }
 }
 
-fn own_spec(own: &OwnFunctionsSpec, quantity: Quantity) -> Option<&FunctionSpec> {
+fn own_spec(own: &OwnFunctionsSpec, quantity: CoefficientKind) -> Option<&FunctionSpec> {
     match quantity {
-        Quantity::Mass => own.mass.as_ref(),
-        Quantity::Damping => own.damping.as_ref(),
-        Quantity::Stiffness => own.stiffness.as_ref(),
-        Quantity::CubicStiffness => own.cubic_stiffness.as_ref(),
-        Quantity::QuadraticDamping => own.quadratic_damping.as_ref(),
-        Quantity::CoulombFriction => own.coulomb_friction.as_ref(),
-        Quantity::Offset => own.offset.as_ref(),
+        CoefficientKind::Mass => own.mass.as_ref(),
+        CoefficientKind::Damping => own.damping.as_ref(),
+        CoefficientKind::Stiffness => own.stiffness.as_ref(),
+        CoefficientKind::CubicStiffness => own.cubic_stiffness.as_ref(),
+        CoefficientKind::QuadraticDamping => own.quadratic_damping.as_ref(),
+        CoefficientKind::CoulombFriction => own.coulomb_friction.as_ref(),
+        CoefficientKind::Offset => own.offset.as_ref(),
     }
 }
 
@@ -304,13 +304,13 @@ fn column(
 /// The equation of motion needs a positive mass everywhere.
 fn positive_mass(
     file: &ModelFile,
-    quantity: Quantity,
+    quantity: CoefficientKind,
     key: &str,
     values: &[f64],
 ) -> Result<(), InputError> {
     let broken = values.iter().position(|m| *m <= 0.0);
     match broken {
-        Some(i) if quantity == Quantity::Mass => Err(file
+        Some(i) if quantity == CoefficientKind::Mass => Err(file
             .error_at(key, "the mass must be positive at all times")
             .found(match values.iter().all(|m| m == &values[i]) {
                 true => values[i].to_string(),
@@ -327,19 +327,22 @@ fn basis_names() -> String {
 }
 
 /// The true device on the grid, where the model names it.
-pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, InputError> {
+pub(super) fn truth(
+    file: &ModelFile,
+    grid: &Grid,
+) -> Result<Option<NodalCoefficients>, InputError> {
     let Some(spec) = &file.spec.truth else {
         return Ok(None);
     };
-    let column = |quantity: Quantity| {
+    let column = |quantity: CoefficientKind| {
         let named = spec.columns.as_ref().and_then(|c| match quantity {
-            Quantity::Mass => c.mass.as_ref(),
-            Quantity::Damping => c.damping.as_ref(),
-            Quantity::Stiffness => c.stiffness.as_ref(),
-            Quantity::CubicStiffness => c.cubic_stiffness.as_ref(),
-            Quantity::QuadraticDamping => c.quadratic_damping.as_ref(),
-            Quantity::CoulombFriction => c.coulomb_friction.as_ref(),
-            Quantity::Offset => c.offset.as_ref(),
+            CoefficientKind::Mass => c.mass.as_ref(),
+            CoefficientKind::Damping => c.damping.as_ref(),
+            CoefficientKind::Stiffness => c.stiffness.as_ref(),
+            CoefficientKind::CubicStiffness => c.cubic_stiffness.as_ref(),
+            CoefficientKind::QuadraticDamping => c.quadratic_damping.as_ref(),
+            CoefficientKind::CoulombFriction => c.coulomb_friction.as_ref(),
+            CoefficientKind::Offset => c.offset.as_ref(),
         });
         let name = named.map_or(quantity.column(), |name| name.0.as_str());
         let wanted = Wanted {
@@ -352,7 +355,7 @@ pub(super) fn truth(file: &ModelFile, grid: &Grid) -> Result<Option<Device>, Inp
     };
     let mut list = quantities(file).into_iter();
     let mass = list.next().map(&column).transpose()?.unwrap_or_default();
-    Ok(Some(Device {
+    Ok(Some(NodalCoefficients {
         mass,
         coefficients: list.map(&column).collect::<Result<_, _>>()?,
     }))

@@ -18,10 +18,10 @@ use super::spec::InitialSpec;
 use super::{ModelFile, Source};
 use crate::error::{InputError, Place};
 use crate::memory;
-use kmcfit_core::internals::functions::Functions;
+use kmcfit_core::internals::functions::Parameterization;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{self, FitSettings, timed};
-use kmcfit_core::internals::system::{Device, Oscillator, State};
+use kmcfit_core::internals::system::{NodalCoefficients, State, System};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -41,7 +41,7 @@ pub struct Model {
     /// The rule that chooses the weight of some penalties, whose weight in `problem` is 1.
     pub weight_rule: Option<WeightSearch>,
     /// The true device on the grid, where it is known.
-    pub truth: Option<Device>,
+    pub truth: Option<NodalCoefficients>,
     /// What reports say about the channels of each experiment.
     pub notes: Vec<Vec<ChannelNote>>,
     /// Experiments that are only predicted and scored.
@@ -134,14 +134,14 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let grid = grid::build(file, purpose, &records, &mut remarks)?;
     let list = functions::build(file, &grid, &mut warnings)?;
     let functions =
-        Functions::with_devices(list, assemblies.devices.clone(), grid.nodes(), grid.step());
+        Parameterization::with_devices(list, assemblies.devices.clone(), grid.nodes(), grid.step());
     let functions = functions.ok_or_else(|| {
         file.error_at(
             "functions",
             "a basis has functions that the grid cannot tell apart",
         )
     })?;
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: grid::method(file),
         terms: functions::terms(file)?,

@@ -10,10 +10,10 @@ use crate::config::spec::{
 use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::did_you_mean;
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
-    Channel, ChannelKind, Drive, Experiment, Waveform, Weighting,
+    Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
 };
 use kmcfit_core::internals::system::State;
 use std::time::Duration;
@@ -244,7 +244,7 @@ fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f6
 
 fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<(), InputError> {
     let grid = &problem.oscillator.grid;
-    match kmcfit_core::internals::system::Place::of(grid, time) {
+    match kmcfit_core::internals::system::TimePoint::of(grid, time) {
         Some(_) => Ok(()),
         None => Err(file
             .error_at(key, "this time is outside the record")
@@ -317,7 +317,9 @@ fn function(
     key: &str,
     name: FunctionName,
 ) -> Result<usize, InputError> {
-    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name.name());
+    let quantity = CoefficientKind::ALL
+        .into_iter()
+        .find(|q| q.name() == name.name());
     let main = problem.functions.assembly(0);
     let of = |f: &&usize| Some(problem.functions.get(**f).quantity) == quantity;
     let key = format!("{key}.function");
@@ -349,7 +351,7 @@ fn candidate(
     let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
     if let Some(force) = &spec.force {
         let force = Some(Waveform::Shape(experiments::shape(file, key, force)?));
-        experiment.drive = Drive { force, base: None };
+        experiment.drive = Input { force, base: None };
         experiment.excitation = Some(experiment.drive.on(grid, nodes));
     }
     let kind = match spec.channel {

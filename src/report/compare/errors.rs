@@ -2,7 +2,7 @@
 
 use super::RECOVERED;
 use kmcfit_core::internals::functions::Ratios;
-use kmcfit_core::internals::system::Device;
+use kmcfit_core::internals::system::NodalCoefficients;
 use serde::Serialize;
 
 /// Largest distances from the truth over the nodes.
@@ -31,7 +31,7 @@ pub struct Errors {
 
 impl Errors {
     /// The distances of `device` from `truth`, on the same grid.
-    pub fn of(device: &Device, truth: &Device) -> Self {
+    pub fn of(device: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
         let (found, real) = (Ratios::of(device), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
         let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);

@@ -7,7 +7,7 @@ use super::table::short;
 use crate::report::figure::{Axis, Figure, Panel};
 use crate::report::mark::{Colour, Dash, Mark, Style};
 use kmcfit_core::internals::functions::Ratios;
-use kmcfit_core::internals::system::Device;
+use kmcfit_core::internals::system::NodalCoefficients;
 
 /// The colours of runs; black and grey are left to the truth.
 const COLOURS: [Colour; 6] = [
@@ -51,7 +51,11 @@ fn time() -> Axis {
 }
 
 /// A curve of each device: its caption, its unit, its values.
-type Curve = (&'static str, &'static str, fn(&Device) -> Vec<f64>);
+type Curve = (
+    &'static str,
+    &'static str,
+    fn(&NodalCoefficients) -> Vec<f64>,
+);
 
 fn functions(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
     let curves: [Curve; 3] = [
@@ -191,8 +195,8 @@ fn reaches(
 }
 
 /// The true devices, each once, with its label and the run whose grid it is on.
-fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &Device)> {
-    let mut found: Vec<(&ComparedRun, &Device)> = Vec::new();
+fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
+    let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
     for run in runs {
         let Some(truth) = &run.finished.truth else {
             continue;
@@ -216,7 +220,12 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &Device)> {
 }
 
 /// Whether two true devices agree at the nodes of the second that the first covers.
-fn same(run: &ComparedRun, one: &Device, other_run: &ComparedRun, other: &Device) -> bool {
+fn same(
+    run: &ComparedRun,
+    one: &NodalCoefficients,
+    other_run: &ComparedRun,
+    other: &NodalCoefficients,
+) -> bool {
     let grid = &run.finished.oscillator.grid;
     let close = |f: &[f64], g: &[f64]| {
         let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);

@@ -6,7 +6,7 @@ use super::verdict;
 use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::system::Device;
+use kmcfit_core::internals::system::NodalCoefficients;
 use serde::Serialize;
 
 /// The numbers of one run, and what they mean in one line.
@@ -124,7 +124,7 @@ pub struct Roughness {
 
 impl Roughness {
     /// The roughness of a device on a grid with this step, s.
-    pub fn of(device: &Device, step: f64) -> Self {
+    pub fn of(device: &NodalCoefficients, step: f64) -> Self {
         let slope = |f: &[f64]| -> f64 {
             let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
             squares.sum::<f64>() * step
@@ -149,9 +149,9 @@ fn smallest(f: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    fn device(mass: &[f64], damping: f64, stiffness: f64) -> Device {
+    fn device(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
         let constant = |value| vec![value; mass.len()];
-        Device {
+        NodalCoefficients {
             mass: mass.to_vec(),
             coefficients: vec![constant(damping), constant(stiffness)],
         }

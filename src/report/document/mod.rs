@@ -9,7 +9,7 @@ pub use channel::{
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -228,8 +228,8 @@ impl ResultDocument {
 
     /// Whether the motion is a rotation, in rad: then the mass is a moment of inertia.
     pub fn is_rotation(&self) -> bool {
-        let mass = self.functions.get(Quantity::Mass.name());
-        mass.is_some_and(|mass| mass.unit == Quantity::Mass.angular_unit())
+        let mass = self.functions.get(CoefficientKind::Mass.name());
+        mass.is_some_and(|mass| mass.unit == CoefficientKind::Mass.angular_unit())
     }
 }
 

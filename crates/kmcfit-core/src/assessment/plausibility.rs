@@ -4,11 +4,11 @@ use super::channel::diagnostics;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
-use crate::functions::Quantity;
+use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use crate::system::{Excitation, Term};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
@@ -43,7 +43,7 @@ pub enum Unidentified {
     /// The fit failed.
     Failed,
     /// There is no response with half the step.
-    NoResponseOnHalfStep(Breakdown),
+    NoResponseOnHalfStep(SimulationError),
     /// Half the step changes the response by more than a tenth of the largest reading.
     StepDependent,
     /// All channels are missed by more than twice what their readings vary.
@@ -228,8 +228,12 @@ fn coarse(
 /// What is said of optima that are hardly devices.
 fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
-    let sizes = problem.natural_sizes(evaluation);
-    let passive = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let sizes = problem.natural_scales(evaluation);
+    let passive = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let values = problem
         .functions
         .assembly(0)

@@ -3,7 +3,7 @@
 use crate::diagnostics::rms;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 /// The optimum on a grid of half the step.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,12 +19,12 @@ pub struct StepCheck {
 }
 
 /// The check: `None` where the readings do not lie on the finer grid, an error where there is no response on it.
-pub type StepCheckOutcome = Result<Option<StepCheck>, Breakdown>;
+pub type StepCheckOutcome = Result<Option<StepCheck>, SimulationError>;
 
 /// Simulates the optimum with half the step.
 ///
 /// # Errors
-/// A [`Breakdown`] if there is no response with half the step.
+/// A [`SimulationError`] if there is no response with half the step.
 pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcome {
     let Some(Refined {
         step,

@@ -33,11 +33,11 @@ pub use part::Part;
 pub use record::Record;
 
 use crate::constraints::{Impossible, Statement};
-use crate::functions::{Functions, Quantity};
+use crate::functions::{CoefficientKind, Parameterization};
 use crate::problem::Problem;
 use crate::signal::even_spacing;
 use crate::solvers::{StartProjection, states_from_readings};
-use crate::system::{Grid, Method, Oscillator, Term};
+use crate::system::{Grid, Method, System, Term};
 
 /// Most nodes: more would be asked for by mistake, and end in a lack of memory.
 const MOST_NODES: usize = 100_000_000;
@@ -45,7 +45,7 @@ const MOST_NODES: usize = 100_000_000;
 /// What a problem is made of.
 #[derive(Debug, Clone)]
 pub struct Builder {
-    parts: Vec<(Quantity, Part)>,
+    parts: Vec<(CoefficientKind, Part)>,
     width: f64,
     records: Vec<Record>,
     nodes: Option<usize>,
@@ -58,9 +58,9 @@ impl Builder {
     pub fn new([mass, damping, stiffness]: [Part; 3]) -> Self {
         Self {
             parts: vec![
-                (Quantity::Mass, mass),
-                (Quantity::Damping, damping),
-                (Quantity::Stiffness, stiffness),
+                (CoefficientKind::Mass, mass),
+                (CoefficientKind::Damping, damping),
+                (CoefficientKind::Stiffness, stiffness),
             ],
             width: 0.0,
             records: Vec::new(),
@@ -73,29 +73,29 @@ impl Builder {
     /// With a stiffness `k3` (N/m^3) on the cube of the displacement.
     #[must_use]
     pub fn cubic_stiffness(self, part: Part) -> Self {
-        self.with(Quantity::CubicStiffness, part)
+        self.with(CoefficientKind::CubicStiffness, part)
     }
 
     /// With a damping (N s^2/m^2) on `|v| v`.
     #[must_use]
     pub fn quadratic_damping(self, part: Part) -> Self {
-        self.with(Quantity::QuadraticDamping, part)
+        self.with(CoefficientKind::QuadraticDamping, part)
     }
 
     /// With a friction (N) on `v / sqrt(v^2 + width^2)`, `width` in m/s.
     #[must_use]
     pub fn coulomb_friction(mut self, part: Part, width: f64) -> Self {
         self.width = width;
-        self.with(Quantity::CoulombFriction, part)
+        self.with(CoefficientKind::CoulombFriction, part)
     }
 
     /// With a constant push (N) against the direction of `y`.
     #[must_use]
     pub fn offset(self, part: Part) -> Self {
-        self.with(Quantity::Offset, part)
+        self.with(CoefficientKind::Offset, part)
     }
 
-    fn with(mut self, quantity: Quantity, part: Part) -> Self {
+    fn with(mut self, quantity: CoefficientKind, part: Part) -> Self {
         self.parts.retain(|(known, _)| *known != quantity);
         self.parts.push((quantity, part));
         self
@@ -144,8 +144,8 @@ impl Builder {
     pub fn build(&self) -> Result<Problem, BuildError> {
         self.records.iter().try_for_each(Record::check)?;
         let grid = self.grid()?;
-        let mut parts: Vec<&(Quantity, Part)> = self.parts.iter().collect();
-        parts.sort_by_key(|(quantity, _)| Quantity::ALL.iter().position(|q| q == quantity));
+        let mut parts: Vec<&(CoefficientKind, Part)> = self.parts.iter().collect();
+        parts.sort_by_key(|(quantity, _)| CoefficientKind::ALL.iter().position(|q| q == quantity));
         let list = parts
             .iter()
             .map(|(quantity, part)| part.on(*quantity, &grid));
@@ -157,7 +157,7 @@ impl Builder {
             penalties.extend(smooth);
             variations.extend(variation);
         }
-        let functions = Functions::new(list, grid.nodes(), grid.step());
+        let functions = Parameterization::new(list, grid.nodes(), grid.step());
         let functions = functions.ok_or_else(|| {
             BuildError::new(
                 "functions",
@@ -167,7 +167,7 @@ impl Builder {
         let mut scalars = Vec::new();
         let experiments = self.records.iter().map(|r| r.on(&grid, &mut scalars));
         let experiments = experiments.collect::<Result<_, _>>()?;
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid,
             method: self.method,
             terms: self.terms(&parts)?,
@@ -221,8 +221,10 @@ impl Builder {
         (same && even_spacing(first).is_some()).then_some(first)
     }
 
-    fn terms(&self, parts: &[&(Quantity, Part)]) -> Result<Vec<Term>, BuildError> {
-        let friction = parts.iter().any(|(q, _)| *q == Quantity::CoulombFriction);
+    fn terms(&self, parts: &[&(CoefficientKind, Part)]) -> Result<Vec<Term>, BuildError> {
+        let friction = parts
+            .iter()
+            .any(|(q, _)| *q == CoefficientKind::CoulombFriction);
         if friction && !(self.width.is_finite() && self.width > 0.0) {
             let problem = format!("its width is {} m/s, not positive", self.width);
             return Err(BuildError::new("coulomb_friction", problem));
@@ -233,7 +235,7 @@ impl Builder {
 
     fn constrain(
         &self,
-        parts: &[&(Quantity, Part)],
+        parts: &[&(CoefficientKind, Part)],
         problem: &mut Problem,
     ) -> Result<(), BuildError> {
         let mut all: Vec<(Statement, Option<f64>)> = Vec::new();
@@ -264,7 +266,7 @@ impl Builder {
 }
 
 fn in_words(why: &Impossible) -> String {
-    let names = |list: &[Quantity]| {
+    let names = |list: &[CoefficientKind]| {
         let names: Vec<&str> = list.iter().map(|q| q.name()).collect();
         names.join(", ")
     };

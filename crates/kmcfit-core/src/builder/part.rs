@@ -3,7 +3,7 @@
 use super::BuildError;
 use crate::constraints::{Limit, Statement};
 use crate::functions::basis::{from_physical_powers, uniform_knots};
-use crate::functions::{Basis, CoefficientFunction, Design, Penalty, Quantity, Variation};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Design, Penalty, Variation};
 use crate::system::Grid;
 
 /// Where a function comes from.
@@ -121,7 +121,7 @@ impl Part {
     /// On a grid.
     pub(super) fn on(
         &self,
-        quantity: Quantity,
+        quantity: CoefficientKind,
         grid: &Grid,
     ) -> Result<CoefficientFunction, BuildError> {
         let name = quantity.name();
@@ -149,7 +149,7 @@ impl Part {
         function.values_into(&function.start, &mut values);
         match values.iter().find(|v| !v.is_finite()) {
             Some(value) => return refuse(format!("its start is {value}, not a finite number")),
-            None if quantity != Quantity::Mass => {}
+            None if quantity != CoefficientKind::Mass => {}
             None => {
                 if let Some(value) = values.iter().find(|v| **v <= 0.0) {
                     return refuse(format!("it must be positive at all times, not {value}"));
@@ -160,7 +160,7 @@ impl Part {
     }
 
     /// What its limits demand.
-    pub(super) fn limits(&self, of: Quantity) -> Result<Vec<Statement>, BuildError> {
+    pub(super) fn limits(&self, of: CoefficientKind) -> Result<Vec<Statement>, BuildError> {
         let mut limits = Vec::new();
         for (name, limit) in [("min", self.min), ("max", self.max)] {
             let Some(value) = limit else { continue };
@@ -168,7 +168,7 @@ impl Part {
                 let problem = format!("`{name}` is {value}, not a finite number");
                 return Err(BuildError::new(of.name(), problem));
             }
-            if name == "max" && of == Quantity::Mass && value <= 0.0 {
+            if name == "max" && of == CoefficientKind::Mass && value <= 0.0 {
                 return Err(BuildError::new("mass", "`max` leaves no mass"));
             }
         }

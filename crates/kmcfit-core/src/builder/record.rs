@@ -1,14 +1,14 @@
 //! One record: where the motion begins, what drives it, what was read.
 
 use super::BuildError;
-use crate::functions::Scalar;
-use crate::objective::state_sizes;
+use crate::functions::ScalarParameter;
+use crate::objective::state_scales;
 use crate::record::{
-    BaseMotion, Channel, ChannelKind, Drive, Experiment, Loss, Waveform, Weighting, integral_over,
+    BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, Waveform, Weighting, integral_over,
 };
 use crate::signal::{Interpolation, Signal};
 use crate::signal::{even_spacing, median_spacing};
-use crate::system::{Excitation, Grid, State, Surroundings};
+use crate::system::{Excitation, Grid, InputSample, State};
 
 /// Readings of one kind.
 #[derive(Debug, Clone, PartialEq)]
@@ -193,9 +193,9 @@ impl Record {
     pub(super) fn on(
         &self,
         grid: &Grid,
-        scalars: &mut Vec<Scalar>,
+        scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Experiment, BuildError> {
-        let drive = Drive {
+        let drive = Input {
             force: self
                 .signal("force", self.force.as_ref(), grid)?
                 .map(Waveform::Samples),
@@ -205,7 +205,7 @@ impl Record {
         };
         let nodes = grid.nodes();
         let mut experiment = Experiment::free(&self.name, State::default(), nodes);
-        experiment.excitation = (drive != Drive::default()).then(|| drive.on(grid, nodes));
+        experiment.excitation = (drive != Input::default()).then(|| drive.on(grid, nodes));
         match self.initial {
             Some(state) => experiment.initial = state,
             None => experiment.sought = self.seek_initial(scalars),
@@ -243,7 +243,7 @@ impl Record {
     fn channel(
         &self,
         readings: &Readings,
-        drive: &Drive,
+        drive: &Input,
         excitation: Option<&Excitation>,
         grid: &Grid,
     ) -> Result<Channel, BuildError> {
@@ -270,7 +270,7 @@ impl Record {
             .ok_or_else(|| self.refuse(format!("{}: readings outside the grid", kind.name())))?;
         let mut channel = channel.with_loss(*loss);
         if *kind == ChannelKind::Acceleration && excitation.is_some() {
-            let around = |t: &f64| Surroundings {
+            let around = |t: &f64| InputSample {
                 force: drive.force_at(*t),
                 base: drive.base_acceleration_at(*t),
             };
@@ -283,16 +283,16 @@ impl Record {
         Ok(channel)
     }
 
-    fn seek_initial(&self, scalars: &mut Vec<Scalar>) -> [Option<usize>; 2] {
+    fn seek_initial(&self, scalars: &mut Vec<ScalarParameter>) -> [Option<usize>; 2] {
         let nearest = self.readings.iter().min_by_key(|r| r.kind);
         let sizes = nearest.map_or([1.0; 2], |r| {
-            state_sizes(r.kind, &r.values, median_spacing(&r.times))
+            state_scales(r.kind, &r.values, median_spacing(&r.times))
         });
         let parts = [("displacement", "m"), ("velocity", "m/s")];
         let mut sought = [None; 2];
         for (((name, unit), size), sought) in parts.into_iter().zip(sizes).zip(&mut sought) {
             *sought = Some(scalars.len());
-            scalars.push(Scalar {
+            scalars.push(ScalarParameter {
                 name: format!("initial {name} of {}", self.name),
                 unit: unit.into(),
                 start: 0.0,

@@ -1,8 +1,8 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
-use super::{CoefficientFunction, Design, Gram, Runs, Scalar};
+use super::{CoefficientFunction, Design, Gram, RowRuns, ScalarParameter};
 use crate::simd::sum::largest_difference;
-use crate::system::Device;
+use crate::system::NodalCoefficients;
 use crate::system::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
 
@@ -11,14 +11,14 @@ use std::ops::Range;
 ///
 /// The first functions make up the main device: mass, then one per force term. Further ones belong
 /// to single experiments and replace one of the main device there: each device is a list of
-/// functions ([`Functions::assembly`]).
+/// functions ([`Parameterization::assembly`]).
 #[derive(Debug, Clone)]
-pub struct Functions {
+pub struct Parameterization {
     list: Vec<CoefficientFunction>,
     ranges: Vec<Range<usize>>,
     grams: Vec<Gram>,
     devices: Vec<Vec<usize>>,
-    scalars: Vec<Scalar>,
+    scalars: Vec<ScalarParameter>,
     nodes: usize,
     step: f64,
     /// Of each parameter of a function the first node at which it matters.
@@ -28,10 +28,10 @@ pub struct Functions {
     /// The fixed part and the only entry of the design of each function that has the same value at every node.
     flat: Vec<Option<[f64; 2]>>,
     /// Of each function whose design has them.
-    runs: Vec<Option<Runs>>,
+    runs: Vec<Option<RowRuns>>,
 }
 
-impl Functions {
+impl Parameterization {
     /// Collects `list` (mass first) on `nodes` nodes of step `step` (s), as the functions of one
     /// device; `None` if some basis is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
@@ -39,7 +39,7 @@ impl Functions {
         Self::with_devices(list, vec![main], nodes, step)
     }
 
-    /// [`Functions::new`] with several devices: each is a list of indices into `list`, mass first.
+    /// [`Parameterization::new`] with several devices: each is a list of indices into `list`, mass first.
     ///
     /// # Panics
     /// If there is no device, or one names a function that is not there, or one twice.
@@ -83,7 +83,7 @@ impl Functions {
         Some(Self {
             constant: list.iter().map(|f| f.design.is_constant()).collect(),
             flat: list.iter().map(CoefficientFunction::flat).collect(),
-            runs: list.iter().map(|f| Runs::of(&f.design)).collect(),
+            runs: list.iter().map(|f| RowRuns::of(&f.design)).collect(),
             first_nodes,
             list,
             ranges,
@@ -97,13 +97,13 @@ impl Functions {
 
     /// The same functions with numbers to be fitted beside them.
     #[must_use]
-    pub fn with_scalars(mut self, scalars: Vec<Scalar>) -> Self {
+    pub fn with_scalars(mut self, scalars: Vec<ScalarParameter>) -> Self {
         self.scalars = scalars;
         self
     }
 
     /// The numbers that are fitted beside the functions.
-    pub fn scalars(&self) -> &[Scalar] {
+    pub fn scalars(&self) -> &[ScalarParameter] {
         &self.scalars
     }
 
@@ -168,7 +168,7 @@ impl Functions {
     }
 
     /// The rows of the design of function `index` that see the same parameters, if there are long runs of them.
-    pub(crate) fn runs(&self, index: usize) -> Option<&Runs> {
+    pub(crate) fn runs(&self, index: usize) -> Option<&RowRuns> {
         self.runs[index].as_ref()
     }
 
@@ -217,19 +217,19 @@ impl Functions {
     }
 
     /// A device of the right shape, all zero.
-    pub fn empty_device(&self) -> Device {
-        Device::zeros(self.nodes, self.devices[0].len() - 1)
+    pub fn empty_device(&self) -> NodalCoefficients {
+        NodalCoefficients::zeros(self.nodes, self.devices[0].len() - 1)
     }
 
     /// The main device with parameters `theta`.
-    pub fn device(&self, theta: &[f64]) -> Device {
+    pub fn device(&self, theta: &[f64]) -> NodalCoefficients {
         let mut device = self.empty_device();
         self.device_into(theta, 0, &mut device);
         device
     }
 
     /// Device `which` with parameters `theta`, into storage that is used again.
-    pub fn device_into(&self, theta: &[f64], which: usize, device: &mut Device) {
+    pub fn device_into(&self, theta: &[f64], which: usize, device: &mut NodalCoefficients) {
         for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
             let theta = &theta[self.ranges[f].clone()];
             match (self.flat[f], theta) {
@@ -262,7 +262,7 @@ impl Functions {
     }
 
     /// `B theta` of device `which` without the fixed parts: its change along a direction.
-    pub fn direction(&self, theta: &[f64], which: usize) -> Device {
+    pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
         let mut device = self.empty_device();
         for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
             let range = self.ranges[f].clone();
@@ -273,7 +273,7 @@ impl Functions {
 
     /// Adds `B^T` applied to nodal values of device `which` to `out`: Euclidean gradient in nodal
     /// values to Euclidean gradient in parameters.
-    pub fn add_transpose(&self, nodal: &Device, which: usize, out: &mut [f64]) {
+    pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
         for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
             let out = &mut out[self.ranges[f].clone()];
             match &self.runs[f] {
@@ -283,8 +283,8 @@ impl Functions {
         }
     }
 
-    /// [`Functions::add_transpose`] of the main device to zero.
-    pub fn transpose(&self, nodal: &Device) -> Vec<f64> {
+    /// [`Parameterization::add_transpose`] of the main device to zero.
+    pub fn transpose(&self, nodal: &NodalCoefficients) -> Vec<f64> {
         let mut out = vec![0.0; self.parameters()];
         self.add_transpose(nodal, 0, &mut out);
         out

@@ -16,14 +16,14 @@ mod scalar;
 mod variation;
 
 pub use basis::Basis;
-pub use collection::Functions;
+pub use collection::Parameterization;
 pub use design::Design;
 pub use gram::Gram;
 pub use penalty::Penalty;
-pub use quantity::Quantity;
+pub use quantity::CoefficientKind;
 pub use ratios::Ratios;
-pub(crate) use runs::Runs;
-pub use scalar::{Prior, Scalar, Value};
+pub(crate) use runs::RowRuns;
+pub use scalar::{Prior, ScalarParameter, Value};
 pub use variation::Variation;
 
 use crate::system::Grid;
@@ -32,7 +32,7 @@ use crate::system::Grid;
 #[derive(Debug, Clone)]
 pub struct CoefficientFunction {
     /// Which function this is.
-    pub quantity: Quantity,
+    pub quantity: CoefficientKind,
     /// The experiment that has it for itself; `None` if it belongs to the main device.
     pub owner: Option<String>,
     /// The space that the function is sought in; `None` if it is fixed.
@@ -50,7 +50,7 @@ pub struct CoefficientFunction {
 
 impl CoefficientFunction {
     /// A function known at all nodes: no parameters.
-    pub fn fixed(quantity: Quantity, values: Vec<f64>) -> Self {
+    pub fn fixed(quantity: CoefficientKind, values: Vec<f64>) -> Self {
         Self {
             quantity,
             owner: None,
@@ -66,7 +66,7 @@ impl CoefficientFunction {
     ///
     /// # Panics
     /// If `start` has another number of parameters than the basis.
-    pub fn free(quantity: Quantity, basis: Basis, grid: &Grid, start: Vec<f64>) -> Self {
+    pub fn free(quantity: CoefficientKind, basis: Basis, grid: &Grid, start: Vec<f64>) -> Self {
         assert_eq!(
             start.len(),
             basis.parameters(grid),
@@ -77,19 +77,19 @@ impl CoefficientFunction {
     }
 
     /// One value per node, starting from `start`.
-    pub fn nodal(quantity: Quantity, start: Vec<f64>) -> Self {
+    pub fn nodal(quantity: CoefficientKind, start: Vec<f64>) -> Self {
         let nodes = start.len();
         Self::with_design(quantity, Basis::Nodal, Design::Identity, nodes, start)
     }
 
     /// One value for all `nodes` nodes, starting from `start`.
-    pub fn constant(quantity: Quantity, start: f64, nodes: usize) -> Self {
+    pub fn constant(quantity: CoefficientKind, start: f64, nodes: usize) -> Self {
         let design = Design::ones(nodes);
         Self::with_design(quantity, Basis::Constant, design, nodes, vec![start])
     }
 
     fn with_design(
-        quantity: Quantity,
+        quantity: CoefficientKind,
         basis: Basis,
         design: Design,
         nodes: usize,

@@ -4,7 +4,7 @@ use crate::system::Term;
 
 /// Which coefficient function of the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum CoefficientKind {
     /// Mass `m(t)`.
     Mass,
     /// Damping `c(t)`.
@@ -21,81 +21,81 @@ pub enum Quantity {
     Offset,
 }
 
-impl Quantity {
+impl CoefficientKind {
     /// Key in a model file and in `result.json`.
     pub fn name(self) -> &'static str {
         match self {
-            Quantity::Mass => "mass",
-            Quantity::Damping => "damping",
-            Quantity::Stiffness => "stiffness",
-            Quantity::CubicStiffness => "cubic_stiffness",
-            Quantity::QuadraticDamping => "quadratic_damping",
-            Quantity::CoulombFriction => "coulomb_friction",
-            Quantity::Offset => "offset",
+            CoefficientKind::Mass => "mass",
+            CoefficientKind::Damping => "damping",
+            CoefficientKind::Stiffness => "stiffness",
+            CoefficientKind::CubicStiffness => "cubic_stiffness",
+            CoefficientKind::QuadraticDamping => "quadratic_damping",
+            CoefficientKind::CoulombFriction => "coulomb_friction",
+            CoefficientKind::Offset => "offset",
         }
     }
 
     /// Symbol in the equation of motion.
     pub fn symbol(self) -> &'static str {
         match self {
-            Quantity::Mass => "m",
-            Quantity::Damping => "c",
-            Quantity::Stiffness => "k",
-            Quantity::CubicStiffness => "k3",
-            Quantity::QuadraticDamping => "c2",
-            Quantity::CoulombFriction => "F_c",
-            Quantity::Offset => "F_0",
+            CoefficientKind::Mass => "m",
+            CoefficientKind::Damping => "c",
+            CoefficientKind::Stiffness => "k",
+            CoefficientKind::CubicStiffness => "k3",
+            CoefficientKind::QuadraticDamping => "c2",
+            CoefficientKind::CoulombFriction => "F_c",
+            CoefficientKind::Offset => "F_0",
         }
     }
 
     /// SI unit when the displacement is in m.
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::Mass => "kg",
-            Quantity::Damping => "N s/m",
-            Quantity::Stiffness => "N/m",
-            Quantity::CubicStiffness => "N/m^3",
-            Quantity::QuadraticDamping => "N s^2/m^2",
-            Quantity::CoulombFriction => "N",
-            Quantity::Offset => "N",
+            CoefficientKind::Mass => "kg",
+            CoefficientKind::Damping => "N s/m",
+            CoefficientKind::Stiffness => "N/m",
+            CoefficientKind::CubicStiffness => "N/m^3",
+            CoefficientKind::QuadraticDamping => "N s^2/m^2",
+            CoefficientKind::CoulombFriction => "N",
+            CoefficientKind::Offset => "N",
         }
     }
 
     /// SI unit where the motion is a rotation: displacement in rad, force a moment.
     pub fn angular_unit(self) -> &'static str {
         match self {
-            Quantity::Mass => "kg m^2",
-            Quantity::Damping => "N m s/rad",
-            Quantity::Stiffness => "N m/rad",
-            Quantity::CubicStiffness => "N m/rad^3",
-            Quantity::QuadraticDamping => "N m s^2/rad^2",
-            Quantity::CoulombFriction | Quantity::Offset => "N m",
+            CoefficientKind::Mass => "kg m^2",
+            CoefficientKind::Damping => "N m s/rad",
+            CoefficientKind::Stiffness => "N m/rad",
+            CoefficientKind::CubicStiffness => "N m/rad^3",
+            CoefficientKind::QuadraticDamping => "N m s^2/rad^2",
+            CoefficientKind::CoulombFriction | CoefficientKind::Offset => "N m",
         }
     }
 
     /// Column header with the unit of motion along a line.
     pub fn column(self) -> &'static str {
         match self {
-            Quantity::Mass => "mass_kg",
-            Quantity::Damping => "damping_N_s_per_m",
-            Quantity::Stiffness => "stiffness_N_per_m",
-            Quantity::CubicStiffness => "cubic_stiffness_N_per_m3",
-            Quantity::QuadraticDamping => "quadratic_damping_N_s2_per_m2",
-            Quantity::CoulombFriction => "coulomb_friction_N",
-            Quantity::Offset => "offset_N",
+            CoefficientKind::Mass => "mass_kg",
+            CoefficientKind::Damping => "damping_N_s_per_m",
+            CoefficientKind::Stiffness => "stiffness_N_per_m",
+            CoefficientKind::CubicStiffness => "cubic_stiffness_N_per_m3",
+            CoefficientKind::QuadraticDamping => "quadratic_damping_N_s2_per_m2",
+            CoefficientKind::CoulombFriction => "coulomb_friction_N",
+            CoefficientKind::Offset => "offset_N",
         }
     }
 
     /// Column header with the unit of a rotation.
     pub fn angular_column(self) -> &'static str {
         match self {
-            Quantity::Mass => "mass_kg_m2",
-            Quantity::Damping => "damping_N_m_s_per_rad",
-            Quantity::Stiffness => "stiffness_N_m_per_rad",
-            Quantity::CubicStiffness => "cubic_stiffness_N_m_per_rad3",
-            Quantity::QuadraticDamping => "quadratic_damping_N_m_s2_per_rad2",
-            Quantity::CoulombFriction => "coulomb_friction_N_m",
-            Quantity::Offset => "offset_N_m",
+            CoefficientKind::Mass => "mass_kg_m2",
+            CoefficientKind::Damping => "damping_N_m_s_per_rad",
+            CoefficientKind::Stiffness => "stiffness_N_m_per_rad",
+            CoefficientKind::CubicStiffness => "cubic_stiffness_N_m_per_rad3",
+            CoefficientKind::QuadraticDamping => "quadratic_damping_N_m_s2_per_rad2",
+            CoefficientKind::CoulombFriction => "coulomb_friction_N_m",
+            CoefficientKind::Offset => "offset_N_m",
         }
     }
 
@@ -114,15 +114,15 @@ impl Quantity {
     /// width of Coulomb friction, m/s.
     pub fn term(self, friction_width: f64) -> Option<Term> {
         match self {
-            Quantity::Mass => None,
-            Quantity::Damping => Some(Term::Damping),
-            Quantity::Stiffness => Some(Term::Stiffness),
-            Quantity::CubicStiffness => Some(Term::CubicStiffness),
-            Quantity::QuadraticDamping => Some(Term::QuadraticDamping),
-            Quantity::CoulombFriction => Some(Term::CoulombFriction {
+            CoefficientKind::Mass => None,
+            CoefficientKind::Damping => Some(Term::Damping),
+            CoefficientKind::Stiffness => Some(Term::Stiffness),
+            CoefficientKind::CubicStiffness => Some(Term::CubicStiffness),
+            CoefficientKind::QuadraticDamping => Some(Term::QuadraticDamping),
+            CoefficientKind::CoulombFriction => Some(Term::CoulombFriction {
                 width: friction_width,
             }),
-            Quantity::Offset => Some(Term::Offset),
+            CoefficientKind::Offset => Some(Term::Offset),
         }
     }
 }

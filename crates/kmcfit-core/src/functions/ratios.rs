@@ -1,6 +1,6 @@
 //! What a free motion can show: the ratios of the functions.
 
-use crate::system::Device;
+use crate::system::NodalCoefficients;
 
 /// Ratios of stiffness and damping to mass at the nodes, and what engineers call them.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +20,7 @@ impl Ratios {
     ///
     /// # Panics
     /// If the device has fewer coefficients.
-    pub fn of(device: &Device) -> Self {
+    pub fn of(device: &NodalCoefficients) -> Self {
         let (m, c, k) = (
             &device.mass,
             &device.coefficients[0],

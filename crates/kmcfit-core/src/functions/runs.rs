@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// A design with one or two entries in every row.
 #[derive(Debug, Clone)]
-pub(crate) struct Runs {
+pub(crate) struct RowRuns {
     runs: Vec<Run>,
     /// The first entry of every row, and the second: zero where there is none.
     entries: [Vec<f64>; 2],
@@ -28,7 +28,7 @@ pub(crate) struct Piece<'a> {
     pub second: Option<(usize, &'a [f64])>,
 }
 
-impl Runs {
+impl RowRuns {
     /// `None` where a row has no entry or more than two, or where runs are so short that they do not pay.
     pub fn of(design: &Design) -> Option<Self> {
         /// Fewest rows of a run, on average.
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn products_have_the_bits_of_the_design() {
         for design in designs() {
-            let runs = Runs::of(&design).expect("two entries a row");
+            let runs = RowRuns::of(&design).expect("two entries a row");
             let theta: Vec<f64> = (0..5).map(|j| (1.3 * f64::from(j)).sin() - 0.2).collect();
             let nodal: Vec<f64> = (0..NODES).map(|i| (0.1 * i as f64).cos()).collect();
             for nodes in [NODES, 300, 1] {
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn pieces_tile_the_rows() {
         for design in designs() {
-            let runs = Runs::of(&design).expect("two entries a row");
+            let runs = RowRuns::of(&design).expect("two entries a row");
             for (from, to) in [(0, NODES), (64, 128), (100, 101), (400, 401), (7, 7)] {
                 let mut next = from;
                 for piece in runs.within(from..to) {
@@ -212,12 +212,12 @@ mod tests {
     #[test]
     fn other_designs_have_none() {
         let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
-        assert!(Runs::of(&Design::Identity).is_none());
-        assert!(Runs::of(&Design::Empty).is_none());
+        assert!(RowRuns::of(&Design::Identity).is_none());
+        assert!(RowRuns::of(&Design::Empty).is_none());
         // More entries, and a run for every few rows.
         let powers = Basis::Polynomial { degree: 3 };
-        assert!(Runs::of(&powers.design(&grid)).is_none());
+        assert!(RowRuns::of(&powers.design(&grid)).is_none());
         let many: Vec<f64> = (0..101).map(|i| 0.1 * f64::from(i)).collect();
-        assert!(Runs::of(&linear(&many).design(&grid)).is_none());
+        assert!(RowRuns::of(&linear(&many).design(&grid)).is_none());
     }
 }

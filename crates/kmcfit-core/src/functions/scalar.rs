@@ -11,7 +11,7 @@ pub struct Prior {
 
 /// A number to be fitted.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scalar {
+pub struct ScalarParameter {
     /// Name for reports.
     pub name: String,
     /// Its unit.
@@ -24,7 +24,7 @@ pub struct Scalar {
     pub prior: Option<Prior>,
 }
 
-impl Scalar {
+impl ScalarParameter {
     /// What the prior charges for the value `x`.
     pub fn price(&self, x: f64) -> f64 {
         self.prior.map_or(0.0, |p| {
@@ -34,7 +34,7 @@ impl Scalar {
     }
 }
 
-/// A number that is known, or fitted as one of the [`Scalar`]s.
+/// A number that is known, or fitted as one of the [`ScalarParameter`]s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
     /// Known.

@@ -3,7 +3,7 @@
 use crate::functions::CoefficientFunction;
 use crate::problem::Problem;
 use crate::record::Experiment;
-use crate::system::Stepwise;
+use crate::system::StageSamples;
 
 /// Functions that one factor multiplies: those of devices that have a function in common.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +108,6 @@ pub(super) fn given_words(names: &[String]) -> String {
 }
 
 /// The force of an experiment, where there is one.
-pub(super) fn force_of(experiment: &Experiment) -> Option<&Stepwise> {
+pub(super) fn force_of(experiment: &Experiment) -> Option<&StageSamples> {
     experiment.excitation.as_ref()?.force.as_ref()
 }

@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Directions `d_k` of the parameters, `theta = sum_k z_k d_k`, scaled so that `z` has no unit.
 ///
-/// With sizes `P_j` of the functions ([`Problem::natural_sizes`]) each direction has length one in
+/// With sizes `P_j` of the functions ([`Problem::natural_scales`]) each direction has length one in
 /// `sum_j 1/T integral (delta p_j / P_j)^2 dt + sum_s (delta x_s / size_s)^2`: one unit of `z_k` is a
 /// change by 100 % of the natural size, root mean square over the record. So a singular value says by
 /// how many standard deviations all readings together answer to such a change, whatever the basis.
@@ -26,7 +26,7 @@ impl Directions {
     /// One direction per parameter if there are at most `most`, else hats: so many that there are
     /// about `coarse` directions in all.
     pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize, coarse: usize) -> Self {
-        let sizes = problem.natural_sizes(evaluation);
+        let sizes = problem.natural_scales(evaluation);
         let duration = problem.oscillator.grid.duration();
         let metric = problem.functions.relative_metric(&sizes, duration);
         let unit = |j: usize| vec![(j, 1.0 / metric[j].sqrt())];

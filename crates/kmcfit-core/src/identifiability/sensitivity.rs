@@ -4,7 +4,7 @@ use super::directions::Directions;
 use super::linear::right_svd;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simulate::{Slopes, Trajectory};
+use crate::simulate::{CoefficientGradient, Trajectory};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -160,21 +160,25 @@ fn by_adjoints(
     transposed.transpose()
 }
 
-type Parts<'a, 'b> = (&'a mut Trajectory, &'a mut Slopes<'b>, &'a mut [f64]);
+type Parts<'a, 'b> = (
+    &'a mut Trajectory,
+    &'a mut CoefficientGradient<'b>,
+    &'a mut [f64],
+);
 
 /// Gradient in the parameters of a linear function of the predictions of experiment `e`.
 fn reading_gradient(
     problem: &Problem,
     evaluation: &Evaluation,
     e: usize,
-    add: impl FnOnce(crate::objective::View, Parts),
+    add: impl FnOnce(crate::objective::SimulatedRecord, Parts),
 ) -> Vec<f64> {
     let experiment = &problem.experiments[e];
     let view = problem.view(evaluation, e);
     let mut source = Trajectory::zeros(experiment.nodes);
     let mut nodal = problem.functions.empty_device();
     let mut scalars = vec![0.0; evaluation.scalars.len()];
-    let mut direct = Slopes::AtNodes(&mut nodal);
+    let mut direct = CoefficientGradient::AtNodes(&mut nodal);
     add(view, (&mut source, &mut direct, &mut scalars));
     let share = view.discrete_adjoint(&source);
     for (total, share) in nodal.functions_mut().zip(share.device.functions()) {

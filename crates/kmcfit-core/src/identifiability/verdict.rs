@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::system::Term;
 
 /// A function is identified where the half-width of its 95 % band is at most this share of its
-/// size at most times ([`Problem::natural_sizes`] with the median of its values in place of the largest): a quarter
+/// size at most times ([`Problem::natural_scales`] with the median of its values in place of the largest): a quarter
 /// tells half of it from the whole.
 pub const IDENTIFIED: f64 = 0.25;
 /// It is identified on the whole if it is so at this share of the nodes: the ends of a record are
@@ -115,7 +115,7 @@ fn is_known(band: &Band, size: f64, i: usize) -> bool {
 
 /// Verdicts on every function of the list, then on `k/m` and `c/m`.
 pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
-    let sizes = problem.middle_sizes(evaluation);
+    let sizes = problem.median_scales(evaluation);
     let assembly = problem.functions.assembly(0);
     let mass = median_size(&evaluation.device.mass);
     let of = |term: Term| {

@@ -3,7 +3,7 @@
 use crate::functions::Design;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
-use crate::simulate::{Breakdown, least_squares};
+use crate::simulate::{SimulationError, least_squares};
 use crate::system::Excitation;
 
 impl Problem {
@@ -21,7 +21,11 @@ impl Problem {
     ///
     /// # Panics
     /// If `theta` or `gradient` has another length than the parameters.
-    pub fn cost_and_gradient(&self, theta: &[f64], gradient: &mut [f64]) -> Result<f64, Breakdown> {
+    pub fn cost_and_gradient(
+        &self,
+        theta: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<f64, SimulationError> {
         assert_eq!(theta.len(), self.parameters(), "one number per parameter");
         assert_eq!(gradient.len(), self.parameters(), "one slope per parameter");
         if let Some(misfit) = self.fused_least_squares(theta, gradient) {
@@ -90,7 +94,7 @@ impl Problem {
 mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
-    use crate::functions::Functions;
+    use crate::functions::Parameterization;
     use crate::system::{Grid, Method};
 
     /// The paper's problem, on few nodes.
@@ -129,7 +133,7 @@ mod tests {
             .try_into()
             .unwrap();
         let grid = problem.oscillator.grid;
-        let functions = Functions::with_devices(
+        let functions = Parameterization::with_devices(
             vec![k, m, c],
             vec![vec![1, 2, 0]],
             grid.nodes(),

@@ -3,9 +3,9 @@
 use super::Evaluation;
 use crate::functions::{CoefficientFunction, Design};
 use crate::problem::Problem;
-use crate::simulate::{Engine, Slopes, Trajectory, continuous_adjoint};
+use crate::simulate::{CoefficientGradient, Engine, Trajectory, continuous_adjoint};
 use crate::system::quadrature::trapezoid_weights;
-use crate::system::{Device, State};
+use crate::system::{NodalCoefficients, State};
 
 /// Which adjoint computes the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,7 +118,8 @@ impl Problem {
     /// Euclidean gradient of the misfit in the parameters.
     fn discrete_gradient(&self, evaluation: &Evaluation) -> Vec<f64> {
         let mut gradient = vec![0.0; self.parameters()];
-        let mut nodal: Vec<Option<Device>> = vec![None; self.functions.assemblies().len()];
+        let mut nodal: Vec<Option<NodalCoefficients>> =
+            vec![None; self.functions.assemblies().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.channels.is_empty()
@@ -129,7 +130,7 @@ impl Problem {
             let view = self.view(evaluation, e);
             let empty = || self.functions.empty_device();
             let total = nodal[experiment.device].get_or_insert_with(empty);
-            let direct = &mut Slopes::AtNodes(total);
+            let direct = &mut CoefficientGradient::AtNodes(total);
             let source = self.source(evaluation, e, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
             add(total, &share.device);
@@ -150,7 +151,7 @@ impl Problem {
         &self,
         evaluation: &Evaluation,
         e: usize,
-        direct: &mut Slopes,
+        direct: &mut CoefficientGradient,
         scalars: &mut [f64],
     ) -> Trajectory {
         let (experiment, view) = (&self.experiments[e], self.view(evaluation, e));
@@ -181,7 +182,12 @@ impl Problem {
         }
         let mut direct = vec![0.0; assembly.len()];
         let mut own = vec![0.0; scalars.len()];
-        let source = self.source(evaluation, e, &mut Slopes::Summed(&mut direct), &mut own);
+        let source = self.source(
+            evaluation,
+            e,
+            &mut CoefficientGradient::Summed(&mut direct),
+            &mut own,
+        );
         let found = view.engine().discrete_adjoint_sums(
             view.oscillator,
             view.device,
@@ -209,7 +215,8 @@ impl Problem {
             self.supports_continuous(),
             "Eq. 13 needs one reading per node and no sigma"
         );
-        let mut nodal: Vec<Option<Device>> = vec![None; self.functions.assemblies().len()];
+        let mut nodal: Vec<Option<NodalCoefficients>> =
+            vec![None; self.functions.assemblies().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
@@ -226,9 +233,10 @@ impl Problem {
             }
             add_initial(experiment.sought, share.initial, &mut scalars);
         }
-        let or_empty =
-            |device: Option<Device>| device.unwrap_or_else(|| self.functions.empty_device());
-        let nodal: Vec<Device> = nodal.into_iter().map(or_empty).collect();
+        let or_empty = |device: Option<NodalCoefficients>| {
+            device.unwrap_or_else(|| self.functions.empty_device())
+        };
+        let nodal: Vec<NodalCoefficients> = nodal.into_iter().map(or_empty).collect();
         let grid = &self.oscillator.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let identity = |f: &CoefficientFunction| matches!(f.design, Design::Identity);
@@ -280,7 +288,7 @@ fn add_initial(sought: [Option<usize>; 2], gradient: State, scalars: &mut [f64])
     }
 }
 
-fn add(total: &mut Device, share: &Device) {
+fn add(total: &mut NodalCoefficients, share: &NodalCoefficients) {
     for (total, share) in total.functions_mut().zip(share.functions()) {
         total.iter_mut().zip(share).for_each(|(t, s)| *t += s);
     }

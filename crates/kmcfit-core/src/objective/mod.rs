@@ -12,14 +12,14 @@ mod view;
 
 pub use gradient::{Gradient, GradientKind};
 pub use refine::Refined;
-pub use sizes::state_sizes;
+pub use sizes::state_scales;
 pub use verify::GradientError;
-pub use view::{View, ViewTangent};
+pub use view::{RecordTangent, SimulatedRecord};
 
 use crate::problem::Problem;
 use crate::simulate::reference::tangent;
-use crate::simulate::{Breakdown, Cause, Engine, Purpose, Trajectory};
-use crate::system::{Device, DeviceTangent, Place, State};
+use crate::simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
+use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
 /// The cost at one point and everything that it was computed from.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,9 +31,9 @@ pub struct Evaluation {
     /// Part of the penalties.
     pub regularisation: f64,
     /// The main device at this point.
-    pub device: Device,
-    /// The other devices of [`Functions::assemblies`](crate::functions::Functions::assemblies).
-    pub own_devices: Vec<Device>,
+    pub device: NodalCoefficients,
+    /// The other devices of [`Parameterization::assemblies`](crate::functions::Functions::assemblies).
+    pub own_devices: Vec<NodalCoefficients>,
     /// The scalars at this point.
     pub scalars: Vec<f64>,
     /// The motion in each experiment.
@@ -43,8 +43,8 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Device `which` of [`Functions::assemblies`](crate::functions::Functions::assemblies).
-    pub fn device_of(&self, which: usize) -> &Device {
+    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Functions::assemblies).
+    pub fn device_of(&self, which: usize) -> &NodalCoefficients {
         match which {
             0 => &self.device,
             own => &self.own_devices[own - 1],
@@ -78,12 +78,12 @@ impl Problem {
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
     /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
     /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
-    /// ([`crate::functions::Scalar::price`]).
+    /// ([`crate::functions::ScalarParameter::price`]).
     ///
     /// # Errors
-    /// A [`Breakdown`] if a motion does not exist (the mass is not positive, or it overflows), or the
+    /// A [`SimulationError`] if a motion does not exist (the mass is not positive, or it overflows), or the
     /// cost overflows.
-    pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, Breakdown> {
+    pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, SimulationError> {
         let mut evaluation = self.workspace();
         self.evaluate_into(theta, &mut evaluation)?;
         Ok(evaluation)
@@ -98,7 +98,7 @@ impl Problem {
         &self,
         theta: &[f64],
         evaluation: &mut Evaluation,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), SimulationError> {
         self.evaluate_for(Purpose::Estimation, theta, evaluation)
     }
 
@@ -111,7 +111,7 @@ impl Problem {
         purpose: Purpose,
         theta: &[f64],
         evaluation: &mut Evaluation,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), SimulationError> {
         self.functions.device_into(theta, 0, &mut evaluation.device);
         for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
             self.functions.device_into(theta, i + 1, own);
@@ -130,12 +130,16 @@ impl Problem {
     /// and regularisation stay as they are.
     ///
     /// # Errors
-    /// A [`Breakdown`] if a motion does not exist.
-    pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+    /// A [`SimulationError`] if a motion does not exist.
+    pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), SimulationError> {
         self.motions(Purpose::Estimation, evaluation)
     }
 
-    fn motions(&self, purpose: Purpose, evaluation: &mut Evaluation) -> Result<(), Breakdown> {
+    fn motions(
+        &self,
+        purpose: Purpose,
+        evaluation: &mut Evaluation,
+    ) -> Result<(), SimulationError> {
         evaluation.misfit = 0.0;
         for (e, experiment) in self.experiments.iter().enumerate() {
             let device = match experiment.device {
@@ -147,7 +151,7 @@ impl Problem {
             let (oscillator, excitation) = (&self.oscillator, experiment.excitation.as_ref());
             let engine = Engine::choose(oscillator, excitation, motion.nodes(), purpose);
             engine.forward_into(oscillator, device, initial, excitation, motion)?;
-            let view = View {
+            let view = SimulatedRecord {
                 oscillator,
                 device,
                 excitation,
@@ -167,9 +171,9 @@ impl Problem {
     }
 
     /// What the channels of experiment `e` look at, at an evaluated point.
-    pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> View<'a> {
+    pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> SimulatedRecord<'a> {
         let experiment = &self.experiments[e];
-        View {
+        SimulatedRecord {
             oscillator: &self.oscillator,
             device: evaluation.device_of(experiment.device),
             excitation: experiment.excitation.as_ref(),
@@ -186,13 +190,13 @@ impl Problem {
         along: &[f64],
     ) -> Vec<Vec<Vec<f64>>> {
         let scalars = self.scalars(along);
-        let devices: Vec<Device> = (0..self.functions.assemblies().len())
+        let devices: Vec<NodalCoefficients> = (0..self.functions.assemblies().len())
             .map(|d| self.functions.direction(along, d))
             .collect();
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
             let change = |sought: Option<usize>| sought.map_or(0.0, |i| scalars[i]);
-            let direction = DeviceTangent {
+            let direction = SystemTangent {
                 device: devices[experiment.device].clone(),
                 initial: State {
                     displacement: change(experiment.sought[0]),
@@ -201,7 +205,7 @@ impl Problem {
             };
             let (device, excitation) = (view.device, view.excitation);
             let motion = tangent(view.oscillator, device, excitation, view.motion, &direction);
-            let along = ViewTangent {
+            let along = RecordTangent {
                 device: &direction.device,
                 motion: &motion,
                 scalars,
@@ -213,9 +217,9 @@ impl Problem {
     }
 
     /// Where the largest residual stands, for a cost that has left the finite numbers.
-    fn cost_overflow(&self, evaluation: &Evaluation) -> Breakdown {
+    fn cost_overflow(&self, evaluation: &Evaluation) -> SimulationError {
         let mut worst = (
-            Place {
+            TimePoint {
                 step: 0,
                 fraction: 0.0,
             },
@@ -231,7 +235,7 @@ impl Problem {
             }
         }
         let node = worst.0.as_node().unwrap_or(worst.0.step);
-        Breakdown {
+        SimulationError {
             cause: Cause::CostOverflow,
             node,
             time: self.oscillator.grid.time(node),

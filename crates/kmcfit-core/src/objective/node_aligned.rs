@@ -1,11 +1,11 @@
 //! Accelerations read on every node, eight at a time.
 
-use super::View;
+use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
 use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
 use crate::simulate::fast::padded_loads;
-use crate::simulate::{Slopes, Trajectory};
+use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
@@ -43,7 +43,7 @@ impl Channel {
     pub(super) fn accelerations<A: Arithmetic>(
         &self,
         arithmetic: A,
-        view: View,
+        view: SimulatedRecord,
         i: usize,
         seen: &mut Accelerations,
     ) {
@@ -60,7 +60,7 @@ impl Channel {
 /// Appends what the model says of the readings of `channel`.
 pub(super) struct Predict<'a> {
     pub channel: &'a Channel,
-    pub view: View<'a>,
+    pub view: SimulatedRecord<'a>,
     pub out: &'a mut Vec<f64>,
 }
 
@@ -97,10 +97,10 @@ impl Kernel for Predict<'_> {
 /// [`Channel::add_transpose`] of such readings, after the filter.
 pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
-    pub view: View<'a>,
+    pub view: SimulatedRecord<'a>,
     pub slopes: &'a [f64],
     pub source: &'a mut Trajectory,
-    pub direct: &'a mut Slopes<'b>,
+    pub direct: &'a mut CoefficientGradient<'b>,
     pub scalars: &'a mut [f64],
 }
 
@@ -138,13 +138,13 @@ impl Kernel for AddTranspose<'_, '_> {
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
             match direct {
-                Slopes::AtNodes(device) => {
+                CoefficientGradient::AtNodes(device) => {
                     for (values, by) in device.functions_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
                 // Lanes without a reading have no slope.
-                Slopes::Summed(_) => {
+                CoefficientGradient::Summed(_) => {
                     for (sums, by) in sums.iter_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, sums);
                     }
@@ -158,7 +158,7 @@ impl Kernel for AddTranspose<'_, '_> {
                 }
             }
         }
-        if let Slopes::Summed(all) = direct {
+        if let CoefficientGradient::Summed(all) = direct {
             for (sum, lanes) in all.iter_mut().zip(sums) {
                 *sum += lanes.iter().sum::<f64>();
             }

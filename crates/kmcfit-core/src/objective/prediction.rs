@@ -1,17 +1,17 @@
 //! What the model says of a channel's readings, how that changes, and the transpose.
 
 use super::node_aligned::{AddTranspose, Predict};
-use super::{View, ViewTangent};
+use super::{RecordTangent, SimulatedRecord};
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simd;
-use crate::simulate::reference::{Sensed, observe};
-use crate::simulate::{Slopes, Trajectory};
-use crate::system::Place;
+use crate::simulate::reference::{Observation, observe};
+use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::system::TimePoint;
 
 impl Channel {
     /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
-    pub fn sensed(&self, view: View, i: usize) -> Sensed {
+    pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
             view.oscillator,
             self.kind(),
@@ -28,7 +28,7 @@ impl Channel {
     }
 
     /// The value alone of [`Channel::sensed`].
-    fn seen(&self, view: View, i: usize) -> f64 {
+    fn seen(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
             self.places()[i].as_node(),
@@ -40,14 +40,14 @@ impl Channel {
     }
 
     /// What the model says of the readings.
-    pub fn predict(&self, view: View) -> Vec<f64> {
+    pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
         self.predict_into(view, &mut out);
         out
     }
 
     /// [`Channel::predict`] into storage that is used again.
-    pub fn predict_into(&self, view: View, out: &mut Vec<f64>) {
+    pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
         if self.is_on_every_node() && self.is_plain() {
             out.extend_from_slice(&view.motion.displacement[..self.len()]);
@@ -70,12 +70,12 @@ impl Channel {
     }
 
     /// The change of [`Channel::predict`] along a direction.
-    pub fn predict_tangent(&self, view: View, along: ViewTangent) -> Vec<f64> {
+    pub fn predict_tangent(&self, view: SimulatedRecord, along: RecordTangent) -> Vec<f64> {
         let [gain, ..] = self.sensor().values(view.scalars);
         let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
         let model = |i: usize| {
             let sensed = self.sensed(view, i);
-            let Place { step, .. } = self.places()[i];
+            let TimePoint { step, .. } = self.places()[i];
             let mut change = gain * answer(&sensed, step, along);
             if by_gain != 0.0 {
                 change += by_gain * sensed.value;
@@ -94,10 +94,10 @@ impl Channel {
     /// at fixed states) and `scalars`, adding to each.
     pub fn add_transpose(
         &self,
-        view: View,
+        view: SimulatedRecord,
         slopes: &[f64],
         source: &mut Trajectory,
-        direct: &mut Slopes,
+        direct: &mut CoefficientGradient,
         scalars: &mut [f64],
     ) {
         let filtered;
@@ -150,7 +150,7 @@ impl Channel {
 }
 
 /// The change of what is sensed when the motion and the device change.
-fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
+fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
     let (y, v) = (&along.motion.displacement, &along.motion.velocity);
     let by_states = sensed.states[0] * y[step]
         + sensed.states[1] * v[step]
@@ -169,7 +169,13 @@ fn answer(sensed: &Sensed, step: usize, along: ViewTangent) -> f64 {
 }
 
 /// Transpose of [`answer`].
-fn spread(sensed: &Sensed, step: usize, slope: f64, source: &mut Trajectory, direct: &mut Slopes) {
+fn spread(
+    sensed: &Observation,
+    step: usize,
+    slope: f64,
+    source: &mut Trajectory,
+    direct: &mut CoefficientGradient,
+) {
     for side in 0..2 {
         source.displacement[step + side] += slope * sensed.states[2 * side];
         source.velocity[step + side] += slope * sensed.states[2 * side + 1];

@@ -1,9 +1,9 @@
 //! The optimum on a grid of half the step: how much of it is the stepper's.
 
-use super::{Evaluation, View};
+use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::simulate::{Breakdown, Trajectory, reference};
-use crate::system::{Device, Oscillator};
+use crate::simulate::{SimulationError, Trajectory, reference};
+use crate::system::{NodalCoefficients, System};
 
 /// What half the step changes, with the functions and scalars as they are.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,13 +22,16 @@ impl Problem {
     /// old nodes, forces are sampled anew. `None` where readings do not lie on the finer grid.
     ///
     /// # Errors
-    /// A [`Breakdown`] if there is no motion on the finer grid.
-    pub fn on_half_step(&self, evaluation: &Evaluation) -> Result<Option<Refined>, Breakdown> {
+    /// A [`SimulationError`] if there is no motion on the finer grid.
+    pub fn on_half_step(
+        &self,
+        evaluation: &Evaluation,
+    ) -> Result<Option<Refined>, SimulationError> {
         let Some(grid) = (self.oscillator.grid).with_nodes(2 * self.oscillator.grid.nodes() - 1)
         else {
             return Ok(None);
         };
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid,
             ..self.oscillator.clone()
         };
@@ -50,7 +53,7 @@ impl Problem {
                 experiment.excitation.as_ref(),
                 &mut motion,
             )?;
-            let view = View {
+            let view = SimulatedRecord {
                 oscillator: &oscillator,
                 device: &device,
                 excitation: experiment.excitation.as_ref(),
@@ -71,12 +74,12 @@ impl Problem {
 }
 
 /// Functions that are linear between the old nodes, on the old nodes and half-way between them.
-fn halved(device: &Device) -> Device {
+fn halved(device: &NodalCoefficients) -> NodalCoefficients {
     let finer = |f: &[f64]| -> Vec<f64> {
         let pairs = f.windows(2).flat_map(|w| [w[0], 0.5 * (w[0] + w[1])]);
         pairs.chain(f.last().copied()).collect()
     };
-    Device {
+    NodalCoefficients {
         mass: finer(&device.mass),
         coefficients: device.coefficients.iter().map(|f| finer(f)).collect(),
     }

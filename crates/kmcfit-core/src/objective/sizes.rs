@@ -3,7 +3,7 @@
 use super::Evaluation;
 use crate::diagnostics::median_size;
 use crate::problem::Problem;
-use crate::record::{ChannelKind, Experiment, LONG};
+use crate::record::{ChannelKind, Experiment, LONG_RECORD_STEPS};
 use crate::signal::Spectrum;
 use crate::simd::sum::{dot, largest};
 use crate::simulate::Trajectory;
@@ -16,13 +16,13 @@ impl Problem {
     /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
     /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
     /// of a damping that matters.
-    pub fn natural_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+    pub fn natural_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
         self.sizes(evaluation, largest)
     }
 
-    /// [`Problem::natural_sizes`] with the median of the sizes of a function's own values in place of the largest one: what
+    /// [`Problem::natural_scales`] with the median of the sizes of a function's own values in place of the largest one: what
     /// a function is like at most times, whatever it does where nothing is seen of it.
-    pub(crate) fn middle_sizes(&self, evaluation: &Evaluation) -> Vec<f64> {
+    pub(crate) fn median_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
         self.sizes(evaluation, median_size)
     }
 
@@ -58,13 +58,13 @@ impl Problem {
     }
 
     /// The largest change of a function or scalar from one point to the parameters `after`, relative
-    /// to [`Problem::natural_sizes`] at the first, or to the scalar's own size.
+    /// to [`Problem::natural_scales`] at the first, or to the scalar's own size.
     pub fn relative_change(&self, before: &Evaluation, from: &[f64], after: &[f64]) -> f64 {
-        self.change_in_sizes(&self.natural_sizes(before), from, after)
+        self.change_in_scales(&self.natural_scales(before), from, after)
     }
 
     /// [`Problem::relative_change`] with the natural sizes at hand.
-    pub(crate) fn change_in_sizes(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
+    pub(crate) fn change_in_scales(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
         let ranges = self.functions.ranges().iter().zip(sizes);
         let mut most = 0.0f64;
         for (index, (range, size)) in ranges.enumerate() {
@@ -112,7 +112,7 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
         let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
             .chain(seen)
             .collect();
-        if motion.nodes() > LONG {
+        if motion.nodes() > LONG_RECORD_STEPS {
             for (column, sum) in columns.iter().zip(&mut sums) {
                 *sum += dot(column, column);
             }
@@ -146,7 +146,7 @@ fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
 
 /// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
 /// (s) apart: their rms, and their dominant frequency.
-pub fn state_sizes(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
+pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
     let rms = (centred.iter().map(|v| v * v).sum::<f64>() / centred.len() as f64).sqrt();
@@ -188,11 +188,11 @@ mod tests {
         ];
         let rms = amplitude / 2f64.sqrt();
         for (kind, size, phase) in cases {
-            let [displacement, velocity] = state_sizes(kind, &readings(size, phase), spacing);
+            let [displacement, velocity] = state_scales(kind, &readings(size, phase), spacing);
             // The dominant frequency is known to a small part of its distance to the next.
             assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
             assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
-            assert_eq!(state_sizes(kind, &[2.0; 400], spacing), [0.0; 2]);
+            assert_eq!(state_scales(kind, &[2.0; 400], spacing), [0.0; 2]);
         }
     }
 
@@ -224,7 +224,7 @@ mod tests {
     }
 
     fn sizes(problem: &Problem) -> Vec<f64> {
-        problem.natural_sizes(&problem.evaluate(&problem.start()).unwrap())
+        problem.natural_scales(&problem.evaluate(&problem.start()).unwrap())
     }
 
     /// A force as large as the mass's, in the mean of squares: that of a damping is `m w`, that of a

@@ -2,7 +2,7 @@
 
 use super::{Evaluation, GradientKind};
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 /// One point of the paper's Fig. 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,13 +19,13 @@ impl Problem {
     /// takes over; an inexact one's stays at its floor.
     ///
     /// # Errors
-    /// A [`Breakdown`] at `theta` itself; steps that break down are left out.
+    /// A [`SimulationError`] at `theta` itself; steps that break down are left out.
     pub fn gradient_error(
         &self,
         theta: &[f64],
         kind: GradientKind,
         steps: &[f64],
-    ) -> Result<Vec<GradientError>, Breakdown> {
+    ) -> Result<Vec<GradientError>, SimulationError> {
         let here = self.evaluate(theta)?;
         let gradient = self.gradient(theta, &here, kind);
         let mut trial = self.workspace();
@@ -62,14 +62,14 @@ impl Problem {
     /// `steps`: they fall with the square of the step if the gradient is exact.
     ///
     /// # Errors
-    /// A [`Breakdown`] at `theta` or at one of the trial points.
+    /// A [`SimulationError`] at `theta` or at one of the trial points.
     pub fn taylor_remainders(
         &self,
         theta: &[f64],
         direction: &[f64],
         kind: GradientKind,
         steps: &[f64],
-    ) -> Result<Vec<f64>, Breakdown> {
+    ) -> Result<Vec<f64>, SimulationError> {
         let here = self.evaluate(theta)?;
         let gradient = self.gradient(theta, &here, kind).euclidean;
         let slope: f64 = gradient.iter().zip(direction).map(|(g, d)| g * d).sum();

@@ -1,15 +1,15 @@
 //! A simulated record, and its change along a direction.
 
 use crate::simulate::{Engine, Purpose, Trajectory};
-use crate::system::{Device, DeviceTangent, Excitation, Oscillator};
+use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 
 /// A simulated record.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
+pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
-    pub oscillator: &'a Oscillator,
+    pub oscillator: &'a System,
     /// The device that moves.
-    pub device: &'a Device,
+    pub device: &'a NodalCoefficients,
     /// What drives it.
     pub excitation: Option<&'a Excitation>,
     /// Its motion.
@@ -20,16 +20,16 @@ pub struct View<'a> {
 
 /// How a view changes along a direction.
 #[derive(Debug, Clone, Copy)]
-pub struct ViewTangent<'a> {
+pub struct RecordTangent<'a> {
     /// Change of the device.
-    pub device: &'a Device,
+    pub device: &'a NodalCoefficients,
     /// Change of the motion.
     pub motion: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
 }
 
-impl View<'_> {
+impl SimulatedRecord<'_> {
     /// The engine of its response and derivatives.
     pub(crate) fn engine(&self) -> Engine {
         let nodes = self.motion.nodes();
@@ -37,7 +37,7 @@ impl View<'_> {
     }
 
     /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
-    pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> DeviceTangent {
+    pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
             oscillator,
             device,

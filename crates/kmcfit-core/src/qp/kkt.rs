@@ -100,7 +100,7 @@ impl Subproblem {
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let joined = self.joined_sizes(z);
         let scale = self.cost_scale(z, &joined, at_zero);
-        let natural = self.natural_sizes(z, &joined, scale);
+        let natural = self.natural_scales(z, &joined, scale);
         let near = self.proximal.iter().zip(z);
         let mut gradient: Vec<f64> = near.map(|(d, z)| d * z).collect();
         for (rows, factors) in [
@@ -181,7 +181,7 @@ impl Subproblem {
     }
 
     /// `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; of variables without curvature the size by which rows join them.
-    fn natural_sizes(&self, z: &[f64], joined: &[f64], scale: f64) -> Vec<f64> {
+    fn natural_scales(&self, z: &[f64], joined: &[f64], scale: f64) -> Vec<f64> {
         let mut curvature = self.proximal.clone();
         for i in 0..self.residuals.len() {
             self.residuals

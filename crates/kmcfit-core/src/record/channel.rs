@@ -2,7 +2,7 @@
 
 use super::{ChannelKind, Loss, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
-use crate::system::{Excitation, Grid, Place, Surroundings};
+use crate::system::{Excitation, Grid, InputSample, TimePoint};
 
 /// The readings of one sensor.
 ///
@@ -14,7 +14,7 @@ use crate::system::{Excitation, Grid, Place, Surroundings};
 pub struct Channel {
     kind: ChannelKind,
     times: Vec<f64>,
-    places: Vec<Place>,
+    places: Vec<TimePoint>,
     observed: Vec<f64>,
     /// The readings before the filter; none without one.
     unfiltered: Vec<f64>,
@@ -42,13 +42,13 @@ impl Channel {
         nodes: usize,
     ) -> Option<Self> {
         let place = |t: &f64| {
-            let place = Place::of(grid, *t)?;
+            let place = TimePoint::of(grid, *t)?;
             match place.as_node() {
-                Some(node) => (node < nodes).then(|| Place::node(node, nodes)),
+                Some(node) => (node < nodes).then(|| TimePoint::node(node, nodes)),
                 None => (place.step + 1 < nodes).then_some(place),
             }
         };
-        let places: Option<Vec<Place>> = times.iter().map(place).collect();
+        let places: Option<Vec<TimePoint>> = times.iter().map(place).collect();
         let fits = times.len() == values.len() && !values.is_empty();
         let places = places?;
         let on_every_node = (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i));
@@ -113,7 +113,7 @@ impl Channel {
     /// # Panics
     /// If there is not one for each reading.
     #[must_use]
-    pub fn with_surroundings(mut self, around: Vec<Surroundings>) -> Self {
+    pub fn with_surroundings(mut self, around: Vec<InputSample>) -> Self {
         assert_eq!(around.len(), self.times.len(), "one for each reading");
         let forces = around.iter().map(|a| a.force).collect();
         let bases = around.iter().map(|a| a.base).collect();
@@ -241,7 +241,7 @@ impl Channel {
     }
 
     /// Where they are on the grid.
-    pub fn places(&self) -> &[Place] {
+    pub fn places(&self) -> &[TimePoint] {
         &self.places
     }
 
@@ -281,14 +281,14 @@ impl Channel {
     }
 
     /// Force and base at reading `i`: as given, or else linear over the step.
-    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> Surroundings {
+    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.around, excitation) {
-            (Some([forces, bases]), _) => Surroundings {
+            (Some([forces, bases]), _) => InputSample {
                 force: forces[i],
                 base: bases[i],
             },
             (None, Some(excitation)) => excitation.around(self.places[i]),
-            (None, None) => Surroundings::default(),
+            (None, None) => InputSample::default(),
         }
     }
 
@@ -353,7 +353,7 @@ impl Channel {
             Some(place) => place.as_node()?,
             None => 1,
         };
-        let in_place = |(i, place): (usize, &Place)| place.as_node() == Some(i * stride);
+        let in_place = |(i, place): (usize, &TimePoint)| place.as_node() == Some(i * stride);
         (self.places.iter().enumerate().all(in_place)).then_some(stride)
     }
 }

@@ -1,6 +1,6 @@
 //! One record: input, initial state and channels.
 
-use super::{Channel, Drive};
+use super::{Channel, Input};
 use crate::system::{Excitation, Grid, State};
 
 /// One record of a device's motion.
@@ -15,10 +15,10 @@ pub struct Experiment {
     /// What drives the motion, on the grid; `None` is free motion.
     pub excitation: Option<Excitation>,
     /// What it was made from; empty where it was given on the grid.
-    pub drive: Drive,
+    pub drive: Input,
     /// Number of nodes of its motion: a record may end before the grid does.
     pub nodes: usize,
-    /// Which device of [`Functions::assemblies`] moves.
+    /// Which device of [`Parameterization::assemblies`] moves.
     pub device: usize,
     /// What was measured; none for an experiment that is only simulated.
     pub channels: Vec<Channel>,
@@ -32,7 +32,7 @@ impl Experiment {
             initial,
             sought: [None; 2],
             excitation: None,
-            drive: Drive::default(),
+            drive: Input::default(),
             nodes,
             device: 0,
             channels: Vec::new(),
@@ -71,7 +71,7 @@ impl Experiment {
         let excitation = self
             .excitation
             .as_ref()
-            .map(|old| match self.drive == Drive::default() {
+            .map(|old| match self.drive == Input::default() {
                 false => self.drive.on(grid, nodes),
                 true => old.halved(),
             });

@@ -2,7 +2,7 @@
 
 use super::ChannelKind;
 use crate::signal::{Shape, Signal};
-use crate::system::{Excitation, Grid, Stepwise};
+use crate::system::{Excitation, Grid, StageSamples};
 
 /// A force over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,14 +24,14 @@ pub enum BaseMotion {
 
 /// What drives a motion, at any time: from it the excitation on any grid is made.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Drive {
+pub struct Input {
     /// The force.
     pub force: Option<Waveform>,
     /// The motion of the base.
     pub base: Option<BaseMotion>,
 }
 
-impl Drive {
+impl Input {
     /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
         let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
@@ -39,7 +39,7 @@ impl Drive {
                 let (left, right) = (grid.time(i), grid.time(i + 1));
                 [at(left), at(0.5 * (left + right)), before(right)]
             };
-            Stepwise::new((0..nodes - 1).map(step).collect())
+            StageSamples::new((0..nodes - 1).map(step).collect())
         };
         Excitation {
             force: self.force.as_ref().map(|force| match force {

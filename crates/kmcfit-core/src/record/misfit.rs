@@ -1,6 +1,6 @@
 //! How far the predictions are from the readings, and what that costs.
 
-use super::{Channel, LONG, Loss, Weighting};
+use super::{Channel, LONG_RECORD_STEPS, Loss, Weighting};
 use crate::simd::sum::squared_distance;
 use crate::system::quadrature::trapezoid_weights_at;
 use std::ops::Range;
@@ -38,7 +38,7 @@ impl Channel {
         }
         if let Weighting::Sigma(sigma) | Weighting::Estimated { sigma } = self.weighting()
             && self.loss() == Loss::Squares
-            && self.len() >= LONG
+            && self.len() >= LONG_RECORD_STEPS
         {
             return squared_distance(predicted, self.observed(), 1.0 / sigma);
         }

@@ -11,7 +11,7 @@ mod weighting;
 
 pub use channel::Channel;
 pub use experiment::Experiment;
-pub use input::{BaseMotion, Drive, Waveform};
+pub use input::{BaseMotion, Input, Waveform};
 pub use kind::ChannelKind;
 pub use loss::Loss;
 pub use misfit::integral_over;
@@ -19,4 +19,4 @@ pub use sensor::Sensor;
 pub use weighting::Weighting;
 
 /// Steps from which on a record is long: it is then worth being gone through in parts.
-pub(crate) const LONG: usize = 1 << 15;
+pub(crate) const LONG_RECORD_STEPS: usize = 1 << 15;

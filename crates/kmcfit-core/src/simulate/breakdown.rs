@@ -2,7 +2,7 @@
 
 use super::Trajectory;
 use crate::simd::sum::are_positive;
-use crate::system::{Device, Grid};
+use crate::system::{Grid, NodalCoefficients};
 use std::fmt;
 
 /// Why a motion could not be computed.
@@ -18,7 +18,7 @@ pub enum Cause {
 
 /// An evaluation that ended early: an outcome of a trial, not a misuse. Line searches step back.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Breakdown {
+pub struct SimulationError {
     /// What happened.
     pub cause: Cause,
     /// Node at which it happened.
@@ -30,7 +30,7 @@ pub struct Breakdown {
     pub value: f64,
 }
 
-impl fmt::Display for Breakdown {
+impl fmt::Display for SimulationError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (time, value) = (self.time, self.value);
         match self.cause {
@@ -45,10 +45,13 @@ impl fmt::Display for Breakdown {
     }
 }
 
-impl std::error::Error for Breakdown {}
+impl std::error::Error for SimulationError {}
 
 /// Refuses a mass that is not positive at some node.
-pub(super) fn require_positive_mass(grid: &Grid, device: &Device) -> Result<(), Breakdown> {
+pub(super) fn require_positive_mass(
+    grid: &Grid,
+    device: &NodalCoefficients,
+) -> Result<(), SimulationError> {
     if are_positive(&device.mass) {
         return Ok(());
     }
@@ -60,7 +63,7 @@ pub(super) fn require_positive_mass(grid: &Grid, device: &Device) -> Result<(), 
 }
 
 /// Refuses a response that leaves the finite numbers.
-pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(), Breakdown> {
+pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(), SimulationError> {
     if trajectory.is_finite() {
         return Ok(());
     }
@@ -71,8 +74,8 @@ pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(),
     Err(at(grid, Cause::Overflow, node, last))
 }
 
-fn at(grid: &Grid, cause: Cause, node: usize, value: f64) -> Breakdown {
-    Breakdown {
+fn at(grid: &Grid, cause: Cause, node: usize, value: f64) -> SimulationError {
+    SimulationError {
         cause,
         node,
         time: grid.time(node),

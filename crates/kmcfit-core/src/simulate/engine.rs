@@ -1,12 +1,12 @@
 //! The choice among the reference functions and their specialisations.
 
-use super::breakdown::{Breakdown, require_finite, require_positive_mass};
+use super::breakdown::{SimulationError, require_finite, require_positive_mass};
 use super::fast::blocks::LinearDevice;
 use super::fast::{continuous_adjoint, prefactored, simd_adjoint};
 use super::reference::equation::EquationOfMotion;
 use super::reference::{self, AdjointEquation};
-use super::{Slopes, Trajectory};
-use crate::system::{Device, DeviceTangent, Excitation, Method, Oscillator, State, Term};
+use super::{CoefficientGradient, Trajectory};
+use crate::system::{Excitation, Method, NodalCoefficients, State, System, SystemTangent, Term};
 
 /// Purpose of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +42,7 @@ const SHORTEST_IN_BLOCKS: usize = 64;
 impl Engine {
     /// The engine for a response over `nodes` nodes.
     pub fn choose(
-        oscillator: &Oscillator,
+        oscillator: &System,
         excitation: Option<&Excitation>,
         nodes: usize,
         purpose: Purpose,
@@ -66,12 +66,12 @@ impl Engine {
     /// As [`reference::forward`].
     pub fn forward_into(
         self,
-        oscillator: &Oscillator,
-        device: &Device,
+        oscillator: &System,
+        device: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
         trajectory: &mut Trajectory,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), SimulationError> {
         match self {
             Self::Reference => {}
             Self::ParallelInTime => {
@@ -99,12 +99,12 @@ impl Engine {
     /// [`reference::discrete_adjoint`].
     pub fn discrete_adjoint(
         self,
-        oscillator: &Oscillator,
-        device: &Device,
+        oscillator: &System,
+        device: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         source: &Trajectory,
-    ) -> DeviceTangent {
+    ) -> SystemTangent {
         let nodes = trajectory.nodes();
         let gradient = match self {
             Self::Reference => None,
@@ -116,7 +116,7 @@ impl Engine {
                 let equation = EquationOfMotion::new(oscillator, device, excitation, nodes);
                 let method = oscillator.method;
                 Some(simd_adjoint::gradient(equation, method, trajectory, source))
-                    .filter(DeviceTangent::is_finite)
+                    .filter(SystemTangent::is_finite)
             }
         };
         gradient.unwrap_or_else(|| {
@@ -128,8 +128,8 @@ impl Engine {
     /// and its initial state. `None` if the engine does not sum, or the sums leave the finite numbers.
     pub(crate) fn discrete_adjoint_sums(
         self,
-        oscillator: &Oscillator,
-        device: &Device,
+        oscillator: &System,
+        device: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         source: &Trajectory,
@@ -137,7 +137,7 @@ impl Engine {
         (self == Self::Prefactored).then_some(())?;
         let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
         let mut sums = vec![0.0; 1 + oscillator.terms.len()];
-        let gradient = Slopes::Summed(&mut sums);
+        let gradient = CoefficientGradient::Summed(&mut sums);
         let initial = simd_adjoint::back(equation, oscillator.method, trajectory, source, gradient);
         let is_finite = initial.is_finite() && sums.iter().all(|x| x.is_finite());
         is_finite.then_some((sums, initial))
@@ -146,12 +146,12 @@ impl Engine {
 
 /// [`reference::continuous_adjoint`], to the bit.
 pub fn continuous_adjoint(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
-) -> DeviceTangent {
+) -> SystemTangent {
     let equation = AdjointEquation::new(oscillator, device, trajectory, observed);
     let adjoint = continuous_adjoint::solve(&equation);
     equation.gradients(oscillator, excitation, trajectory, &adjoint)
@@ -159,7 +159,7 @@ pub fn continuous_adjoint(
 
 /// Whether a system has damping and stiffness alone and is stepped by the midpoint rule: its free responses are
 /// computed in blocks and in batches of steps.
-pub(crate) fn is_linear_midpoint(oscillator: &Oscillator) -> bool {
+pub(crate) fn is_linear_midpoint(oscillator: &System) -> bool {
     oscillator.method == Method::Midpoint && oscillator.terms == [Term::Damping, Term::Stiffness]
 }
 
@@ -171,7 +171,7 @@ pub(crate) fn is_linear_midpoint(oscillator: &Oscillator) -> bool {
 /// # Panics
 /// If a function, the measurements or a part of the gradient has another length than the grid.
 pub(crate) fn least_squares(
-    oscillator: &Oscillator,
+    oscillator: &System,
     functions: [&[f64]; 3],
     initial: State,
     observed: &[f64],

@@ -1,22 +1,22 @@
 //! Accumulation of derivatives with respect to the coefficient functions.
 
-use crate::system::Device;
+use crate::system::NodalCoefficients;
 
 /// Where derivatives with respect to the functions of a device are added.
 #[derive(Debug)]
-pub enum Slopes<'a> {
+pub enum CoefficientGradient<'a> {
     /// To those with respect to the values at the nodes.
-    AtNodes(&'a mut Device),
+    AtNodes(&'a mut NodalCoefficients),
     /// To their sums over the nodes, one a function, mass first: all that a constant asks for.
     Summed(&'a mut [f64]),
 }
 
-impl Slopes<'_> {
+impl CoefficientGradient<'_> {
     /// Number of functions.
     pub(crate) fn functions(&self) -> usize {
         match self {
-            Slopes::AtNodes(device) => 1 + device.coefficients.len(),
-            Slopes::Summed(sums) => sums.len(),
+            CoefficientGradient::AtNodes(device) => 1 + device.coefficients.len(),
+            CoefficientGradient::Summed(sums) => sums.len(),
         }
     }
 
@@ -24,8 +24,8 @@ impl Slopes<'_> {
     #[inline(always)]
     pub(crate) fn add(&mut self, f: usize, node: usize, slope: f64) {
         match self {
-            Slopes::AtNodes(device) => device.function_mut(f)[node] += slope,
-            Slopes::Summed(sums) => sums[f] += slope,
+            CoefficientGradient::AtNodes(device) => device.function_mut(f)[node] += slope,
+            CoefficientGradient::Summed(sums) => sums[f] += slope,
         }
     }
 }

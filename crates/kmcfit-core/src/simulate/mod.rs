@@ -10,14 +10,14 @@ mod gradient;
 pub mod reference;
 mod trajectory;
 
-pub use breakdown::{Breakdown, Cause};
+pub use breakdown::{Cause, SimulationError};
 pub use engine::{Engine, Purpose, continuous_adjoint};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
-pub use gradient::Slopes;
-pub use reference::{Sensed, StepJacobian};
+pub use gradient::CoefficientGradient;
+pub use reference::{Observation, StepJacobian};
 pub use trajectory::Trajectory;
 
-use crate::system::{Device, Excitation, Oscillator, State};
+use crate::system::{Excitation, NodalCoefficients, State, System};
 
 /// The vector instructions of responses, adjoints and tangents: `AVX-512`, `AVX2` or `scalar`, the widest that this
 /// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the
@@ -26,20 +26,20 @@ pub fn arithmetic() -> &'static str {
     crate::simd::name()
 }
 
-impl Oscillator {
+impl System {
     /// [`reference::forward`].
     ///
     /// # Errors
-    /// A [`Breakdown`] if the mass is not positive at some node or the response overflows.
+    /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
     ///
     /// # Panics
     /// If `device` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
-        device: &Device,
+        device: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
-    ) -> Result<Trajectory, Breakdown> {
+    ) -> Result<Trajectory, SimulationError> {
         reference::forward(self, device, initial, excitation)
     }
 }

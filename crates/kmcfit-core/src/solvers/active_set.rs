@@ -82,7 +82,7 @@ pub fn active_constraints(problem: &Problem, point: &Iterate) -> Vec<ActiveGroup
     }
     let multipliers = multipliers(problem, point);
     let gain_that_counts =
-        (PUSH * point.evaluation.cost).max(ROUNDING * problem.misfit_of_silence());
+        (PUSH * point.evaluation.cost).max(ROUNDING * problem.zero_response_misfit());
     let counts = |scale: f64, multiplier: f64| 0.01 * scale * multiplier > gain_that_counts;
     let groups = constraints.groups.iter().zip(near).enumerate();
     let rows = groups.map(|(g, (group, rows))| {

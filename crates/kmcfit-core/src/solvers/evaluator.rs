@@ -8,7 +8,7 @@ use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
-use crate::simulate::{Breakdown, Purpose, Trajectory};
+use crate::simulate::{Purpose, SimulationError, Trajectory};
 use std::sync::OnceLock;
 
 /// The problem behind argmin's counters: the one door through which solvers evaluate.
@@ -79,7 +79,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     }
 
     /// The motions at a point that was there before, computed again without counting.
-    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, Breakdown> {
+    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
         problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
@@ -91,7 +91,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         &mut self,
         parameters: &[f64],
         evaluation: &mut Evaluation,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), SimulationError> {
         self.count(FORWARD, 1);
         let (problem, purpose) = (self.problem(), self.purpose);
         timed(&mut self.timings.forward, || {
@@ -200,7 +200,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         let problem = self.problem();
         if let Some(halfway) = self.halfway {
             let (reduced, sizes) = timed(&mut timings.tangent, || {
-                let sizes = || problem.natural_sizes(&evaluation);
+                let sizes = || problem.natural_scales(&evaluation);
                 in_halves(problem, &evaluation, halfway, sizes)
             });
             if let Some(misfit) = reduced.misfit_gradient() {

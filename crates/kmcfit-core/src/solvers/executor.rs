@@ -15,7 +15,7 @@ use crate::host::Instant;
 use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::{Breakdown, Cause};
+use crate::simulate::{Cause, SimulationError};
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -28,14 +28,14 @@ use std::time::Duration;
 /// error is no search: it is minimised at once.
 ///
 /// # Errors
-/// A [`Breakdown`] if the start itself cannot be evaluated.
+/// A [`SimulationError`] if the start itself cannot be evaluated.
 pub(super) fn search(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
     reference: Option<Reference>,
     watch: &mut Observer,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     let prepared = Prepared {
         parameters: start.to_vec(),
         evaluation: None,
@@ -61,7 +61,7 @@ pub(super) fn search_prepared(
     settings: &FitSettings,
     reference: Option<Reference>,
     watch: &mut Observer,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     if settings.solver == Solver::EquationError {
         return Ok(equation_error::fit(
             problem,
@@ -107,12 +107,12 @@ pub(super) fn search_prepared(
 /// near an optimum, or whose start is the question.
 ///
 /// # Errors
-/// A [`Breakdown`] if the start itself has no motion.
+/// A [`SimulationError`] if the start itself has no motion.
 pub fn fit_from(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     let fit = search(
         problem,
         start,
@@ -132,7 +132,7 @@ struct Run<'a, 'w> {
     at_start: Option<Evaluation>,
     clock: Instant,
     timings: Timings,
-    progress: Result<Progress, Breakdown>,
+    progress: Result<Progress, SimulationError>,
     outcome: Option<Outcome>,
     /// What was kept of this search when it ran before.
     kept: Option<(Vec<IterationRecord>, SolverState)>,
@@ -154,7 +154,7 @@ struct Progress {
 }
 
 /// What `progress` holds until argmin calls `init`.
-const NOT_STARTED: Breakdown = Breakdown {
+const NOT_STARTED: SimulationError = SimulationError {
     cause: Cause::Overflow,
     node: 0,
     time: f64::NAN,
@@ -169,7 +169,7 @@ impl Run<'_, '_> {
         &mut self,
         work: &mut CountedEvaluator,
         parameters: Vec<f64>,
-    ) -> Result<Progress, Breakdown> {
+    ) -> Result<Progress, SimulationError> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
             None => {
@@ -333,7 +333,7 @@ impl Run<'_, '_> {
                 return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
             // Squares of readings below 1e-154 are zero.
-            return match problem.is_some_and(|p| p.misfit_of_silence() == 0.0) {
+            return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
                 true => converged(Reason::ZeroReadings),
                 false => converged(Reason::ExactStart),
             };
@@ -351,7 +351,7 @@ impl Run<'_, '_> {
         is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
-    fn finish(mut self, counts: Counts) -> Result<Fit, Breakdown> {
+    fn finish(mut self, counts: Counts) -> Result<Fit, SimulationError> {
         match &self.outcome {
             _ if self.progress.is_err() => self.watch.nothing(),
             // It goes on from where it was kept to stand.

@@ -10,7 +10,7 @@ use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use std::time::Duration;
 
 /// A finished fit: the best point, how it was reached and how it ended.
@@ -77,7 +77,7 @@ impl Attempt {
     }
 
     /// An attempt without a response at its start.
-    pub(super) fn failed(start: StartStrategy, breakdown: Breakdown) -> Self {
+    pub(super) fn failed(start: StartStrategy, breakdown: SimulationError) -> Self {
         Self {
             start,
             initial_cost: f64::NAN,

@@ -53,16 +53,16 @@ impl Iterate {
         &self.cached.linearization
     }
 
-    /// [`Problem::natural_sizes`] here.
-    fn natural_sizes(&self, problem: &Problem) -> &[f64] {
-        (self.cached.sizes).get_or_init(|| problem.natural_sizes(&self.evaluation))
+    /// [`Problem::natural_scales`] here.
+    fn natural_scales(&self, problem: &Problem) -> &[f64] {
+        (self.cached.sizes).get_or_init(|| problem.natural_scales(&self.evaluation))
     }
 
-    /// [`Functions::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
+    /// [`Parameterization::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
     /// whole grid.
     pub(crate) fn relative_metric(&self, problem: &Problem) -> Vec<f64> {
         let duration = problem.oscillator.grid.duration();
-        (problem.functions).relative_metric(self.natural_sizes(problem), duration)
+        (problem.functions).relative_metric(self.natural_scales(problem), duration)
     }
 
     /// [`Problem::relative_change`] from here to the parameters `after`.
@@ -72,7 +72,7 @@ impl Iterate {
 
     /// [`Problem::relative_change`] between two lists of parameters, by the sizes here.
     pub(crate) fn distance(&self, problem: &Problem, from: &[f64], to: &[f64]) -> f64 {
-        problem.change_in_sizes(self.natural_sizes(problem), from, to)
+        problem.change_in_scales(self.natural_scales(problem), from, to)
     }
     /// A number that two points share if cost and gradient have the same bits, and hardly otherwise.
     pub fn fingerprint(&self) -> u64 {

@@ -53,14 +53,14 @@ pub use validation::predict_held_out;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 impl Problem {
     /// Fits from the problem's start with the usual settings.
     ///
     /// # Errors
-    /// A [`Breakdown`] if the start itself has no motion.
-    pub fn fit(&self) -> Result<Fit, Breakdown> {
+    /// A [`SimulationError`] if the start itself has no motion.
+    pub fn fit(&self) -> Result<Fit, SimulationError> {
         self.fit_with(&FitSettings::default())
     }
 
@@ -68,7 +68,7 @@ impl Problem {
     ///
     /// # Errors
     /// As [`Problem::fit`].
-    pub fn fit_with(&self, settings: &FitSettings) -> Result<Fit, Breakdown> {
+    pub fn fit_with(&self, settings: &FitSettings) -> Result<Fit, SimulationError> {
         fit(self, &self.start(), settings, &mut |_| {})
     }
 }

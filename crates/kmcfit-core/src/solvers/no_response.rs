@@ -11,7 +11,7 @@ use super::settings::FitSettings;
 use super::termination::{Outcome, Status};
 use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 /// The end of a fit none of whose starts in the constraint set has a motion, the first for the reason
 /// `breakdown`: `infeasible`, with the start `given` before it was moved into the constraints as the
@@ -26,8 +26,8 @@ pub fn without_motion(
     problem: &Problem,
     given: &[f64],
     settings: &FitSettings,
-    breakdown: Breakdown,
-) -> Result<Fit, Breakdown> {
+    breakdown: SimulationError,
+) -> Result<Fit, SimulationError> {
     if problem.constraints.hold(given, TOLERANCE) {
         return Err(breakdown);
     }

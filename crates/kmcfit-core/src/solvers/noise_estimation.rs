@@ -9,7 +9,7 @@ use super::start_strategy::search_from_starts;
 use super::termination::Status;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, Weighting};
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 /// Most rounds of fit and estimate.
 const ROUNDS: usize = 20;
@@ -33,7 +33,7 @@ pub fn fit_with_noise(
     start: &[f64],
     settings: &FitSettings,
     observe: &mut dyn FnMut(&IterationRecord),
-) -> Result<(Problem, Fit), Breakdown> {
+) -> Result<(Problem, Fit), SimulationError> {
     fit_with_noise_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
@@ -47,7 +47,7 @@ pub fn fit_with_noise_watched(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Result<(Problem, Fit), Breakdown> {
+) -> Result<(Problem, Fit), SimulationError> {
     let mut problem = problem.clone();
     let mut found = search_from_starts(&problem, start, settings, watch)?;
     let estimates = problem

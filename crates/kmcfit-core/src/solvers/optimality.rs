@@ -80,12 +80,12 @@ impl Optimality {
     /// are below 1e-10 of the measurements then has a share below [`Optimality::LEAST`], for no step lowers J by
     /// more than J.
     pub fn reference(problem: &Problem, cost: f64) -> f64 {
-        cost.max(EXACT * problem.misfit_of_silence() / Self::LEAST)
+        cost.max(EXACT * problem.zero_response_misfit() / Self::LEAST)
     }
 
     /// Whether J is so small that no step can lower it by a share that counts.
     pub fn is_exact(problem: &Problem, cost: f64) -> bool {
-        cost <= EXACT * problem.misfit_of_silence()
+        cost <= EXACT * problem.zero_response_misfit()
     }
 
     /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
@@ -141,7 +141,7 @@ impl Optimality {
 /// A change of the cost that is within the rounding of the response, which changes a sum of squared residuals by their
 /// product.
 pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
-    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.misfit_of_silence().sqrt();
+    let rounding = MOTION_ROUNDING * f64::EPSILON * problem.zero_response_misfit().sqrt();
     2.0 * rounding * cost.sqrt() + rounding * rounding
 }
 

@@ -1,7 +1,7 @@
 //! Reasons for which a fit ended.
 
 use crate::qp::ConicStatus;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::time::Duration;
@@ -81,10 +81,10 @@ pub enum Reason {
     },
     /// The start has no response.
     #[serde(skip)]
-    NoResponse(Breakdown),
+    NoResponse(SimulationError),
     /// No start within the constraints has a response.
     #[serde(skip)]
-    NoFeasibleResponse(Breakdown),
+    NoFeasibleResponse(SimulationError),
     /// A record has no equation error.
     #[serde(skip)]
     UnsupportedRecord(UnsupportedRecord),

@@ -22,7 +22,7 @@ use crate::host::Instant;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -37,13 +37,13 @@ const PROBING_ITERATIONS: u64 = 60;
 /// is returned. The other solvers take the first one only, and the equation error needs none.
 ///
 /// # Errors
-/// A [`Breakdown`] if no starting point has a response.
+/// A [`SimulationError`] if no starting point has a response.
 pub fn fit(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
     observe: &mut dyn FnMut(&IterationRecord),
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     fit_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
@@ -56,7 +56,7 @@ pub fn fit_watched(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     let fit = search_from_starts(problem, start, settings, watch)?;
     Ok(measured(problem, fit, settings))
 }
@@ -67,7 +67,7 @@ pub(super) fn search_from_starts(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     if settings.solver == Solver::EquationError {
         return search(problem, start, settings, None, watch);
     }
@@ -103,7 +103,7 @@ struct Attempts<'a, 'w> {
     timings: Timings,
     best: Option<Fit>,
     attempts: Vec<Attempt>,
-    trouble: Option<Breakdown>,
+    trouble: Option<SimulationError>,
 }
 
 impl<'a, 'w> Attempts<'a, 'w> {
@@ -264,7 +264,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
     }
 
     /// The best fit, continued if it reached the iteration limit of an attempt, with all work.
-    fn finish(mut self) -> Result<Fit, Breakdown> {
+    fn finish(mut self) -> Result<Fit, SimulationError> {
         let Some(mut fit) = self.best else {
             return Err(self
                 .trouble
@@ -299,7 +299,7 @@ fn continued(
     reference: Option<Reference>,
     attempts: &mut Vec<Attempt>,
     watch: &mut Observer,
-) -> Result<Fit, Breakdown> {
+) -> Result<Fit, SimulationError> {
     let mut settings = settings.clone();
     let taken = fit.history.len() as u64;
     settings.stopping.iterations = settings.stopping.iterations.saturating_sub(taken);

@@ -4,32 +4,32 @@ use super::checkpoint::Observer;
 use super::executor::search;
 use super::settings::{FitSettings, Solver};
 use super::state_estimation::states_from_readings;
-use crate::functions::{CoefficientFunction, Functions, Scalar};
+use crate::functions::{CoefficientFunction, Parameterization, ScalarParameter};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Experiment;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 
 /// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
 /// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own readings.
 /// Returns the problem of that experiment alone and the point found.
 ///
 /// # Errors
-/// A [`Breakdown`] if there is no motion.
+/// A [`SimulationError`] if there is no motion.
 pub fn predict_held_out(
     problem: &Problem,
     evaluation: &Evaluation,
     experiment: &Experiment,
-    scalars: &[Scalar],
+    scalars: &[ScalarParameter],
     settings: &FitSettings,
-) -> Result<(Problem, Evaluation), Breakdown> {
+) -> Result<(Problem, Evaluation), SimulationError> {
     let grid = &problem.oscillator.grid;
     let known = |(f, values): (&usize, &[f64])| {
         CoefficientFunction::fixed(problem.functions.get(*f).quantity, values.to_vec())
     };
     let main = problem.functions.assembly(0);
     let list = main.iter().zip(evaluation.device.functions()).map(known);
-    let functions = Functions::new(list.collect(), grid.nodes(), grid.step())
+    let functions = Parameterization::new(list.collect(), grid.nodes(), grid.step())
         .expect("known functions have no basis that could be dependent")
         .with_scalars(scalars.to_vec());
     let mut alone = Experiment {

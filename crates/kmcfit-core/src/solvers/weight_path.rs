@@ -12,7 +12,7 @@ use super::start_strategy::search_from_starts;
 use super::termination::{Outcome, Status};
 use super::timings::{Timings, timed};
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
@@ -109,7 +109,7 @@ impl Problem {
 /// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
-/// A [`Breakdown`] if the fit at the middle weight, the first, has no motion at its start.
+/// A [`SimulationError`] if the fit at the middle weight, the first, has no motion at its start.
 pub fn choose_weight(
     problem: &Problem,
     start: &[f64],
@@ -117,7 +117,7 @@ pub fn choose_weight(
     rule: WeightRule,
     which: &[usize],
     observe: &mut dyn FnMut(&IterationRecord),
-) -> Result<(WeightPath, Problem, Fit), Breakdown> {
+) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     choose_weight_watched(
         problem,
         start,
@@ -140,7 +140,7 @@ pub fn choose_weight_watched(
     rule: WeightRule,
     which: &[usize],
     watch: &mut Observer,
-) -> Result<(WeightPath, Problem, Fit), Breakdown> {
+) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     let mut walk = Walk {
         problem,
         settings: settings.clone(),
@@ -206,7 +206,7 @@ impl Walk<'_, '_> {
     /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
     /// at the middle a fit explains the record, which it need not at the largest weight, and
     /// converges fast, which it need not at the smallest.
-    fn both_ways(&mut self, weights: &[f64]) -> Result<Vec<PathPoint>, Breakdown> {
+    fn both_ways(&mut self, weights: &[f64]) -> Result<Vec<PathPoint>, SimulationError> {
         let middle = weights.len() / 2;
         let mut points = vec![self.visit(weights[middle])?];
         for &weight in weights[..middle].iter().rev() {
@@ -225,7 +225,7 @@ impl Walk<'_, '_> {
         Ok(points)
     }
 
-    fn visit(&mut self, weight: f64) -> Result<PathPoint, Breakdown> {
+    fn visit(&mut self, weight: f64) -> Result<PathPoint, SimulationError> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
         let from = std::mem::take(&mut self.from);
         let found = match self.last {
@@ -258,7 +258,7 @@ impl Walk<'_, '_> {
     }
 
     /// The fit at a point of the path once more, with the attempts that led onto the path.
-    fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, Breakdown> {
+    fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, SimulationError> {
         let mut found = search(problem, from, &self.settings, None, self.watch)?;
         if self.ended()
             && let Some(outcome) = self.last.take()
@@ -289,7 +289,7 @@ fn iterations(found: &Fit) -> u64 {
 }
 
 fn weights(problem: &Problem) -> Vec<f64> {
-    let reference = problem.misfit_of_silence();
+    let reference = problem.zero_response_misfit();
     let count = (DECADES * PER_DECADE) as i32 + 1;
     let factor = |i: i32| 10f64.powf(-f64::from(i) / PER_DECADE);
     (0..count)

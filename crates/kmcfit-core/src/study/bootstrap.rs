@@ -15,7 +15,7 @@ use super::refit::settings;
 use super::simulate::{normal, sigmas, stream, with_readings};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use crate::solvers::{Status, fit_from};
 use nalgebra::DMatrix;
 use rand::RngExt;
@@ -44,7 +44,7 @@ pub struct Bootstrap {
 /// `count` refits about `optimum`, on up to `threads` threads; the same bits for any number of them.
 ///
 /// # Errors
-/// A [`Breakdown`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no motion.
 pub fn bootstrap(
     problem: &Problem,
     optimum: &[f64],
@@ -52,7 +52,7 @@ pub fn bootstrap(
     count: usize,
     seed: u64,
     threads: usize,
-) -> Result<Bootstrap, Breakdown> {
+) -> Result<Bootstrap, SimulationError> {
     let evaluation = problem.evaluate(optimum)?;
     let sigmas = sigmas(problem, &evaluation);
     let job = |index: usize| {

@@ -23,7 +23,7 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::system::quadrature::trapezoid_weights;
-use crate::system::{Device, Grid};
+use crate::system::{Grid, NodalCoefficients};
 
 /// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
 /// record, so that the wish comes first between the anchors.
@@ -105,7 +105,11 @@ impl Wish {
 ///
 /// # Panics
 /// If mass, motion and wish do not have one value per node.
-pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, ConicStatus> {
+pub fn equivalent(
+    mass: &[f64],
+    motion: &Motion,
+    wish: &Wish,
+) -> Result<NodalCoefficients, ConicStatus> {
     let n = motion.grid.nodes();
     let lengths = [mass.len(), motion.displacement.len(), wish.damping.len()];
     assert_eq!(lengths, [n; 3], "one value per node");
@@ -154,7 +158,7 @@ pub fn equivalent(mass: &[f64], motion: &Motion, wish: &Wish) -> Result<Device, 
     match solution.status {
         ConicStatus::Solved | ConicStatus::Almost => {
             let scaled = |part: &[f64], size: f64| part.iter().map(|x| x * size).collect();
-            Ok(Device {
+            Ok(NodalCoefficients {
                 mass: mass.to_vec(),
                 coefficients: vec![
                     scaled(&solution.z[..n], large_c),
@@ -193,7 +197,7 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 /// How far the equation is from holding along the motion for `device`, N at the nodes.
-pub fn imbalance(device: &Device, motion: &Motion) -> Vec<f64> {
+pub fn imbalance(device: &NodalCoefficients, motion: &Motion) -> Vec<f64> {
     let at = |i: usize| {
         device.mass[i] * motion.acceleration[i]
             + device.coefficients[0][i] * motion.velocity[i]

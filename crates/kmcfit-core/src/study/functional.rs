@@ -2,7 +2,7 @@
 
 use crate::functions::Basis;
 use crate::problem::Problem;
-use crate::system::Place;
+use crate::system::TimePoint;
 use crate::system::quadrature::trapezoid_weights;
 
 /// `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, a function's value or its mean.
@@ -51,7 +51,7 @@ impl Linear {
     /// Value of function `function` at `time` (s), linear between the nodes as the stepper sees it;
     /// `None` outside the grid.
     pub fn value(problem: &Problem, function: usize, time: f64) -> Option<Self> {
-        let place = Place::of(&problem.oscillator.grid, time)?;
+        let place = TimePoint::of(&problem.oscillator.grid, time)?;
         let weights = [
             (place.step, 1.0 - place.fraction),
             (place.step + 1, place.fraction),

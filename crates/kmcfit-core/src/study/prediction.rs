@@ -8,7 +8,7 @@
 use super::pull_apart::Extreme;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
-use crate::simulate::{Breakdown, Trajectory};
+use crate::simulate::{SimulationError, Trajectory};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
@@ -64,7 +64,7 @@ pub struct Prediction {
 /// `extremes`.
 ///
 /// # Errors
-/// A [`Breakdown`] if the optimum has no motion in the run.
+/// A [`SimulationError`] if the optimum has no motion in the run.
 ///
 /// # Panics
 /// If the covariance is not one of the parameters.
@@ -74,7 +74,7 @@ pub fn predict(
     run: &Run,
     covariance: Option<&DMatrix<f64>>,
     extremes: &[Extreme],
-) -> Result<Prediction, Breakdown> {
+) -> Result<Prediction, SimulationError> {
     let seen = with_run(problem, run);
     let evaluation = seen.evaluate(theta)?;
     let motion = evaluation.trajectories[0].clone();

@@ -31,7 +31,7 @@ pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
     let Ok(evaluation) = problem.evaluate(theta) else {
         return vec![1.0; theta.len()];
     };
-    let natural = problem.natural_sizes(&evaluation);
+    let natural = problem.natural_scales(&evaluation);
     let largest = natural
         .iter()
         .copied()

@@ -17,14 +17,14 @@ impl State {
 
 /// Values of the mass and of every term's coefficient function at all nodes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Device {
+pub struct NodalCoefficients {
     /// Mass at the nodes, kg.
     pub mass: Vec<f64>,
     /// One coefficient function per [`Term`](super::Term), in the system's order, at the nodes.
     pub coefficients: Vec<Vec<f64>>,
 }
 
-impl Device {
+impl NodalCoefficients {
     /// A device with all values zero: `nodes` nodes, `terms` terms.
     pub fn zeros(nodes: usize, terms: usize) -> Self {
         Self {
@@ -48,7 +48,7 @@ impl Device {
         }
     }
 
-    /// As [`Device::functions`], mutable.
+    /// As [`NodalCoefficients::functions`], mutable.
     pub fn functions_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
         std::iter::once(&mut self.mass).chain(self.coefficients.iter_mut())
     }
@@ -56,14 +56,14 @@ impl Device {
 
 /// A direction in which device and initial state change.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DeviceTangent {
+pub struct SystemTangent {
     /// Change of every function at the nodes.
-    pub device: Device,
+    pub device: NodalCoefficients,
     /// Change of the initial state.
     pub initial: State,
 }
 
-impl DeviceTangent {
+impl SystemTangent {
     pub(crate) fn is_finite(&self) -> bool {
         let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
         self.device.functions().all(finite) && self.initial.is_finite()

@@ -66,14 +66,14 @@ impl Grid {
 
 /// A time on a grid: `fraction` of a step after the left node of step `step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct TimePoint {
     /// Step, from 0.
     pub step: usize,
     /// From 0 at the left node to 1 at the right one.
     pub fraction: f64,
 }
 
-impl Place {
+impl TimePoint {
     /// How near a time must be to a node, in steps, to be taken as the node itself.
     pub const SAME_TIME: f64 = 1e-6;
 

@@ -1,14 +1,14 @@
 //! The input of a record: force and motion of the base.
 
-use super::Place;
+use super::TimePoint;
 use super::integrator::Position;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a
 /// right end is the limit from the left, so that a jump at a node belongs to the step after it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stepwise(Vec<[f64; 3]>);
+pub struct StageSamples(Vec<[f64; 3]>);
 
-impl Stepwise {
+impl StageSamples {
     /// Values at the left end, middle and right end of each step.
     pub fn new(steps: Vec<[f64; 3]>) -> Self {
         Self(steps)
@@ -58,23 +58,23 @@ impl Stepwise {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
     /// Force, N; `None` is no force.
-    pub force: Option<Stepwise>,
+    pub force: Option<StageSamples>,
     /// Acceleration `b''` of the base, m/s^2; `None` is a base at rest.
-    pub base: Option<Stepwise>,
+    pub base: Option<StageSamples>,
 }
 
 impl Excitation {
     /// A force that is linear between its values at the nodes (N), and a base at rest.
     pub fn force_at_nodes(nodes: &[f64]) -> Self {
         Self {
-            force: Some(Stepwise::linear(nodes)),
+            force: Some(StageSamples::linear(nodes)),
             base: None,
         }
     }
 
     /// Whether nothing drives the motion.
     pub fn is_zero(&self) -> bool {
-        let zero = |part: &Option<Stepwise>| part.as_ref().is_none_or(Stepwise::is_zero);
+        let zero = |part: &Option<StageSamples>| part.as_ref().is_none_or(StageSamples::is_zero);
         zero(&self.force) && zero(&self.base)
     }
 
@@ -82,14 +82,14 @@ impl Excitation {
     /// between.
     #[must_use]
     pub fn halved(&self) -> Self {
-        let halves = |part: &Stepwise| {
+        let halves = |part: &StageSamples| {
             let halves = part.0.iter().flat_map(|&[left, middle, right]| {
                 [
                     [left, 0.5 * (left + middle), middle],
                     [middle, 0.5 * (middle + right), right],
                 ]
             });
-            Stepwise(halves.collect())
+            StageSamples(halves.collect())
         };
         Self {
             force: self.force.as_ref().map(halves),
@@ -98,14 +98,14 @@ impl Excitation {
     }
 
     /// Both at any place, linear between the ends of its step.
-    pub fn around(&self, place: Place) -> Surroundings {
-        let at = |part: &Option<Stepwise>| {
+    pub fn around(&self, place: TimePoint) -> InputSample {
+        let at = |part: &Option<StageSamples>| {
             part.as_ref().map_or(0.0, |p| {
                 let [left, _, right] = p.0[place.step];
                 left * (1.0 - place.fraction) + right * place.fraction
             })
         };
-        Surroundings {
+        InputSample {
             force: at(&self.force),
             base: at(&self.base),
         }
@@ -120,7 +120,7 @@ impl Excitation {
 
 /// Force and acceleration of the base at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Surroundings {
+pub struct InputSample {
     /// Force, N.
     pub force: f64,
     /// Acceleration of the base, m/s^2.
@@ -134,8 +134,8 @@ mod tests {
     #[test]
     fn half_steps_meet_the_old_stages_and_are_linear_between() {
         let whole = Excitation {
-            force: Some(Stepwise::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
-            base: Some(Stepwise::new(vec![[0.5, 0.25, 1.0]])),
+            force: Some(StageSamples::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
+            base: Some(StageSamples::new(vec![[0.5, 0.25, 1.0]])),
         };
         let halves = whole.halved();
         let force = halves.force.unwrap();

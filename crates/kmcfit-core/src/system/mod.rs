@@ -13,27 +13,27 @@ pub mod quadrature;
 
 pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
 
-pub use coefficients::{Device, DeviceTangent, State};
+pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};
-pub use grid::{Grid, Place};
-pub use input::{Excitation, Stepwise, Surroundings};
+pub use grid::{Grid, TimePoint};
+pub use input::{Excitation, InputSample, StageSamples};
 pub use integrator::Method;
 
 /// Most functions of a device: the mass and one for each term.
 pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
 
-/// Grid, stepper and force terms of an oscillator. The values of the coefficient functions are a [`Device`].
+/// Grid, stepper and force terms of an oscillator. The values of the coefficient functions are a [`NodalCoefficients`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Oscillator {
+pub struct System {
     /// Time nodes.
     pub grid: Grid,
     /// Stepper.
     pub method: Method,
-    /// Force terms, in the order of [`Device::coefficients`].
+    /// Force terms, in the order of [`NodalCoefficients::coefficients`].
     pub terms: Vec<Term>,
 }
 
-impl Oscillator {
+impl System {
     /// Whether the response is linear in the initial state and nothing drives it.
     pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
         let is_free = || excitation.is_none_or(Excitation::is_zero);

@@ -6,11 +6,11 @@ pub mod reference;
 pub mod sensed;
 pub mod synthetic;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, Functions, Quantity};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::system::{Device, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -22,8 +22,8 @@ pub const INITIAL: State = State {
     velocity: 1.0,
 };
 
-pub fn oscillator(nodes: usize, method: Method) -> Oscillator {
-    Oscillator {
+pub fn oscillator(nodes: usize, method: Method) -> System {
+    System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -31,11 +31,11 @@ pub fn oscillator(nodes: usize, method: Method) -> Oscillator {
 }
 
 /// The device that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
-pub fn paper_device(nodes: usize) -> Device {
+pub fn paper_device(nodes: usize) -> NodalCoefficients {
     let mass = (0..nodes)
         .map(|i| 1.0 - 0.5 * (i + 1) as f64 / nodes as f64)
         .collect();
-    Device {
+    NodalCoefficients {
         mass,
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     }
@@ -49,7 +49,11 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .forward(&paper_device(nodes), INITIAL, None)
         .unwrap()
         .displacement;
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let list = quantities
         .into_iter()
         .zip(start)
@@ -58,7 +62,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let weighting = Weighting::Integral { spacing: step };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
-    let functions = Functions::new(list, nodes, step).unwrap();
+    let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }
 
@@ -102,7 +106,7 @@ pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
 }
 
 /// Simulated displacement of `device` with Gaussian noise.
-pub fn noisy(oscillator: &Oscillator, device: &Device, sigma: f64, seed: u64) -> Vec<f64> {
+pub fn noisy(oscillator: &System, device: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
@@ -117,7 +121,7 @@ pub fn noisy(oscillator: &Oscillator, device: &Device, sigma: f64, seed: u64) ->
 
 /// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
 pub fn problem_of(
-    oscillator: Oscillator,
+    oscillator: System,
     list: Vec<CoefficientFunction>,
     observed: Vec<f64>,
     sigma: Option<f64>,
@@ -129,7 +133,7 @@ pub fn problem_of(
     };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
-    let functions = Functions::new(list, nodes, step).unwrap();
+    let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(oscillator, functions, vec![experiment])
 }
 
@@ -164,7 +168,7 @@ pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
 }
 
 /// Largest distance of each function from the truth over the nodes, mass first.
-pub fn errors(found: &Device, truth: &Device) -> Vec<f64> {
+pub fn errors(found: &NodalCoefficients, truth: &NodalCoefficients) -> Vec<f64> {
     let largest = |(a, b): (&[f64], &[f64])| {
         a.iter()
             .zip(b)

@@ -7,7 +7,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
 use kmcfit_core::internals::system::{
-    Device, Excitation, Oscillator, State, Stepwise, Surroundings, Term,
+    Excitation, InputSample, NodalCoefficients, StageSamples, State, System, Term,
 };
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -16,8 +16,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// What moves, what drives it and where it starts.
 pub struct Truth<'a> {
-    pub oscillator: &'a Oscillator,
-    pub device: &'a Device,
+    pub oscillator: &'a System,
+    pub device: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub initial: State,
 }
@@ -25,7 +25,7 @@ pub struct Truth<'a> {
 impl Truth<'_> {
     /// Readings of a perfect sensor at `times`; force and base there are `around`, or else linear
     /// over each step.
-    pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[Surroundings]) -> Vec<f64> {
+    pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[InputSample]) -> Vec<f64> {
         let record = self.record();
         let states = record.motion();
         let grid = &self.oscillator.grid;
@@ -51,7 +51,7 @@ impl Truth<'_> {
 
     fn record(&self) -> Record<f64> {
         let steps = self.oscillator.grid.nodes() - 1;
-        let part = |choose: &dyn Fn(&Excitation) -> Option<Stepwise>| {
+        let part = |choose: &dyn Fn(&Excitation) -> Option<StageSamples>| {
             let given = self.excitation.and_then(choose);
             let mut values = given.map_or(Vec::new(), |p| p.values().to_vec());
             values.resize(steps, [0.0; 3]);

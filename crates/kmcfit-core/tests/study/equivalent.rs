@@ -1,6 +1,8 @@
 use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::study::equivalent::{Motion, Wish, anchors, equivalent, imbalance};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -9,17 +11,17 @@ const INITIAL: State = State {
     velocity: 1.0,
 };
 
-fn oscillator(nodes: usize, method: Method) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize, method: Method) -> System {
+    System {
         grid: Grid::new(0.0, 12.0, nodes).unwrap(),
         method,
         terms: vec![Term::Damping, Term::Stiffness],
     }
 }
 
-fn truth(grid: &Grid) -> Device {
+fn truth(grid: &Grid) -> NodalCoefficients {
     let each = |f: &dyn Fn(f64) -> f64| grid.times().iter().map(|t| f(*t)).collect();
-    Device {
+    NodalCoefficients {
         mass: each(&|t| 1.0 - 0.03 * t),
         coefficients: vec![each(&|_| 0.1), each(&|t| 1.0 + 0.1 * (0.5 * t).sin())],
     }
@@ -75,7 +77,7 @@ fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
 }
 
 /// Largest error of the equivalent device's motion by the midpoint rule.
-fn error(nodes: usize, seed: u64) -> (f64, Device, Motion) {
+fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, Motion) {
     let motion = motion(nodes);
     let mass = random_mass(seed, &motion.grid);
     let wish = Wish::near(vec![0.1; nodes], 0.05);

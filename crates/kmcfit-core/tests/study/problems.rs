@@ -2,11 +2,13 @@
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, Functions, Prior, Quantity, Scalar, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
-use kmcfit_core::internals::system::{Device, Excitation, Grid, Method, Oscillator, State, Term};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
 
 pub const SIGMA: f64 = 0.05;
 pub const REST: State = State {
@@ -14,8 +16,8 @@ pub const REST: State = State {
     velocity: 0.0,
 };
 
-pub fn oscillator(duration: f64, nodes: usize) -> Oscillator {
-    Oscillator {
+pub fn oscillator(duration: f64, nodes: usize) -> System {
+    System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -23,8 +25,8 @@ pub fn oscillator(duration: f64, nodes: usize) -> Oscillator {
 }
 
 /// One value for each function.
-pub fn device(nodes: usize, [m, c, k]: [f64; 3]) -> Device {
-    Device {
+pub fn device(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
+    NodalCoefficients {
         mass: vec![m; nodes],
         coefficients: vec![vec![c; nodes], vec![k; nodes]],
     }
@@ -36,7 +38,11 @@ pub fn constants(
     sought: [Option<f64>; 3],
     known: [f64; 3],
 ) -> Vec<CoefficientFunction> {
-    let quantities = [Quantity::Mass, Quantity::Damping, Quantity::Stiffness];
+    let quantities = [
+        CoefficientKind::Mass,
+        CoefficientKind::Damping,
+        CoefficientKind::Stiffness,
+    ];
     let each = quantities.into_iter().zip(sought).zip(known);
     each.map(|((quantity, sought), known)| match sought {
         Some(start) => CoefficientFunction::constant(quantity, start, nodes),
@@ -47,8 +53,8 @@ pub fn constants(
 
 /// Readings of `truth` at every `stride`-th node with noise of the seed.
 pub fn readings(
-    oscillator: &Oscillator,
-    truth: &Device,
+    oscillator: &System,
+    truth: &NodalCoefficients,
     excitation: Option<&Excitation>,
     stride: usize,
     sigma: f64,
@@ -66,13 +72,13 @@ pub fn readings(
 
 /// Readings from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
 pub fn problem(
-    oscillator: Oscillator,
+    oscillator: System,
     list: Vec<CoefficientFunction>,
-    scalars: Vec<Scalar>,
+    scalars: Vec<ScalarParameter>,
     record: Record,
 ) -> Problem {
     let grid = oscillator.grid;
-    let functions = Functions::new(list, grid.nodes(), grid.step()).unwrap();
+    let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
     let channel =
         Channel::displacement_at_nodes(record.readings, record.stride, record.weighting, &grid)
             .with_sensor(record.sensor);
@@ -108,8 +114,8 @@ impl Record {
     }
 }
 
-pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> Scalar {
-    Scalar {
+pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> ScalarParameter {
+    ScalarParameter {
         name: name.into(),
         unit: "m".into(),
         start,
@@ -172,7 +178,7 @@ pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) ->
     };
     let start = basis.constant(&grid, 2.0);
     let mut list = constants(201, [None, Some(0.1), None], [1.0, 0.0, 2.0]);
-    list[2] = CoefficientFunction::free(Quantity::Stiffness, basis, &grid, start);
+    list[2] = CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, start);
     let record = Record {
         weighting: Weighting::Sigma(sigma),
         ..Record::of(values, 2)

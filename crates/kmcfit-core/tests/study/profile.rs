@@ -3,7 +3,9 @@ use crate::problems::{
     Record, bound, constants, device, linear, oscillator, problem, readings, regular, scalar,
 };
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Penalty, Quantity, Value};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Penalty, Value,
+};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
@@ -222,7 +224,7 @@ fn a_nodal_function_has_a_profile() {
     let device = crate::common::paper_device(101);
     let values = crate::common::noisy(&oscillator, &device, sigma, 5);
     let mut list = constants(101, [None; 3], [1.0, 0.0, 1.0]);
-    list[0] = CoefficientFunction::nodal(Quantity::Mass, vec![1.0; 101]);
+    list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(oscillator, list, values, Some(sigma));
     let rows = Basis::Nodal.roughness(&problem.oscillator.grid, 2);
     problem.penalties.push(Penalty::new(0, 2, 1e4, rows));

@@ -188,7 +188,8 @@ fn ratios_have_tubes_of_their_own() {
     let n = oscillator.grid.nodes();
     let list = crate::problems::constants(n, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     problem.functions =
-        kmcfit_core::internals::functions::Functions::new(list, n, oscillator.grid.step()).unwrap();
+        kmcfit_core::internals::functions::Parameterization::new(list, n, oscillator.grid.step())
+            .unwrap();
     let (best, misfit) = optimum(&problem);
     let level = Level::of(misfit + QUANTILE_95);
     let targets = ratios_at(&problem, 2, 0, &[3.0]);

@@ -9,7 +9,7 @@ use crate::config::build::functions::slots;
 use crate::config::scalar::NumberOrColumn;
 use crate::config::spec::FunctionSpec;
 use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, Quantity};
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind};
 use kmcfit_core::internals::problem::Problem;
 
 /// A warning where `statement`, which stands at `key`, means nothing.
@@ -22,16 +22,16 @@ pub(super) fn says_nothing(
     let what = match statement {
         Statement::Passive => "passivity",
         Statement::Shape {
-            of: Quantity::Mass,
+            of: CoefficientKind::Mass,
             shape: Shape::NonIncreasing | Shape::NonDecreasing,
         } => "a monotone mass",
         Statement::Shape {
-            of: Quantity::Stiffness,
+            of: CoefficientKind::Stiffness,
             shape: Shape::NonIncreasing | Shape::NonDecreasing,
         } => "a monotone stiffness",
         Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
-            Quantity::Mass => "a slope of the mass in one direction",
-            Quantity::Stiffness => "a slope of the stiffness in one direction",
+            CoefficientKind::Mass => "a slope of the mass in one direction",
+            CoefficientKind::Stiffness => "a slope of the stiffness in one direction",
             _ => return None,
         },
         _ => return None,

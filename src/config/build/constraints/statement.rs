@@ -7,7 +7,7 @@ use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
 use crate::digits::clock;
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 
 /// How far outside the record a time may be, in steps, to be taken for its end.
@@ -108,7 +108,7 @@ pub(super) fn bounds(
     file: &ModelFile,
     grid: &Grid,
     key: &str,
-    of: Quantity,
+    of: CoefficientKind,
     (min, max): (&Option<NumberOrColumn>, &Option<NumberOrColumn>),
 ) -> Result<Statement, InputError> {
     let limit = |name: &str, given: &Option<NumberOrColumn>| match given {
@@ -206,7 +206,7 @@ impl Reader<'_> {
         }
     }
 
-    fn of(&self) -> Quantity {
+    fn of(&self) -> CoefficientKind {
         // Kinds without a function do not ask.
         quantity(self.spec.function.unwrap_or(FunctionName::Mass))
     }
@@ -402,14 +402,14 @@ impl Reader<'_> {
     }
 }
 
-fn quantity(name: FunctionName) -> Quantity {
+fn quantity(name: FunctionName) -> CoefficientKind {
     match name {
-        FunctionName::Mass => Quantity::Mass,
-        FunctionName::Damping => Quantity::Damping,
-        FunctionName::Stiffness => Quantity::Stiffness,
-        FunctionName::CubicStiffness => Quantity::CubicStiffness,
-        FunctionName::QuadraticDamping => Quantity::QuadraticDamping,
-        FunctionName::CoulombFriction => Quantity::CoulombFriction,
-        FunctionName::Offset => Quantity::Offset,
+        FunctionName::Mass => CoefficientKind::Mass,
+        FunctionName::Damping => CoefficientKind::Damping,
+        FunctionName::Stiffness => CoefficientKind::Stiffness,
+        FunctionName::CubicStiffness => CoefficientKind::CubicStiffness,
+        FunctionName::QuadraticDamping => CoefficientKind::QuadraticDamping,
+        FunctionName::CoulombFriction => CoefficientKind::CoulombFriction,
+        FunctionName::Offset => CoefficientKind::Offset,
     }
 }

@@ -7,7 +7,7 @@ use crate::config::spec::{ExperimentSpec, InitialSpec};
 use crate::digits::{clock, significant};
 use crate::error::InputError;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
@@ -255,7 +255,7 @@ fn offsets(
     open: &dyn Fn(Option<usize>) -> bool,
 ) -> Result<(), InputError> {
     let mut functions = problem.functions.iter();
-    let sought = functions.any(|f| f.quantity == Quantity::Offset && f.parameters() > 0);
+    let sought = functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
     let shifted = |e: &kmcfit_core::internals::record::Experiment| {
         let sees = |c: &kmcfit_core::internals::record::Channel| {
             c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index())

@@ -6,14 +6,14 @@ use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
 use crate::error::InputError;
 use crate::units::Kind;
-use kmcfit_core::internals::record::{BaseMotion, Drive, Experiment, Waveform};
+use kmcfit_core::internals::record::{BaseMotion, Experiment, Input, Waveform};
 use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
 use kmcfit_core::internals::system::Grid;
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]
 pub struct RawExcitation {
-    drive: Drive,
+    drive: Input,
 }
 
 impl RawExcitation {
@@ -80,7 +80,7 @@ pub fn read(
         }
     };
     let base = base(file, i, spec, warnings)?;
-    let drive = Drive { force, base };
+    let drive = Input { force, base };
     Ok(RawExcitation { drive })
 }
 

@@ -6,8 +6,8 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, InitialSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::functions::{Scalar, Value};
-use kmcfit_core::internals::objective::state_sizes;
+use kmcfit_core::internals::functions::{ScalarParameter, Value};
+use kmcfit_core::internals::objective::state_scales;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
 
@@ -16,7 +16,7 @@ pub fn build(
     file: &ModelFile,
     i: usize,
     record: Option<&Record>,
-    scalars: &mut Vec<Scalar>,
+    scalars: &mut Vec<ScalarParameter>,
 ) -> Result<(State, [Option<usize>; 2]), InputError> {
     let estimate: EstimateValue = ScalarOr::Scalar(NumberOrEstimate::Estimate);
     let given: [&EstimateValue; 2] = match &file.spec.experiments[i].initial {
@@ -61,7 +61,7 @@ pub fn build(
 /// How large displacement and velocity are, from the channel nearest to a displacement.
 fn sizes(record: &Record) -> [f64; 2] {
     match record.channels.iter().min_by_key(|c| c.kind) {
-        Some(c) => state_sizes(c.kind, &c.values, c.median_spacing),
+        Some(c) => state_scales(c.kind, &c.values, c.median_spacing),
         None => [1.0; 2],
     }
 }

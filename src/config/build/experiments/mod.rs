@@ -17,7 +17,7 @@ use crate::observations::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
-use kmcfit_core::internals::functions::Scalar;
+use kmcfit_core::internals::functions::ScalarParameter;
 use kmcfit_core::internals::record::{ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::system::Grid;
 
@@ -72,7 +72,7 @@ pub struct ChannelNote {
 pub(super) struct Built {
     pub fitted: Vec<Experiment>,
     pub notes: Vec<Vec<ChannelNote>>,
-    pub scalars: Vec<Scalar>,
+    pub scalars: Vec<ScalarParameter>,
     pub held_out: Vec<HoldOut>,
 }
 
@@ -82,7 +82,7 @@ pub struct HoldOut {
     /// The experiment; what it leaves open are the scalars beside it.
     pub experiment: Experiment,
     /// Numbers of its own that are found from it with the functions held.
-    pub scalars: Vec<Scalar>,
+    pub scalars: Vec<ScalarParameter>,
     /// What a report says about its channels.
     pub notes: Vec<ChannelNote>,
 }
@@ -267,7 +267,7 @@ fn place(
     grid: &Grid,
     (i, device): (usize, usize),
     record: Option<Record>,
-    scalars: &mut Vec<Scalar>,
+    scalars: &mut Vec<ScalarParameter>,
 ) -> Result<(Experiment, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
     let nodes = match &record {
@@ -298,7 +298,7 @@ fn place(
 /// The nodes that a motion needs to reach `end`.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
-    let steps = (steps - kmcfit_core::internals::system::Place::SAME_TIME)
+    let steps = (steps - kmcfit_core::internals::system::TimePoint::SAME_TIME)
         .ceil()
         .max(0.0);
     (steps as usize + 1).clamp(Grid::FEWEST_NODES, grid.nodes())

@@ -4,7 +4,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::EstimateValue;
 use crate::error::InputError;
-use kmcfit_core::internals::functions::{Prior, Scalar, Value};
+use kmcfit_core::internals::functions::{Prior, ScalarParameter, Value};
 
 /// A number of the model and what a report calls it.
 pub struct Named<'a> {
@@ -25,7 +25,7 @@ pub fn value(
     file: &ModelFile,
     named: &Named,
     given: &EstimateValue,
-    scalars: &mut Vec<Scalar>,
+    scalars: &mut Vec<ScalarParameter>,
 ) -> Result<Value, InputError> {
     let (start, prior) = match given {
         ScalarOr::Scalar(NumberOrEstimate::Number(number)) => return Ok(Value::Known(number.0)),
@@ -48,7 +48,7 @@ pub fn value(
         }),
     };
     let size = if named.size > 0.0 { named.size } else { 1.0 };
-    scalars.push(Scalar {
+    scalars.push(ScalarParameter {
         name: named.name.clone(),
         unit: named.unit.to_owned(),
         start: start.or(prior.map(|p| p.mean)).unwrap_or(named.start),

@@ -3,7 +3,7 @@
 use super::linear;
 use crate::config::{Model, StudyPlan};
 use crate::report::study::pieces::*;
-use kmcfit_core::internals::functions::Functions;
+use kmcfit_core::internals::functions::Parameterization;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::study::Linear;
 use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
@@ -67,7 +67,7 @@ pub fn multistart(
         });
     }
     // Below this share of what there is to explain a difference of costs is rounding.
-    let rounding = 1e-12 * problem.misfit_of_silence();
+    let rounding = 1e-12 * problem.zero_response_misfit();
     if let (Ok(here), Some(best)) = (problem.evaluate(theta), waterfall.costs().first()) {
         if *best < here.cost * (1.0 - 1e-6) - rounding {
             sentences.push(format!(
@@ -98,7 +98,7 @@ pub fn multistart(
 }
 
 /// Between the start divided and multiplied by `spread`; about zero where the start is zero.
-fn ranges(functions: &Functions, spread: f64) -> Vec<[f64; 2]> {
+fn ranges(functions: &Parameterization, spread: f64) -> Vec<[f64; 2]> {
     let around = |start: f64, size: f64| match start == 0.0 {
         true => [-size, size],
         false => {

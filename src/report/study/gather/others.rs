@@ -4,14 +4,14 @@ use crate::config::{Equivalent, StudyPlan};
 use crate::report::study::pieces::*;
 use crate::report::study::text::ENDED;
 use kmcfit_core::internals::diagnostics::chi_square_one;
-use kmcfit_core::internals::functions::Quantity;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::study::equivalent::{Motion, Wish, equivalent};
 use kmcfit_core::internals::study::pull_apart::{
     Ended, Extreme, Level, ratios_at, tube, values_at,
 };
-use kmcfit_core::internals::system::{Device, Grid, State};
+use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
 
 /// Roughness that the devices in a tube may have, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
@@ -59,16 +59,16 @@ pub fn tubes(
             jobs.push((function.name(), unit, values_at(problem, f, &plan.tubes)));
         }
     }
-    let of = |q: Quantity| {
+    let of = |q: CoefficientKind| {
         main.iter()
             .find(|f| problem.functions.get(**f).quantity == q)
     };
     let ratios = [
-        ("k/m", Quantity::Stiffness, "1/s^2"),
-        ("c/m", Quantity::Damping, "1/s"),
+        ("k/m", CoefficientKind::Stiffness, "1/s^2"),
+        ("c/m", CoefficientKind::Damping, "1/s"),
     ];
     for (name, over, unit) in ratios {
-        if let (Some(&over), Some(&mass)) = (of(over), of(Quantity::Mass)) {
+        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::Mass)) {
             let targets = ratios_at(problem, over, mass, &plan.tubes);
             jobs.push((name.to_owned(), unit.to_owned(), targets));
         }
@@ -191,7 +191,12 @@ fn factors(mass: &[f64]) -> Vec<Equivalent> {
     each.collect()
 }
 
-fn record(grid: &Grid, name: &str, device: &Device, motion_error: f64) -> EquivalentRecord {
+fn record(
+    grid: &Grid,
+    name: &str,
+    device: &NodalCoefficients,
+    motion_error: f64,
+) -> EquivalentRecord {
     EquivalentRecord {
         name: name.into(),
         times: grid.times(),

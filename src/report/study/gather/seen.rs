@@ -11,7 +11,7 @@ use kmcfit_core::internals::identifiability::{
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::system::Device;
+use kmcfit_core::internals::system::NodalCoefficients;
 
 /// Directions that are drawn of each end of the spectrum.
 const DIRECTIONS: usize = 3;
@@ -62,7 +62,7 @@ pub fn bands(
     theta: &[f64],
     evaluation: &Evaluation,
     plan: &StudyPlan,
-    truth: Option<&Device>,
+    truth: Option<&NodalCoefficients>,
 ) -> BandsPiece {
     let settings = BandSettings {
         draws: DRAWS,

@@ -23,7 +23,7 @@ mod values;
 pub use shape::Shape;
 
 use super::Constraints;
-use crate::functions::{CoefficientFunction, Functions, Quantity};
+use crate::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use crate::system::Grid;
 use std::fmt;
 
@@ -66,7 +66,7 @@ pub enum Statement {
     /// `min <= p(t) <= max`, in the unit of the function.
     Bounds {
         /// The function `p`.
-        of: Quantity,
+        of: CoefficientKind,
         /// Smallest value.
         min: Option<Limit>,
         /// Largest value.
@@ -76,7 +76,7 @@ pub enum Statement {
     /// differences between the centres of neighbouring cells.
     Slope {
         /// The function `p`.
-        of: Quantity,
+        of: CoefficientKind,
         /// Smallest slope.
         min: Option<f64>,
         /// Largest slope.
@@ -85,14 +85,14 @@ pub enum Statement {
     /// Monotone or curved in one direction.
     Shape {
         /// The function.
-        of: Quantity,
+        of: CoefficientKind,
         /// Which shape.
         shape: Shape,
     },
     /// `p(at) = value`; a time within 1e-6 steps of a knot is that knot.
     Value {
         /// The function `p`.
-        of: Quantity,
+        of: CoefficientKind,
         /// Time, s.
         at: f64,
         /// Value, in the unit of the function.
@@ -101,14 +101,14 @@ pub enum Statement {
     /// `1/T integral p dt = value`, exactly.
     Mean {
         /// The function `p`.
-        of: Quantity,
+        of: CoefficientKind,
         /// Value, in the unit of the function.
         value: f64,
     },
     /// `integral p dt = value` over the record, exactly.
     Integral {
         /// The function `p`.
-        of: Quantity,
+        of: CoefficientKind,
         /// Value, in (unit of the function) s.
         value: f64,
     },
@@ -116,9 +116,9 @@ pub enum Statement {
     /// between knots or of the same basis, else at the nodes.
     Equal {
         /// First function.
-        first: Quantity,
+        first: CoefficientKind,
         /// Second function.
-        second: Quantity,
+        second: CoefficientKind,
         /// Factor of the second.
         ratio: f64,
     },
@@ -149,9 +149,9 @@ pub enum Statement {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Impossible {
     /// The device has no such function.
-    Absent(Quantity),
+    Absent(CoefficientKind),
     /// All functions that it is about are fixed.
-    Fixed(Vec<Quantity>),
+    Fixed(Vec<CoefficientKind>),
     /// No parameters can change that this row is broken.
     Broken {
         /// Name of the row's group.
@@ -163,7 +163,7 @@ pub enum Impossible {
 
 impl Statement {
     /// The functions that it is about.
-    pub fn functions(&self) -> Vec<Quantity> {
+    pub fn functions(&self) -> Vec<CoefficientKind> {
         match self {
             Statement::Bounds { of, .. }
             | Statement::Slope { of, .. }
@@ -172,9 +172,13 @@ impl Statement {
             | Statement::Mean { of, .. }
             | Statement::Integral { of, .. } => vec![*of],
             Statement::Equal { first, second, .. } => vec![*first, *second],
-            Statement::Frequency { .. } => vec![Quantity::Mass, Quantity::Stiffness],
+            Statement::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
             Statement::Passive | Statement::DampingRatio { .. } => {
-                vec![Quantity::Mass, Quantity::Damping, Quantity::Stiffness]
+                vec![
+                    CoefficientKind::Mass,
+                    CoefficientKind::Damping,
+                    CoefficientKind::Stiffness,
+                ]
             }
         }
     }
@@ -184,19 +188,23 @@ impl Statement {
     ///
     /// # Errors
     /// If it is about fixed functions only, or no parameters can fulfil a row of it.
-    pub fn build(&self, grid: &Grid, functions: &Functions) -> Result<Constraints, Impossible> {
+    pub fn build(
+        &self,
+        grid: &Grid,
+        functions: &Parameterization,
+    ) -> Result<Constraints, Impossible> {
         self.build_for(grid, functions, 0)
     }
 
     /// [`Statement::build`] about the functions of device `device` of
-    /// [`Functions::assemblies`].
+    /// [`Parameterization::assemblies`].
     ///
     /// # Errors
     /// As [`Statement::build`].
     pub fn build_for(
         &self,
         grid: &Grid,
-        functions: &Functions,
+        functions: &Parameterization,
         device: usize,
     ) -> Result<Constraints, Impossible> {
         let all = All::new(grid, functions, device);
@@ -248,13 +256,13 @@ impl Statement {
 /// All functions on their grid.
 struct All<'a> {
     grid: &'a Grid,
-    functions: &'a Functions,
+    functions: &'a Parameterization,
     list: Vec<&'a CoefficientFunction>,
     assembly: &'a [usize],
 }
 
 impl<'a> All<'a> {
-    fn new(grid: &'a Grid, functions: &'a Functions, device: usize) -> Self {
+    fn new(grid: &'a Grid, functions: &'a Parameterization, device: usize) -> Self {
         Self {
             grid,
             functions,
@@ -263,7 +271,7 @@ impl<'a> All<'a> {
         }
     }
 
-    fn index(&self, quantity: Quantity) -> Result<usize, Impossible> {
+    fn index(&self, quantity: CoefficientKind) -> Result<usize, Impossible> {
         let is_meant = |f: &&usize| self.list[**f].quantity == quantity;
         let found = self.assembly.iter().find(is_meant);
         found.copied().ok_or(Impossible::Absent(quantity))

@@ -1,7 +1,7 @@
 //! Cubic B-splines: smooth functions with local parameters.
 
 use super::knots::Knots;
-use super::space::Space;
+use super::space::BasisFunctions;
 
 /// Degree of the pieces.
 const DEGREE: usize = 3;
@@ -27,7 +27,7 @@ impl CubicSpline {
     }
 }
 
-impl Space for CubicSpline {
+impl BasisFunctions for CubicSpline {
     fn parameters(&self) -> usize {
         self.knots.cells() + DEGREE
     }

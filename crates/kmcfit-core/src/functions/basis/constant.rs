@@ -1,7 +1,7 @@
 //! One value for all times.
 
 use super::knots::uniform_knots;
-use super::space::Space;
+use super::space::BasisFunctions;
 use crate::system::Grid;
 
 /// The function 1.
@@ -18,7 +18,7 @@ impl Constant {
     }
 }
 
-impl Space for Constant {
+impl BasisFunctions for Constant {
     fn parameters(&self) -> usize {
         1
     }

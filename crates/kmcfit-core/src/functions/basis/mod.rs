@@ -21,7 +21,7 @@ use super::{Design, Gram};
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
-use space::{Space, matrix};
+use space::{BasisFunctions, matrix};
 
 /// How often [`Basis::project`] corrects its solution of the normal equations; the second pass
 /// removes what the first one lost to rounding.
@@ -77,7 +77,7 @@ impl Basis {
     }
 
     /// The functions of this basis on a record: the one place where the kinds are told apart.
-    fn on(&self, grid: &Grid) -> Box<dyn Space> {
+    fn on(&self, grid: &Grid) -> Box<dyn BasisFunctions> {
         match self {
             Basis::Nodal => Box::new(piecewise_linear::PiecewiseLinear::on_nodes(grid)),
             Basis::Constant => Box::new(constant::Constant::on(grid)),

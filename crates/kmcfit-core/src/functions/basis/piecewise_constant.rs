@@ -2,7 +2,7 @@
 
 use super::differences;
 use super::knots::Knots;
-use super::space::{Space, square_integral};
+use super::space::{BasisFunctions, square_integral};
 use nalgebra_sparse::CsrMatrix;
 
 /// The indicator functions of the cells.
@@ -25,7 +25,7 @@ impl PiecewiseConstant {
     }
 }
 
-impl Space for PiecewiseConstant {
+impl BasisFunctions for PiecewiseConstant {
     fn parameters(&self) -> usize {
         self.knots.cells()
     }

@@ -2,7 +2,7 @@
 
 use super::differences;
 use super::knots::Knots;
-use super::space::{Space, square_integral};
+use super::space::{BasisFunctions, square_integral};
 use crate::system::Grid;
 use nalgebra_sparse::CsrMatrix;
 
@@ -27,7 +27,7 @@ impl PiecewiseLinear {
     }
 }
 
-impl Space for PiecewiseLinear {
+impl BasisFunctions for PiecewiseLinear {
     fn parameters(&self) -> usize {
         self.knots.times().len()
     }

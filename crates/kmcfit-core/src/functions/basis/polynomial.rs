@@ -5,7 +5,7 @@
 
 use super::knots::uniform_knots;
 use super::legendre::legendre;
-use super::space::Space;
+use super::space::BasisFunctions;
 use crate::system::Grid;
 
 /// `P_n(x)`, `n = 0..=degree`, with `x = 2 (t - start) / duration - 1`.
@@ -24,7 +24,7 @@ impl Legendre {
     }
 }
 
-impl Space for Legendre {
+impl BasisFunctions for Legendre {
     fn parameters(&self) -> usize {
         self.degree + 1
     }

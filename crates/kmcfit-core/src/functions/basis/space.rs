@@ -4,7 +4,7 @@ use super::legendre;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 /// The functions `b_j` of a basis on a record: polynomials between break points.
-pub(super) trait Space {
+pub(super) trait BasisFunctions {
     /// Number of functions.
     fn parameters(&self) -> usize;
 
@@ -26,7 +26,7 @@ pub(super) trait Space {
 }
 
 /// The matrix with one row per time and factor: `factor * d^derivative b_j / dt^derivative`.
-pub(super) fn matrix<S: Space + ?Sized>(
+pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     space: &S,
     rows: impl ExactSizeIterator<Item = (f64, f64)>,
     derivative: usize,
@@ -45,7 +45,10 @@ pub(super) fn matrix<S: Space + ?Sized>(
 
 /// `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule:
 /// `degree - order + 1` rows per cell.
-pub(super) fn square_integral<S: Space + ?Sized>(space: &S, order: usize) -> CsrMatrix<f64> {
+pub(super) fn square_integral<S: BasisFunctions + ?Sized>(
+    space: &S,
+    order: usize,
+) -> CsrMatrix<f64> {
     let Some(rest) = space.degree().checked_sub(order) else {
         return CsrMatrix::zeros(0, space.parameters());
     };

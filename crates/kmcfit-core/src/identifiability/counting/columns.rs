@@ -2,7 +2,7 @@
 
 use crate::problem::Problem;
 use crate::record::ChannelKind;
-use crate::system::{Method, Place};
+use crate::system::{Method, TimePoint};
 
 /// The nodes whose values act on some reading.
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
@@ -15,7 +15,7 @@ pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
 }
 
 /// The last node whose values act on a reading; `None` if none does.
-pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: Place) -> Option<usize> {
+pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint) -> Option<usize> {
     match (kind, place.as_node(), problem.oscillator.method) {
         (ChannelKind::Acceleration, Some(node), _) => Some(node),
         (_, Some(0), _) => None,
@@ -26,7 +26,7 @@ pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: Place) ->
     }
 }
 
-fn readings(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, Place)> + '_ {
+fn readings(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimePoint)> + '_ {
     let experiments = problem.experiments.iter().enumerate();
     experiments.flat_map(|(e, experiment)| {
         let channels = experiment.channels.iter();

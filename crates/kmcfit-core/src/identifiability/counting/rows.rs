@@ -6,7 +6,7 @@ use super::columns::last_acting;
 use crate::functions::Basis;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment};
-use crate::system::{Method, Place};
+use crate::system::{Method, TimePoint};
 use std::collections::BTreeMap;
 
 /// Two inputs are independent if this share of one is left beside the others.
@@ -17,7 +17,7 @@ type Key = (usize, ChannelKind, usize, u64);
 
 /// The number of independent equations, and what is to be said of them.
 pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
-    let mut groups: BTreeMap<Key, (Place, Vec<usize>)> = BTreeMap::new();
+    let mut groups: BTreeMap<Key, (TimePoint, Vec<usize>)> = BTreeMap::new();
     let mut others = 0;
     for (e, experiment) in problem.experiments.iter().enumerate() {
         for channel in &experiment.channels {
@@ -26,7 +26,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
                 let known = experiment.sought == [None; 2]
                     && channel.sensor().indices() == [None; 3]
                     && channel.filter().is_empty();
-                let acts = |p: &&Place| last_acting(problem, channel.kind(), **p).is_some();
+                let acts = |p: &&TimePoint| last_acting(problem, channel.kind(), **p).is_some();
                 others += match known {
                     true => channel.places().iter().filter(acts).count(),
                     false => channel.len(),
@@ -160,7 +160,7 @@ impl Inputs {
     }
 
     /// Independent inputs that act on a reading.
-    fn rank(&self, kind: ChannelKind, place: Place, last: usize) -> usize {
+    fn rank(&self, kind: ChannelKind, place: TimePoint, last: usize) -> usize {
         let stage = |step: Option<usize>, s: usize| match step {
             Some(step) => self.after[step.min(self.after.len() - 1)][s],
             None => self.initially,

@@ -3,9 +3,9 @@
 mod moving;
 mod reader;
 
-use super::{Evaluation, View};
+use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::record::{Channel, Experiment, LONG};
+use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
 use crate::simd::tall_qr::Piece;
@@ -99,7 +99,7 @@ impl Problem {
             return None;
         };
         let steps = experiment.nodes - 1;
-        (steps >= LONG).then(|| steps / 2 / TILE * TILE)
+        (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
     /// [`Problem::each_piece`] for the readings in some steps of the only record, which begin with a tile, and how
@@ -134,7 +134,7 @@ impl Problem {
 fn sweep(
     problem: &Problem,
     experiment: &Experiment,
-    view: View,
+    view: SimulatedRecord,
     order: &[usize],
     mut row: usize,
     steps: Range<usize>,
@@ -194,7 +194,7 @@ fn sweep(
 }
 
 /// What the sensor of one channel adds to its rows, from `row` on, and what its filter makes of them.
-fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<f64>) {
+fn add_sensor(channel: &Channel, view: SimulatedRecord, row: usize, jacobian: &mut DMatrix<f64>) {
     let parameters = jacobian.ncols();
     let scalars = parameters - view.scalars.len();
     for (role, index) in channel.sensor().indices().into_iter().enumerate() {
@@ -222,11 +222,11 @@ fn add_sensor(channel: &Channel, view: View, row: usize, jacobian: &mut DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+    use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
     use crate::objective::GradientKind;
     use crate::record::ChannelKind;
     use crate::record::Weighting;
-    use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
+    use crate::system::{Excitation, Grid, Method, State, System, Term};
 
     const NODES: usize = 70;
 
@@ -245,13 +245,13 @@ mod tests {
             }
         };
         let list = vec![
-            CoefficientFunction::constant(Quantity::Mass, 1.3, NODES),
-            function(Quantity::Damping, 5, 0.2),
-            function(Quantity::Stiffness, 20, 2.0),
-            function(Quantity::Stiffness, 20, 3.0),
+            CoefficientFunction::constant(CoefficientKind::Mass, 1.3, NODES),
+            function(CoefficientKind::Damping, 5, 0.2),
+            function(CoefficientKind::Stiffness, 20, 2.0),
+            function(CoefficientKind::Stiffness, 20, 3.0),
         ];
         let devices = vec![vec![0, 1, 2], vec![0, 1, 3]];
-        let functions = Functions::with_devices(list, devices, NODES, grid.step());
+        let functions = Parameterization::with_devices(list, devices, NODES, grid.step());
         let force: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin()).collect();
         let record = |device: usize, nodes: usize| {
             let channel = |kind, at: Vec<usize>| {
@@ -270,7 +270,7 @@ mod tests {
                     .with_channel(channel(ChannelKind::Displacement, thirds))
             }
         };
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid,
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness],

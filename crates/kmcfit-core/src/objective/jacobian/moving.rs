@@ -1,6 +1,6 @@
 //! Which functions change along which parameter, tile by tile.
 
-use crate::functions::{Design, Functions, Runs};
+use crate::functions::{Design, Parameterization, RowRuns};
 use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
@@ -18,7 +18,7 @@ pub(super) struct Moving<'a> {
 
 struct Part<'a> {
     design: &'a Design,
-    runs: Option<&'a Runs>,
+    runs: Option<&'a RowRuns>,
     /// The slots of its groups.
     slots: Vec<usize>,
     /// Slot and lane of each of its parameters.
@@ -28,7 +28,7 @@ struct Part<'a> {
 
 impl<'a> Moving<'a> {
     /// `order` is the parameter at each place, [`LANES`] places a group.
-    pub fn new(functions: &'a Functions, order: &[usize], experiment: &Experiment) -> Self {
+    pub fn new(functions: &'a Parameterization, order: &[usize], experiment: &Experiment) -> Self {
         let mut places = vec![0; order.len()];
         for (place, j) in order.iter().enumerate() {
             places[*j] = place;
@@ -137,7 +137,7 @@ impl Part<'_> {
         }
     }
 
-    fn fill_runs(&self, runs: &Runs, tangents: &mut Tangents, first: usize) {
+    fn fill_runs(&self, runs: &RowRuns, tangents: &mut Tangents, first: usize) {
         for piece in runs.within(first..first + TILE_NODES) {
             let nodes = piece.rows.start - first..piece.rows.end - first;
             for (j, entries) in std::iter::once(piece.first).chain(piece.second) {

@@ -1,10 +1,10 @@
 //! The tangents of one channel's readings, tile by tile.
 
-use crate::objective::View;
+use crate::objective::SimulatedRecord;
 use crate::record::Channel;
 use crate::simd::tall_qr::Piece;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
-use crate::simulate::Sensed;
+use crate::simulate::Observation;
 use crate::simulate::fast::nodal_observations::Accelerations;
 use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
 use crate::system::FUNCTIONS;
@@ -13,7 +13,7 @@ use std::ops::Range;
 /// Takes the tangents of one channel's readings, tile by tile.
 pub(super) struct Reader<'a> {
     channel: &'a Channel,
-    view: View<'a>,
+    view: SimulatedRecord<'a>,
     /// Reading to go on with.
     next: usize,
     gain: f64,
@@ -55,7 +55,7 @@ impl Glance {
         seen: Accelerations::NOTHING,
     };
 
-    fn set(&mut self, l: usize, sensed: &Sensed) {
+    fn set(&mut self, l: usize, sensed: &Observation) {
         self.states[l] = sensed.states;
         self.functions[l] = sensed.functions;
     }
@@ -63,7 +63,7 @@ impl Glance {
 
 impl<'a> Reader<'a> {
     /// From reading `next` on.
-    pub fn new(channel: &'a Channel, view: View<'a>, next: usize) -> Self {
+    pub fn new(channel: &'a Channel, view: SimulatedRecord<'a>, next: usize) -> Self {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
             kind: match () {

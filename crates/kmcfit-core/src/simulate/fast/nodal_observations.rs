@@ -5,7 +5,7 @@ use super::elements::with_known;
 use super::padded_loads;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
-use crate::system::{Device, FUNCTIONS, MOST_TERMS, Oscillator, Term};
+use crate::system::{FUNCTIONS, MOST_TERMS, NodalCoefficients, System, Term};
 
 /// Accelerations at eight nodes and their derivatives, one node a lane.
 #[derive(Debug, Clone, Copy)]
@@ -30,8 +30,8 @@ impl Accelerations {
 /// A response observed at its nodes.
 #[derive(Clone, Copy)]
 pub(crate) struct NodalObservations<'a> {
-    pub oscillator: &'a Oscillator,
-    pub device: &'a Device,
+    pub oscillator: &'a System,
+    pub device: &'a NodalCoefficients,
     pub states: &'a Trajectory,
 }
 

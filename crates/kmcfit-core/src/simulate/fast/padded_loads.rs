@@ -1,7 +1,7 @@
 //! Eight neighbouring values of what is known at the nodes or over the steps.
 
 use crate::simd::{Arithmetic, Eight, LANES, Row, window};
-use crate::system::Stepwise;
+use crate::system::StageSamples;
 
 /// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.
 #[inline(always)]
@@ -26,10 +26,10 @@ pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> 
 #[inline(always)]
 pub(crate) fn stepwise<A: Arithmetic>(
     arithmetic: A,
-    part: Option<&Stepwise>,
+    part: Option<&StageSamples>,
     i: usize,
 ) -> [Eight<A>; 3] {
-    let Some(steps) = part.map(Stepwise::values) else {
+    let Some(steps) = part.map(StageSamples::values) else {
         return [Eight::splat(arithmetic, 0.0); 3];
     };
     let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);

@@ -402,12 +402,12 @@ impl Phi {
 mod tests {
     use super::*;
     use crate::simulate::{Engine, reference};
-    use crate::system::{Device, Excitation, Grid, Oscillator};
+    use crate::system::{Excitation, Grid, NodalCoefficients, System};
 
     /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
     #[test]
     fn functions_that_are_constant_at_first() {
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
@@ -429,7 +429,7 @@ mod tests {
                 };
                 (0..41).map(|i| value + grows(i)).collect()
             };
-            let device = Device {
+            let device = NodalCoefficients {
                 mass: values(0, 1.2),
                 coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
             };

@@ -10,7 +10,7 @@ use super::step_linearisation::{self, StepLinearisation, Wanted};
 use crate::simd::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
-use crate::system::{Device, Excitation, FUNCTIONS, Method, Oscillator};
+use crate::system::{Excitation, FUNCTIONS, Method, NodalCoefficients, System};
 use std::ops::Range;
 
 /// Steps of a tile.
@@ -74,8 +74,8 @@ pub(crate) struct Tangents {
 /// The response about which tangents are taken.
 #[derive(Clone, Copy)]
 pub(crate) struct BaseTrajectory<'a> {
-    pub oscillator: &'a Oscillator,
-    pub device: &'a Device,
+    pub oscillator: &'a System,
+    pub device: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub motion: &'a Trajectory,
 }

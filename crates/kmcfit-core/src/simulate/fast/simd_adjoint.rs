@@ -4,8 +4,8 @@
 use super::step_linearisation::{self, StepLinearisation, Wanted};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::equation::EquationOfMotion;
-use crate::simulate::{Slopes, Trajectory};
-use crate::system::{Device, DeviceTangent, FUNCTIONS, Method, State};
+use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::system::{FUNCTIONS, Method, NodalCoefficients, State, SystemTangent};
 
 /// As [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()), to 40 machine precisions of the largest
 /// value for each step; not finite where a product of this order
@@ -15,11 +15,11 @@ pub(crate) fn gradient(
     method: Method,
     trajectory: &Trajectory,
     source: &Trajectory,
-) -> DeviceTangent {
-    let mut device = Device::zeros(equation.device.mass.len(), equation.terms.len());
-    let gradient = Slopes::AtNodes(&mut device);
+) -> SystemTangent {
+    let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
+    let gradient = CoefficientGradient::AtNodes(&mut device);
     let initial = back(equation, method, trajectory, source, gradient);
-    DeviceTangent { device, initial }
+    SystemTangent { device, initial }
 }
 
 /// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
@@ -29,7 +29,7 @@ pub(crate) fn back(
     method: Method,
     trajectory: &Trajectory,
     source: &Trajectory,
-    gradient: Slopes,
+    gradient: CoefficientGradient,
 ) -> State {
     simd::run(Back {
         equation,
@@ -45,7 +45,7 @@ struct Back<'a> {
     method: Method,
     trajectory: &'a Trajectory,
     source: &'a Trajectory,
-    gradient: Slopes<'a>,
+    gradient: CoefficientGradient<'a>,
 }
 
 impl Kernel for Back<'_> {
@@ -59,8 +59,8 @@ impl Kernel for Back<'_> {
         let last = self.trajectory.nodes() - 1;
         let mut wanted = Wanted::default();
         let asked = match &gradient {
-            Slopes::AtNodes(_) => &mut wanted.ends,
-            Slopes::Summed(_) => &mut wanted.sum,
+            CoefficientGradient::AtNodes(_) => &mut wanted.ends,
+            CoefficientGradient::Summed(_) => &mut wanted.sum,
         };
         asked[..=equation.terms.len()].fill(true);
         let constant_mass = step_linearisation::constant_mass(&equation.device.mass[..=last]);
@@ -97,13 +97,13 @@ impl Kernel for Back<'_> {
             ];
             for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
                 match &mut gradient {
-                    Slopes::AtNodes(device) => {
+                    CoefficientGradient::AtNodes(device) => {
                         let left = share(arithmetic, &maps.left[f], ends);
                         let right = share(arithmetic, &maps.right[f], ends);
                         let values = &mut device.function_mut(f)[from..];
                         set(arithmetic, left, right, to - from, values);
                     }
-                    Slopes::Summed(_) => {
+                    CoefficientGradient::Summed(_) => {
                         let share = share(arithmetic, &maps.sum[f], ends);
                         *sum = (Eight::load(arithmetic, sum) + share).row();
                     }
@@ -111,7 +111,7 @@ impl Kernel for Back<'_> {
             }
             to = from;
         }
-        if let Slopes::Summed(all) = gradient {
+        if let CoefficientGradient::Summed(all) = gradient {
             for (sum, lanes) in all.iter_mut().zip(sums) {
                 *sum += lanes.iter().sum::<f64>();
             }

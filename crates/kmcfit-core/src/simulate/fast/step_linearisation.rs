@@ -7,7 +7,7 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{
-    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, Stepwise, Tableau, Term,
+    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, StageSamples, Tableau, Term,
 };
 
 /// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
@@ -58,7 +58,7 @@ impl<A: Arithmetic> Places<A> {
     }
 
     #[inline(always)]
-    fn stepwise(arithmetic: A, part: Option<&Stepwise>, i: usize) -> Self {
+    fn stepwise(arithmetic: A, part: Option<&StageSamples>, i: usize) -> Self {
         Self(padded_loads::stepwise(arithmetic, part, i))
     }
 

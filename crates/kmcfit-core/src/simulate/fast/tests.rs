@@ -3,14 +3,15 @@
 use super::continuous_adjoint;
 use super::nodal_observations::{Accelerations, NodalObservations};
 use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
-use super::step_batch::{Layout, Ray, Trials, replay};
+use super::step_batch::{LaneLayout, SearchRay, StepBatch, reconstruct};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::reference::{self, AdjointEquation};
 use crate::simulate::{Engine, Purpose, Trajectory, least_squares};
 use crate::system::quadrature::trapezoid;
 use crate::system::{
-    Device, DeviceTangent, Excitation, Grid, Method, Oscillator, Place, State, Stepwise, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, SystemTangent, Term,
+    TimePoint,
 };
 use proptest::prelude::*;
 
@@ -21,8 +22,8 @@ const PER_STEP: f64 = 40.0;
 /// A random system with a random record.
 #[derive(Debug, Clone)]
 struct Case {
-    oscillator: Oscillator,
-    device: Device,
+    oscillator: System,
+    device: NodalCoefficients,
     excitation: Option<Excitation>,
     initial: State,
     /// Numbers in (-1, 1), three a node.
@@ -86,7 +87,7 @@ impl Case {
         self.agree(&a.velocity, &b.velocity)
     }
 
-    fn agree_gradients(&self, a: &DeviceTangent, b: &DeviceTangent) -> Result<(), TestCaseError> {
+    fn agree_gradients(&self, a: &SystemTangent, b: &SystemTangent) -> Result<(), TestCaseError> {
         let pairs = a.device.functions().zip(b.device.functions());
         pairs.into_iter().try_for_each(|(a, b)| self.agree(a, b))?;
         let list = |s: State| [s.displacement, s.velocity];
@@ -131,9 +132,9 @@ fn function(range: std::ops::Range<f64>, nodes: usize) -> impl Strategy<Value = 
     ]
 }
 
-fn stepwise(nodes: usize) -> impl Strategy<Value = Option<Stepwise>> {
+fn stepwise(nodes: usize) -> impl Strategy<Value = Option<StageSamples>> {
     let steps = prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), nodes - 1);
-    prop::option::of(steps.prop_map(Stepwise::new))
+    prop::option::of(steps.prop_map(StageSamples::new))
 }
 
 fn case_of(
@@ -149,7 +150,7 @@ fn case_of(
             .collect();
         let excitation = (stepwise(nodes), stepwise(nodes))
             .prop_map(move |(force, base)| is_driven.then_some(Excitation { force, base }));
-        let oscillator = Oscillator {
+        let oscillator = System {
             grid: Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid"),
             method,
             terms,
@@ -160,7 +161,7 @@ fn case_of(
                 let mut functions = functions.into_iter();
                 Case {
                     oscillator: oscillator.clone(),
-                    device: Device {
+                    device: NodalCoefficients {
                         mass: functions.next().expect("a mass"),
                         coefficients: functions.collect(),
                     },
@@ -211,10 +212,10 @@ impl Kernel for Observe<'_> {
 }
 
 /// A direction for each lane of a group: one series of numbers a function, or one number for a constant function.
-fn directions(case: &Case, holds: bool) -> [DeviceTangent; LANES] {
+fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
     let functions = 1 + case.oscillator.terms.len();
     std::array::from_fn(|lane| {
-        let mut device = Device::zeros(case.nodes(), functions - 1);
+        let mut device = NodalCoefficients::zeros(case.nodes(), functions - 1);
         for (f, values) in device.functions_mut().enumerate() {
             match holds {
                 true if f == lane => values.fill(case.numbers[lane]),
@@ -222,7 +223,7 @@ fn directions(case: &Case, holds: bool) -> [DeviceTangent; LANES] {
                 false => values.clone_from(&case.series(7 * lane + f)),
             }
         }
-        DeviceTangent {
+        SystemTangent {
             device,
             initial: State {
                 displacement: case.numbers[lane],
@@ -237,7 +238,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
     let directions = directions(case, holds);
     let functions = 1 + case.oscillator.terms.len();
     let slots = (0..functions).map(|function| Slot { group: 0, function });
-    let row = |f: &dyn Fn(&DeviceTangent) -> f64| directions.each_ref().map(f);
+    let row = |f: &dyn Fn(&SystemTangent) -> f64| directions.each_ref().map(f);
     let initial = [
         row(&|d| d.initial.displacement),
         row(&|d| d.initial.velocity),
@@ -268,7 +269,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
             }
             let rows = tangents.changes_mut(slot);
             for (i, row) in rows.iter_mut().enumerate().take(count + 1) {
-                let at = |d: &DeviceTangent| {
+                let at = |d: &SystemTangent| {
                     d.device.functions().nth(slot).expect("a function")[first + i]
                 };
                 *row = directions.each_ref().map(at);
@@ -362,7 +363,7 @@ proptest! {
         );
         let (found, initial) = found.expect("a record in blocks");
         case.agree(&[found], &[cost])?;
-        case.agree_gradients(&DeviceTangent { device: gradient, initial }, &exact)?;
+        case.agree_gradients(&SystemTangent { device: gradient, initial }, &exact)?;
     }
 
     #[test]
@@ -391,12 +392,12 @@ proptest! {
         let (oscillator, device) = (&case.oscillator, &case.device);
         let states = case.response();
         let around = [case.numbers[0], case.numbers[1]];
-        let surroundings = crate::system::Surroundings { force: around[0], base: around[1] };
+        let surroundings = crate::system::InputSample { force: around[0], base: around[1] };
         for first in (0..case.nodes()).step_by(LANES) {
             let nodes = NodalObservations { oscillator, device, states: &states };
             let seen = simd::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
-                let place = Place::node(node, case.nodes());
+                let place = TimePoint::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;
                 let exact = reference::observe(
                     oscillator, kind, device, case.excitation(), &states, place, surroundings,
@@ -426,7 +427,7 @@ proptest! {
         let Case { oscillator, device, initial, .. } = &case;
         let (step, observed) = (oscillator.grid.step(), case.series(0));
         let direction = [case.series(1), case.series(2), case.series(3)];
-        let ray = Ray {
+        let ray = SearchRay {
             functions: [&device.mass, &device.coefficients[0], &device.coefficients[1]]
                 .map(Vec::as_slice),
             direction: direction.each_ref().map(Vec::as_slice),
@@ -435,12 +436,12 @@ proptest! {
             step,
         };
         let lengths: Vec<f64> = (1..=count).map(|i| 1.0 / (i * i) as f64).collect();
-        let layout = Layout::new(ray, &lengths);
-        let mut batch = [Trials::default(), Trials::default()];
+        let layout = LaneLayout::new(ray, &lengths);
+        let mut batch = [StepBatch::default(), StepBatch::default()];
         let middle = layout.rows().div_ceil(2);
         batch[0].run(ray, &layout, 0..middle);
         batch[1].run(ray, &layout, middle..layout.rows());
-        let costs = batch.each_ref().map(Trials::costs).concat();
+        let costs = batch.each_ref().map(StepBatch::costs).concat();
         let mut alone = Vec::new();
         for (which, a) in lengths.iter().enumerate() {
             let mut device = device.clone();
@@ -458,7 +459,7 @@ proptest! {
             case.agree(&[step * costs[row][lane]], &[alone[which]])?;
             let states = batch.iter().find_map(|batch| batch.states((row, lane)));
             let mut again = Trajectory::zeros(case.nodes());
-            if replay(&device, *initial, states.expect("its states"), step, &mut again) {
+            if reconstruct(&device, *initial, states.expect("its states"), step, &mut again) {
                 prop_assert_eq!(again, motion);
             }
         }

@@ -7,7 +7,7 @@
 
 use crate::simulate::Trajectory;
 use crate::system::quadrature::{curvature, midpoint, slope};
-use crate::system::{Device, DeviceTangent, Excitation, Oscillator, State, Term};
+use crate::system::{Excitation, NodalCoefficients, State, System, SystemTangent, Term};
 use std::borrow::Cow;
 
 /// Gradient of `J = integral (y - y_obs)^2 dt` with respect to all functions, in the L2 inner
@@ -26,12 +26,12 @@ use std::borrow::Cow;
 /// # Panics
 /// If the response, the measurements or a function of the device end before the grid does.
 pub fn continuous_adjoint(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
-) -> DeviceTangent {
+) -> SystemTangent {
     let equation = AdjointEquation::new(oscillator, device, trajectory, observed);
     let adjoint = equation.solve();
     equation.gradients(oscillator, excitation, trajectory, &adjoint)
@@ -53,8 +53,8 @@ pub(crate) struct Adjoint {
 
 impl<'a> AdjointEquation<'a> {
     pub fn new(
-        oscillator: &Oscillator,
-        device: &'a Device,
+        oscillator: &System,
+        device: &'a NodalCoefficients,
         trajectory: &'a Trajectory,
         observed: &'a [f64],
     ) -> Self {
@@ -106,11 +106,11 @@ impl<'a> AdjointEquation<'a> {
     /// Eqs. 15-17, and the gradient with respect to the initial state.
     pub fn gradients(
         &self,
-        oscillator: &Oscillator,
+        oscillator: &System,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         adjoint: &Adjoint,
-    ) -> DeviceTangent {
+    ) -> SystemTangent {
         let (y, v) = (&trajectory.displacement, &trajectory.velocity);
         let z = &adjoint.displacement;
         let mut acceleration = curvature(y, self.dt);
@@ -133,8 +133,8 @@ impl<'a> AdjointEquation<'a> {
         };
         let [m, m1, _, c, ..] = self.functions.each_ref().map(|f| f[0]);
         let momentum_slope = m1 * z[0] + m * adjoint.first_slope;
-        DeviceTangent {
-            device: Device {
+        SystemTangent {
+            device: NodalCoefficients {
                 mass: gradient(&acceleration),
                 coefficients: oscillator.terms.iter().map(by_term).collect(),
             },
@@ -154,8 +154,8 @@ fn acceleration(functions: [f64; 8], z: f64, w: f64) -> f64 {
 
 /// `(C, K)` at the nodes: damping and stiffness of small disturbances of the response.
 fn linearised_coefficients<'a>(
-    oscillator: &Oscillator,
-    device: &'a Device,
+    oscillator: &System,
+    device: &'a NodalCoefficients,
     trajectory: &Trajectory,
 ) -> [Cow<'a, [f64]>; 2] {
     if oscillator.terms == [Term::Damping, Term::Stiffness] {

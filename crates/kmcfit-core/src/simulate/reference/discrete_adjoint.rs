@@ -3,7 +3,7 @@
 use super::equation::{EquationOfMotion, Stages};
 use crate::simulate::Trajectory;
 use crate::system::{
-    Device, DeviceTangent, Excitation, MIDPOINT, Method, Oscillator, RK4, State, Tableau,
+    Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, SystemTangent, Tableau,
 };
 
 /// Gradient of a scalar cost of the response with respect to the nodal values of all functions and
@@ -17,12 +17,12 @@ use crate::system::{
 /// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 pub fn discrete_adjoint(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     source: &Trajectory,
-) -> DeviceTangent {
+) -> SystemTangent {
     let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
     match oscillator.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, source),
@@ -35,9 +35,9 @@ fn sweep<const S: usize>(
     equation: EquationOfMotion,
     trajectory: &Trajectory,
     source: &Trajectory,
-) -> DeviceTangent {
+) -> SystemTangent {
     let nodes = trajectory.displacement.len();
-    let mut gradient = Device::zeros(equation.device.mass.len(), equation.terms.len());
+    let mut gradient = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
     let mut adjoint = State {
         displacement: source.displacement[nodes - 1],
         velocity: source.velocity[nodes - 1],
@@ -49,7 +49,7 @@ fn sweep<const S: usize>(
         adjoint.displacement += source.displacement[i];
         adjoint.velocity += source.velocity[i];
     }
-    DeviceTangent {
+    SystemTangent {
         device: gradient,
         initial: adjoint,
     }
@@ -63,7 +63,7 @@ fn step_back<const S: usize>(
     i: usize,
     stages: &Stages<S>,
     adjoint: State,
-    gradient: &mut Device,
+    gradient: &mut NodalCoefficients,
 ) -> State {
     let mut before = adjoint;
     let (mut y_bar, mut v_bar) = ([0.0; S], [0.0; S]);

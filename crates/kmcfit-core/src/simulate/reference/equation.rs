@@ -1,12 +1,12 @@
 //! The equation of motion at the stages of one step.
 
-use crate::system::{Device, Excitation, Oscillator, Position, Tableau, Term};
+use crate::system::{Excitation, NodalCoefficients, Position, System, Tableau, Term};
 
 /// The equation of motion of one device in one experiment.
 #[derive(Clone, Copy)]
 pub(crate) struct EquationOfMotion<'a> {
     pub terms: &'a [Term],
-    pub device: &'a Device,
+    pub device: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub dt: f64,
 }
@@ -29,12 +29,12 @@ impl<'a> EquationOfMotion<'a> {
     /// # Panics
     /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
     pub fn new(
-        oscillator: &'a Oscillator,
-        device: &'a Device,
+        oscillator: &'a System,
+        device: &'a NodalCoefficients,
         excitation: Option<&'a Excitation>,
         nodes: usize,
     ) -> Self {
-        let Oscillator { grid, terms, .. } = oscillator;
+        let System { grid, terms, .. } = oscillator;
         assert_eq!(
             device.coefficients.len(),
             terms.len(),

@@ -2,23 +2,23 @@
 
 use super::equation::{EquationOfMotion, advance};
 use crate::simulate::Trajectory;
-use crate::simulate::breakdown::{Breakdown, require_finite, require_positive_mass};
-use crate::system::{Device, Excitation, MIDPOINT, Method, Oscillator, RK4, State, Tableau};
+use crate::simulate::breakdown::{SimulationError, require_finite, require_positive_mass};
+use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, Tableau};
 
 /// The response of `device` from `initial` under `excitation` (`None` is free motion), over the whole grid:
 /// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, step by step in the paper's order of operations.
 ///
 /// # Errors
-/// A [`Breakdown`] if the mass is not positive at some node or the response overflows.
+/// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
 ///
 /// # Panics
 /// If `device` or `excitation` does not fit the grid and the terms.
 pub fn forward(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
-) -> Result<Trajectory, Breakdown> {
+) -> Result<Trajectory, SimulationError> {
     let mut trajectory = Trajectory::zeros(oscillator.grid.nodes());
     forward_into(oscillator, device, initial, excitation, &mut trajectory)?;
     Ok(trajectory)
@@ -30,12 +30,12 @@ pub fn forward(
 /// # Errors
 /// As [`forward`].
 pub fn forward_into(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
     trajectory: &mut Trajectory,
-) -> Result<(), Breakdown> {
+) -> Result<(), SimulationError> {
     let grid = &oscillator.grid;
     require_positive_mass(grid, device)?;
     let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());

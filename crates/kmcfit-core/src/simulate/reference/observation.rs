@@ -9,12 +9,13 @@ use super::equation::EquationOfMotion;
 use crate::record::ChannelKind;
 use crate::simulate::Trajectory;
 use crate::system::{
-    Device, Excitation, FUNCTIONS, Oscillator, Place, Position, Stepwise, Surroundings,
+    Excitation, FUNCTIONS, InputSample, NodalCoefficients, Position, StageSamples, System,
+    TimePoint,
 };
 
 /// A value observed by a sensor, and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensed {
+pub struct Observation {
     /// The value itself, in the SI unit of its kind.
     pub value: f64,
     /// Derivatives with respect to displacement and velocity at the left node, then at the right.
@@ -24,7 +25,7 @@ pub struct Sensed {
     pub functions: [[f64; FUNCTIONS]; 2],
 }
 
-impl Sensed {
+impl Observation {
     const NOTHING: Self = Self {
         value: 0.0,
         states: [0.0; 4],
@@ -60,14 +61,14 @@ impl Sensed {
 /// # Panics
 /// If `place` is not within `states`.
 pub fn observe(
-    oscillator: &Oscillator,
+    oscillator: &System,
     kind: ChannelKind,
-    device: &Device,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
-    place: Place,
-    around: Surroundings,
-) -> Sensed {
+    place: TimePoint,
+    around: InputSample,
+) -> Observation {
     let equation = EquationOfMotion {
         terms: &oscillator.terms,
         device,
@@ -96,48 +97,47 @@ fn hermite(x: f64, h: f64) -> [f64; 4] {
     ]
 }
 
-fn displacement(h: f64, states: &Trajectory, place: Place) -> Sensed {
+fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
     let (y, v, i) = (&states.displacement, &states.velocity, place.step);
     match place.fraction {
-        0.0 => Sensed::state(0, y[i]),
-        1.0 => Sensed::state(2, y[i + 1]),
+        0.0 => Observation::state(0, y[i]),
+        1.0 => Observation::state(2, y[i + 1]),
         x => {
             let weights = hermite(x, h);
             let ends = [y[i], v[i], y[i + 1], v[i + 1]];
-            Sensed {
+            Observation {
                 value: weights.iter().zip(ends).map(|(w, e)| w * e).sum(),
                 states: weights,
-                ..Sensed::NOTHING
+                ..Observation::NOTHING
             }
         }
     }
 }
 
-fn velocity(equation: EquationOfMotion, states: &Trajectory, place: Place) -> Sensed {
+fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -> Observation {
     let (y, v, i) = (&states.displacement, &states.velocity, place.step);
     match place.fraction {
-        0.0 => Sensed::state(1, v[i]),
-        1.0 => Sensed::state(3, v[i + 1]),
+        0.0 => Observation::state(1, v[i]),
+        1.0 => Observation::state(3, v[i + 1]),
         x => {
             let at_end = |right: usize| {
                 let position = [Position::Left, Position::Right][right];
-                let part = |p: &Option<Stepwise>| p.as_ref().map_or(0.0, |p| p.at(i, position));
-                let around =
-                    equation
-                        .excitation
-                        .map_or(Surroundings::default(), |e| Surroundings {
-                            force: part(&e.force),
-                            base: part(&e.base),
-                        });
-                let here = Sensed::state(2 * right, y[i + right]);
-                let speed = Sensed::state(2 * right + 1, v[i + right]);
+                let part = |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.at(i, position));
+                let around = equation
+                    .excitation
+                    .map_or(InputSample::default(), |e| InputSample {
+                        force: part(&e.force),
+                        base: part(&e.base),
+                    });
+                let here = Observation::state(2 * right, y[i + right]);
+                let speed = Observation::state(2 * right + 1, v[i + right]);
                 (
                     speed,
                     acceleration(equation, i, right as f64, around, &here, &speed),
                 )
             };
             let [(v0, a0), (v1, a1)] = [at_end(0), at_end(1)];
-            let mut sensed = Sensed::NOTHING;
+            let mut sensed = Observation::NOTHING;
             for (weight, end) in hermite(x, equation.dt).into_iter().zip([v0, a0, v1, a1]) {
                 sensed.add(weight, &end);
             }
@@ -151,10 +151,10 @@ fn acceleration(
     equation: EquationOfMotion,
     i: usize,
     x: f64,
-    around: Surroundings,
-    y: &Sensed,
-    v: &Sensed,
-) -> Sensed {
+    around: InputSample,
+    y: &Observation,
+    v: &Observation,
+) -> Observation {
     let blend = |f: &[f64]| match x {
         0.0 => f[i],
         1.0 => f[i + 1],
@@ -180,7 +180,7 @@ fn acceleration(
         by_function[j + 1] = -phi / mass;
     }
     by_function[0] = -inertia / mass;
-    let mut sensed = Sensed::NOTHING;
+    let mut sensed = Observation::NOTHING;
     sensed.add(by_y, y);
     sensed.add(by_v, v);
     for (side, share) in sensed.functions.iter_mut().zip([1.0 - x, x]) {

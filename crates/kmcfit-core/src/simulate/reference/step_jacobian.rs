@@ -3,14 +3,14 @@
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
 use crate::system::{
-    Device, Excitation, MIDPOINT, Method, Oscillator, Position, RK4, State, Tableau,
+    Excitation, MIDPOINT, Method, NodalCoefficients, Position, RK4, State, System, Tableau,
 };
 
 /// Change of the state `(y, v)` at the right node of a step.
 pub type StateChange = [f64; 2];
 
 /// One step `x_{i+1} = Phi_i(x_i, p)` and its derivatives; functions in the order of
-/// [`Device::functions`], mass first.
+/// [`NodalCoefficients::functions`], mass first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepJacobian {
     /// `Phi_i` itself: displacement and velocity at the right node.
@@ -33,8 +33,8 @@ enum Seed {
 
 /// All steps linearised about the node states `states`, which need not be a response.
 pub fn step_jacobians(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
 ) -> Vec<StepJacobian> {

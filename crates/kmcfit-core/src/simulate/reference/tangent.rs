@@ -3,18 +3,18 @@
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
 use crate::system::{
-    Device, DeviceTangent, Excitation, MIDPOINT, Method, Oscillator, RK4, Tableau,
+    Excitation, MIDPOINT, Method, NodalCoefficients, RK4, System, SystemTangent, Tableau,
 };
 
 /// Directional derivative of [`forward`](super::forward()) at `trajectory` (which must be the response of
 /// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
 /// step, exact for the discrete response.
 pub fn tangent(
-    oscillator: &Oscillator,
-    device: &Device,
+    oscillator: &System,
+    device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
-    direction: &DeviceTangent,
+    direction: &SystemTangent,
 ) -> Trajectory {
     let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
     match oscillator.method {
@@ -27,7 +27,7 @@ fn sweep<const S: usize>(
     tableau: &Tableau<S>,
     equation: EquationOfMotion,
     trajectory: &Trajectory,
-    direction: &DeviceTangent,
+    direction: &SystemTangent,
 ) -> Trajectory {
     let nodes = trajectory.displacement.len();
     let mut out = Trajectory::zeros(nodes);
@@ -47,7 +47,7 @@ fn sweep<const S: usize>(
 fn stage_changes<const S: usize>(
     tableau: &Tableau<S>,
     equation: EquationOfMotion,
-    direction: &Device,
+    direction: &NodalCoefficients,
     i: usize,
     base: &Stages<S>,
     dy: f64,

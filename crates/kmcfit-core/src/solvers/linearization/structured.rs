@@ -2,7 +2,7 @@
 //! of nodes, for functions with many parameters.
 
 use crate::constraints::Rows;
-use crate::objective::{Evaluation, View};
+use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment};
@@ -126,7 +126,13 @@ impl Columns<'_> {
         }
     }
 
-    fn add_readings(&self, channel: &Channel, predicted: &[f64], view: View, sub: &mut Subproblem) {
+    fn add_readings(
+        &self,
+        channel: &Channel,
+        predicted: &[f64],
+        view: SimulatedRecord,
+        sub: &mut Subproblem,
+    ) {
         let [gain, ..] = channel.sensor().values(view.scalars);
         // A displacement at a node by a known sensor is the state itself.
         let known = channel.sensor().indices().iter().all(Option::is_none);

@@ -1,6 +1,8 @@
 use super::halves::Half;
 use super::*;
-use crate::functions::{Basis, CoefficientFunction, Functions, Quantity, Scalar};
+use crate::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter,
+};
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
@@ -9,7 +11,7 @@ use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
 use crate::solvers::{Fit, fit, fit_from};
-use crate::system::{Excitation, Grid, Method, Oscillator, State, Term};
+use crate::system::{Excitation, Grid, Method, State, System, Term};
 use crate::threads;
 
 fn fitted(problem: &Problem) -> Fit {
@@ -25,28 +27,28 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let nodes = grid.nodes();
     let constant = |quantity, start| CoefficientFunction::constant(quantity, start, nodes);
     let stiffness = match knots {
-        None => constant(Quantity::Stiffness, 2.2),
+        None => constant(CoefficientKind::Stiffness, 2.2),
         Some(knots) => {
             let spacing = grid.duration() / f64::from(knots - 1);
             let knots: Vec<f64> = (0..knots).map(|i| f64::from(i) * spacing).collect();
             let start = knots.iter().map(|t| 2.2 + 1e-3 * t).collect();
             let basis = Basis::PiecewiseLinear { knots };
-            CoefficientFunction::free(Quantity::Stiffness, basis, &grid, start)
+            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, start)
         }
     };
     let list = vec![
-        constant(Quantity::Mass, 1.1),
-        constant(Quantity::Damping, 0.3),
+        constant(CoefficientKind::Mass, 1.1),
+        constant(CoefficientKind::Damping, 0.3),
         stiffness,
     ];
-    let speed = Scalar {
+    let speed = ScalarParameter {
         name: "speed".into(),
         unit: "m/s".into(),
         start: 0.1,
         size: 1.0,
         prior: None,
     };
-    let functions = Functions::new(list, nodes, grid.step()).expect("functions");
+    let functions = Parameterization::new(list, nodes, grid.step()).expect("functions");
     let times = grid.times();
     let force: Vec<f64> = (times.iter())
         .map(|t| (0.9 * t).sin() + (1.7 * t).cos())
@@ -68,7 +70,7 @@ fn long_problem(knots: Option<u32>) -> Problem {
             .with_channel(channel(ChannelKind::Velocity, between))
             .with_channel(channel(ChannelKind::Acceleration, times.clone()))
     };
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],

@@ -12,7 +12,7 @@
 
 use super::line_search::{Line, weak_wolfe};
 use super::{Step, StepRule};
-use crate::functions::{Functions, Quantity};
+use crate::functions::{CoefficientKind, Parameterization};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simd::sum::dot;
@@ -276,13 +276,13 @@ impl StepRule for Lbfgs {
 
 /// Which coordinates are logarithms, the units of the others, and the inner product of all.
 struct Coordinates<'p> {
-    functions: &'p Functions,
+    functions: &'p Parameterization,
     units: Vec<f64>,
     logarithmic: Vec<bool>,
 }
 
 /// The unit of every parameter.
-fn units(functions: &Functions) -> Vec<f64> {
+fn units(functions: &Parameterization) -> Vec<f64> {
     let mut units = vec![1.0; functions.parameters()];
     for (function, range) in functions.iter().zip(functions.ranges()) {
         units[range.clone()].fill(unit(largest(&function.start)));
@@ -307,7 +307,10 @@ impl<'p> Coordinates<'p> {
         let mut logarithmic = vec![false; parameters.len()];
         for (function, range) in functions.iter().zip(functions.ranges()) {
             let all_positive = parameters[range.clone()].iter().all(|p| *p > 0.0);
-            if function.quantity == Quantity::Mass && function.positive_parameters && all_positive {
+            if function.quantity == CoefficientKind::Mass
+                && function.positive_parameters
+                && all_positive
+            {
                 logarithmic[range.clone()].fill(true);
             }
         }

@@ -7,7 +7,7 @@
 //! functions from anywhere.
 
 use crate::constraints::TOLERANCE;
-use crate::objective::{Evaluation, View};
+use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::record::Channel;
@@ -141,7 +141,7 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
         .iter()
         .enumerate()
         .map(|(e, experiment)| {
-            let view: View = problem.view(evaluation, e);
+            let view: SimulatedRecord = problem.view(evaluation, e);
             experiment
                 .channels
                 .iter()
@@ -158,9 +158,9 @@ fn has_mass(evaluation: &Evaluation) -> bool {
 }
 
 fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
-    let sizes = problem.natural_sizes(evaluation);
+    let sizes = problem.natural_scales(evaluation);
     let duration = problem.oscillator.grid.duration();
-    let weight = PULL * problem.misfit_of_silence().max(f64::MIN_POSITIVE);
+    let weight = PULL * problem.zero_response_misfit().max(f64::MIN_POSITIVE);
     let metric = problem.functions.relative_metric(&sizes, duration);
     for (d, m) in sub.proximal.iter_mut().zip(metric) {
         *d = weight * m;

@@ -24,7 +24,7 @@ pub(in crate::solvers) fn growing_horizon_start(
     let mut short = settings.clone();
     short.stopping.iterations = HORIZON_ITERATIONS;
     for share in HORIZONS {
-        let part = problem.first_part(share);
+        let part = problem.truncated(share);
         let found = watch.unseen(|watch| search(&part, &parameters, &short, None, watch));
         if let Ok(fit) = found {
             counts += fit.counts;

@@ -5,17 +5,17 @@
 //! all of it.
 
 use super::{Referred, reference};
-use crate::functions::{Basis, CoefficientFunction, Functions};
+use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::host::Instant;
 use crate::problem::Problem;
-use crate::record::{Drive, Experiment, LONG};
+use crate::record::{Experiment, Input, LONG_RECORD_STEPS};
 use crate::solvers::checkpoint::Observer;
 use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::timings::Timings;
-use crate::system::{Excitation, Grid, Stepwise};
+use crate::system::{Excitation, Grid, StageSamples};
 use crate::threads;
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
     };
     let parameters = problem.parameters();
-    let suits = problem.oscillator.grid.nodes() > LONG
+    let suits = problem.oscillator.grid.nodes() > LONG_RECORD_STEPS
         && problem.penalties.is_empty()
         && problem.variations.is_empty()
         && problem.comes_in_pieces()
@@ -58,7 +58,7 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let devices = functions.assemblies().to_vec();
     let mut part = Problem::new(
         problem.oscillator.clone(),
-        Functions::with_devices(list?, devices, grid.nodes(), grid.step())?
+        Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
             .with_scalars(functions.scalars().to_vec()),
         problem
             .experiments
@@ -91,9 +91,9 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
 }
 
 fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
-    let short = |part: &Option<Stepwise>| {
-        let first = |all: &Stepwise| all.values()[..steps.min(all.steps())].to_vec();
-        part.as_ref().map(|all| Stepwise::new(first(all)))
+    let short = |part: &Option<StageSamples>| {
+        let first = |all: &StageSamples| all.values()[..steps.min(all.steps())].to_vec();
+        part.as_ref().map(|all| StageSamples::new(first(all)))
     };
     let excitation = experiment.excitation.as_ref().map(|all| Excitation {
         force: short(&all.force),
@@ -105,7 +105,7 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
         initial: experiment.initial,
         sought: experiment.sought,
         excitation,
-        drive: Drive::default(),
+        drive: Input::default(),
         nodes: experiment.nodes.min(steps + 1),
         device: experiment.device,
         channels: channels.filter_map(|c| c.within(steps)).collect(),

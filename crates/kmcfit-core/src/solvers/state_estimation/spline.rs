@@ -13,7 +13,7 @@ use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::signal::{Interpolation, Signal, Spectrum};
 use crate::simulate::Trajectory;
-use crate::system::{Place, State};
+use crate::system::{State, TimePoint};
 use std::f64::consts::TAU;
 
 /// Points of a difference stencil: derivatives are of order 4 or better.
@@ -248,7 +248,7 @@ impl Plain<'_> {
     }
 }
 
-fn first_point(place: Place, nodes: usize) -> usize {
+fn first_point(place: TimePoint, nodes: usize) -> usize {
     let nearest = place.step + usize::from(place.fraction > 0.5);
     nearest.saturating_sub(POINTS / 2).min(nodes - POINTS)
 }

@@ -55,7 +55,7 @@ impl Waterfall {
 
 /// How far two points are from each other.
 pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
-    let natural = problem.natural_sizes(a);
+    let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;
     for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
         let (one, two) = (a.device_of(which), b.device_of(which));

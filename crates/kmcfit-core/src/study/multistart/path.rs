@@ -1,7 +1,7 @@
 //! Whether two optima share a valley.
 
 use crate::problem::Problem;
-use crate::system::Device;
+use crate::system::NodalCoefficients;
 
 /// The cost along two paths between two points; infinite where there is no motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +70,7 @@ fn along_gauge(
     Some(theta)
 }
 
-fn mixed(one: &Device, two: &Device, s: f64) -> Device {
+fn mixed(one: &NodalCoefficients, two: &NodalCoefficients, s: f64) -> NodalCoefficients {
     let pairs = one.mass.iter().zip(&two.mass);
     let mass: Vec<f64> = pairs.map(|(a, b)| a.powf(1.0 - s) * b.powf(s)).collect();
     let coefficient = |p: &Vec<f64>, q: &Vec<f64>| -> Vec<f64> {
@@ -79,5 +79,5 @@ fn mixed(one: &Device, two: &Device, s: f64) -> Device {
     };
     let pairs = one.coefficients.iter().zip(&two.coefficients);
     let coefficients = pairs.map(|(p, q)| coefficient(p, q)).collect();
-    Device { mass, coefficients }
+    NodalCoefficients { mass, coefficients }
 }

@@ -20,7 +20,7 @@ mod walk;
 use super::functional::Linear;
 use super::parallel::map;
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use walk::Walk;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
@@ -163,13 +163,13 @@ impl Profile {
 /// where the motion is linear in the parameters.
 ///
 /// # Errors
-/// A [`Breakdown`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no motion.
 pub fn profile(
     problem: &Problem,
     optimum: &[f64],
     of: &Linear,
     how: &ProfileSettings,
-) -> Result<Profile, Breakdown> {
+) -> Result<Profile, SimulationError> {
     Walk::new(problem, optimum, of, how).map(Walk::run)
 }
 
@@ -183,7 +183,7 @@ pub fn profiles(
     of: &[Linear],
     how: &ProfileSettings,
     threads: usize,
-) -> Result<Vec<Profile>, Breakdown> {
+) -> Result<Vec<Profile>, SimulationError> {
     let each = map(of.len(), threads, |i| {
         profile(problem, optimum, &of[i], how)
     });

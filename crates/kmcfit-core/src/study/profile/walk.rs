@@ -4,7 +4,7 @@ use super::{End, FAR, Mark, Profile, ProfileSettings, Verdict};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
@@ -83,7 +83,7 @@ impl<'a> Walk<'a> {
         optimum: &[f64],
         of: &'a Linear,
         how: &'a ProfileSettings,
-    ) -> Result<Self, Breakdown> {
+    ) -> Result<Self, SimulationError> {
         let start = fit_from(problem, optimum, &settings())?.best;
         let cost = start.evaluation.cost;
         Ok(Self {

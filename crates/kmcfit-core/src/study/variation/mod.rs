@@ -26,7 +26,7 @@ mod reduced;
 use super::parallel::map;
 use super::refit::{nearest, settings, sizes};
 use crate::problem::Problem;
-use crate::simulate::Breakdown;
+use crate::simulate::SimulationError;
 use crate::solvers::fit_from;
 use linearised::Linearised;
 use reduced::Reduced;
@@ -111,12 +111,12 @@ impl Default for Asking {
 /// The verdict on every function that could vary, from `optimum`, where the problem was fitted.
 ///
 /// # Errors
-/// A [`Breakdown`] if the optimum, or a constant in its place, has no motion.
+/// A [`SimulationError`] if the optimum, or a constant in its place, has no motion.
 pub fn variation(
     problem: &Problem,
     optimum: &[f64],
     how: &Asking,
-) -> Result<Vec<Varies>, Breakdown> {
+) -> Result<Vec<Varies>, SimulationError> {
     let varies = |f: &usize| problem.functions.ranges()[*f].len() > 1;
     let each = (0..problem.functions.ranges().len()).filter(varies);
     each.map(|f| of_function(problem, optimum, f, how))
@@ -132,7 +132,7 @@ pub fn of_function(
     optimum: &[f64],
     function: usize,
     how: &Asking,
-) -> Result<Varies, Breakdown> {
+) -> Result<Varies, SimulationError> {
     let reduced = Reduced::new(problem, function);
     let start = reduced.mean_of(optimum);
     let sizes_of = sizes(&reduced.problem, &start);

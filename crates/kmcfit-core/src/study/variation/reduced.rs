@@ -1,7 +1,7 @@
 //! The problem with one function constant.
 
 use crate::constraints::{Constraints, RowGroup, Rows};
-use crate::functions::{CoefficientFunction, Design, Functions, Penalty};
+use crate::functions::{CoefficientFunction, Design, Parameterization, Penalty};
 use crate::problem::Problem;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
@@ -33,7 +33,7 @@ impl Reduced {
         };
         list[function] = constant;
         let devices = problem.functions.assemblies().to_vec();
-        let functions = Functions::with_devices(list, devices, nodes, grid.step())
+        let functions = Parameterization::with_devices(list, devices, nodes, grid.step())
             .expect("a constant instead of a function stays independent")
             .with_scalars(problem.functions.scalars().to_vec());
         let mut reduced = Self {
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::builder::{Builder, Part, Record};
     use crate::constraints::Statement;
-    use crate::functions::Quantity;
+    use crate::functions::CoefficientKind;
 
     fn whole() -> Problem {
         let times: Vec<f64> = (0..=80).map(|i| 0.1 * f64::from(i)).collect();
@@ -175,15 +175,15 @@ mod tests {
         let value = |of, value| Statement::Mean { of, value };
         Builder::new(parts)
             .record(record)
-            .demand(value(Quantity::Mass, 1.1))
+            .demand(value(CoefficientKind::Mass, 1.1))
             .demand(Statement::DampingRatio { max: 0.8 })
             .demand(Statement::Slope {
-                of: Quantity::Damping,
+                of: CoefficientKind::Damping,
                 min: Some(-0.5),
                 max: None,
             })
-            .prefer(value(Quantity::Stiffness, 1.5), 2.0)
-            .prefer(value(Quantity::Damping, 0.3), 3.0)
+            .prefer(value(CoefficientKind::Stiffness, 1.5), 2.0)
+            .prefer(value(CoefficientKind::Damping, 0.3), 3.0)
             .build()
             .unwrap()
     }

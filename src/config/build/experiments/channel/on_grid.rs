@@ -5,12 +5,12 @@ use super::{RawChannel, Spec, spec_of};
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
-use kmcfit_core::internals::functions::{Scalar, Value};
+use kmcfit_core::internals::functions::{ScalarParameter, Value};
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Sensor, Weighting, integral_over,
 };
 use kmcfit_core::internals::signal::even_spacing;
-use kmcfit_core::internals::system::{Grid, Surroundings};
+use kmcfit_core::internals::system::{Grid, InputSample};
 
 /// Puts a channel on the grid.
 pub fn place(
@@ -19,7 +19,7 @@ pub fn place(
     raw: RawChannel,
     grid: &Grid,
     experiment: &Experiment,
-    scalars: &mut Vec<Scalar>,
+    scalars: &mut Vec<ScalarParameter>,
 ) -> Result<Channel, InputError> {
     let of_kind = spec_of(spec, raw.kind);
     let weighting = match (raw.weighting, raw.spacing) {
@@ -58,7 +58,7 @@ pub fn place(
     let mut channel = channel.with_loss(raw.loss).with_sensor(sensor);
     let drive = &experiment.drive;
     if raw.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
-        let around = |t: &f64| Surroundings {
+        let around = |t: &f64| InputSample {
             force: drive.force_at(*t),
             base: drive.base_acceleration_at(*t),
         };
@@ -101,7 +101,7 @@ fn sensor(
     (i, angular): (usize, bool),
     of_kind: &Spec,
     values: &[f64],
-    scalars: &mut Vec<Scalar>,
+    scalars: &mut Vec<ScalarParameter>,
 ) -> Result<Sensor, InputError> {
     let Some(spec) = of_kind.sensor else {
         return Ok(Sensor::default());

@@ -23,7 +23,7 @@ mod workspace;
 
 use crate::simd::{self, Arithmetic};
 use crate::simulate::Trajectory;
-use crate::system::{Device, DeviceTangent, Oscillator, State};
+use crate::system::{NodalCoefficients, State, System, SystemTangent};
 use step::{Coefficients, Constants, Rates};
 use tile::Tile;
 use workspace::{Workspace, with_workspace};
@@ -43,7 +43,7 @@ pub(crate) struct LinearDevice<'a> {
 impl<'a> LinearDevice<'a> {
     /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
     /// the terms damping and stiffness.
-    pub fn of(oscillator: &Oscillator, device: &'a Device, nodes: usize) -> Option<Self> {
+    pub fn of(oscillator: &System, device: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
         let [damping, stiffness] = device.coefficients.as_slice() else {
             return None;
         };
@@ -142,14 +142,14 @@ impl<'a> LinearDevice<'a> {
     }
 
     /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()).
-    pub fn gradient(self, trajectory: &Trajectory, source: &Trajectory) -> DeviceTangent {
+    pub fn gradient(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
         let by_velocity = source.velocity.iter().any(|s| *s != 0.0);
         let source = [
             Some(source.displacement.as_slice()),
             by_velocity.then_some(source.velocity.as_slice()),
         ];
         let nodes = trajectory.nodes();
-        let mut gradient = Device::zeros(self.damping.len(), 2);
+        let mut gradient = NodalCoefficients::zeros(self.damping.len(), 2);
         let [damping, stiffness] = gradient.coefficients.as_mut_slice() else {
             unreachable!("two terms")
         };
@@ -164,7 +164,7 @@ impl<'a> LinearDevice<'a> {
                 workspace,
             })
         });
-        DeviceTangent {
+        SystemTangent {
             device: gradient,
             initial,
         }

@@ -11,8 +11,8 @@ const INITIAL: State = State {
     velocity: -1.0,
 };
 
-fn oscillator(nodes: usize) -> Oscillator {
-    Oscillator {
+fn oscillator(nodes: usize) -> System {
+    System {
         grid: Grid::new(0.0, 25.0, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -20,11 +20,11 @@ fn oscillator(nodes: usize) -> Oscillator {
 }
 
 /// Mass falls, damping changes its sign, stiffness wobbles.
-fn device(nodes: usize) -> Device {
+fn device(nodes: usize) -> NodalCoefficients {
     let at = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
         (0..nodes).map(|i| f(i as f64 / nodes as f64)).collect()
     };
-    Device {
+    NodalCoefficients {
         mass: at(&|s| 1.5 - s),
         coefficients: vec![
             at(&|s| 0.2 * (9.0 * s).sin()),
@@ -156,7 +156,7 @@ fn squares_are_motion_and_gradient_in_one() {
 }
 
 /// A motion and what follows from it, with one arithmetic.
-struct Whole<'a>(&'a Oscillator, &'a Device);
+struct Whole<'a>(&'a System, &'a NodalCoefficients);
 
 impl simd::Kernel for Whole<'_> {
     type Output = Vec<u64>;
@@ -167,7 +167,7 @@ impl simd::Kernel for Whole<'_> {
         let nodes = device.mass.len();
         let linear = LinearDevice::of(oscillator, device, nodes).unwrap();
         let mut motion = Trajectory::zeros(nodes);
-        let mut gradient = Device::zeros(nodes, 2);
+        let mut gradient = NodalCoefficients::zeros(nodes, 2);
         with_workspace(|workspace| {
             forward::Forward {
                 device: linear,

@@ -2,11 +2,11 @@
 //!
 //! What is wanted of them is which is lowest, and its motion, with the bits that it would have by itself
 //! ([`forward`](crate::simulate::reference::forward())). So no motion is kept: of each eight states along the record are, from
-//! which the lowest one's is made again, eight parts at once ([`replay()`]). The costs are sums in another order than that of
+//! which the lowest one's is made again, eight parts at once ([`reconstruct()`]). The costs are sums in another order than that of
 //! the integral, of motions in which one quotient in `2^50` may have another last bit; those who may have the lowest cost are
 //! told from all others by a margin far above both.
 
-mod replay;
+mod reconstruct;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -15,11 +15,11 @@ use crate::simd::{self, LANES, Row};
 use crate::system::State;
 use std::ops::Range;
 
-pub(crate) use replay::replay;
+pub(crate) use reconstruct::reconstruct;
 
 /// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
 #[derive(Clone, Copy)]
-pub(crate) struct Ray<'a> {
+pub(crate) struct SearchRay<'a> {
     /// Mass, damping, stiffness at the nodes.
     pub functions: [&'a [f64]; 3],
     /// What is taken away from them, per unit of `a`.
@@ -43,7 +43,7 @@ const MARGIN: f64 = 1e-10;
 
 /// In which rows and lanes the trials at some lengths are.
 #[derive(Debug, Default)]
-pub(crate) struct Layout {
+pub(crate) struct LaneLayout {
     /// Trials before the first that has mass everywhere.
     without_mass: usize,
     /// Trials in the first row, which may be less than full: it is filled up with its first.
@@ -52,9 +52,9 @@ pub(crate) struct Layout {
     nodes: usize,
 }
 
-impl Layout {
+impl LaneLayout {
     /// That of the devices at `lengths`, which fall. The ray [`is_moderate`](Ray::is_moderate) as far as the longest of them.
-    pub fn new(ray: Ray, lengths: &[f64]) -> Self {
+    pub fn new(ray: SearchRay, lengths: &[f64]) -> Self {
         let without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[without_mass..];
         let in_first = match lengths.len() % LANES {
@@ -118,18 +118,18 @@ type States = [[Row; 2]; LANES];
 
 /// The trials of some rows, at most [`ROWS`]: storage that is used again and again.
 #[derive(Default)]
-pub(crate) struct Trials {
+pub(crate) struct StepBatch {
     rows: Range<usize>,
     states: Vec<States>,
     costs: Vec<Row>,
 }
 
-impl Trials {
+impl StepBatch {
     /// Does the trials of some rows.
     ///
     /// # Panics
     /// If they are too many.
-    pub fn run(&mut self, ray: Ray, layout: &Layout, rows: Range<usize>) {
+    pub fn run(&mut self, ray: SearchRay, layout: &LaneLayout, rows: Range<usize>) {
         assert!(rows.len() <= ROWS, "{} rows at once", rows.len());
         let has_half = rows.start == 0 && rows.len() > 1 && layout.begins_with_half();
         let lengths = &layout.rows[rows.clone()];
@@ -161,7 +161,7 @@ impl Trials {
         Some([of(0), of(1)])
     }
 
-    fn of_rows<const R: usize, const HALF: bool>(&mut self, ray: Ray, lengths: &[Row]) {
+    fn of_rows<const R: usize, const HALF: bool>(&mut self, ray: SearchRay, lengths: &[Row]) {
         // Without half a row nobody looks at what stands in its place.
         let (mut no_states, mut no_costs) = ([[[0.0; LANES]; 2]; LANES], [0.0; LANES]);
         let states = halved(&mut self.states, HALF, &mut no_states);
@@ -196,7 +196,7 @@ fn part(nodes: usize) -> usize {
     nodes.div_ceil(LANES)
 }
 
-impl Ray<'_> {
+impl SearchRay<'_> {
     /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
     /// after rounding.
     fn first_with_mass(self, lengths: &[f64]) -> usize {

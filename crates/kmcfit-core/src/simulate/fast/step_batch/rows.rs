@@ -1,11 +1,11 @@
 //! Rows of devices, one a lane, and the steps that they take.
 
-use super::{Ray, States, part};
+use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
 
 /// A row of devices, of which four lanes count, and `R` whole ones.
 pub(super) struct Rows<'a, const R: usize, const HALF: bool> {
-    pub ray: Ray<'a>,
+    pub ray: SearchRay<'a>,
     pub lengths: (&'a Row, &'a [Row; R]),
     pub states: (&'a mut States, &'a mut [States; R]),
     /// Sums of squares, not finite where the motion is not.
@@ -18,7 +18,7 @@ pub(super) struct Values<A: Arithmetic>(pub [Eight<A>; 3]);
 
 impl<A: Arithmetic> Values<A> {
     #[inline(always)]
-    fn at(ray: &Ray, arithmetic: A, length: Eight<A>, i: usize) -> Self {
+    fn at(ray: &SearchRay, arithmetic: A, length: Eight<A>, i: usize) -> Self {
         let mut values = [length; 3];
         let pairs = ray.functions.iter().zip(&ray.direction);
         for (value, (p, g)) in values.iter_mut().zip(pairs) {
@@ -101,7 +101,7 @@ struct Devices<A: Arithmetic> {
 
 impl<A: Arithmetic> Devices<A> {
     #[inline(always)]
-    fn begin(ray: &Ray, arithmetic: A, length: &Row) -> Self {
+    fn begin(ray: &SearchRay, arithmetic: A, length: &Row) -> Self {
         let splat = |x| Eight::splat(arithmetic, x);
         let state = [splat(ray.initial.displacement), splat(ray.initial.velocity)];
         let residual = state[0] - splat(ray.readings[0]);
@@ -116,7 +116,7 @@ impl<A: Arithmetic> Devices<A> {
     }
 
     #[inline(always)]
-    fn step<const MIDDLE_DIVIDED: bool>(&mut self, ray: &Ray, steps: Steps<A>, i: usize) {
+    fn step<const MIDDLE_DIVIDED: bool>(&mut self, ray: &SearchRay, steps: Steps<A>, i: usize) {
         let residual = self.state[0] - Eight::splat(self.arithmetic, ray.readings[i]);
         self.sum += residual * residual;
         let length = Eight::load(self.arithmetic, &self.length);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::simulate::{Trajectory, reference};
 use crate::system::quadrature::trapezoid;
-use crate::system::{Device, Grid, Method, Oscillator, Term};
+use crate::system::{Grid, Method, NodalCoefficients, System, Term};
 
 /// Parts of one node and of many, whole rounds of eight and others, and last parts that are short or empty.
 const NODES: [usize; 9] = [3, 4, 8, 9, 17, 41, 64, 65, 241];
@@ -27,21 +27,21 @@ fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
     ]
 }
 
-fn device_at(ray: &Ray, length: f64) -> Device {
+fn device_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
     let [mass, damping, stiffness] = [0, 1, 2].map(|f| {
         let pairs = ray.functions[f].iter().zip(ray.direction[f]);
         pairs.map(|(p, g)| p - length * g).collect()
     });
-    Device {
+    NodalCoefficients {
         mass,
         coefficients: vec![damping, stiffness],
     }
 }
 
 /// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
-fn by_itself(ray: &Ray, length: f64) -> Option<(Trajectory, f64)> {
+fn by_itself(ray: &SearchRay, length: f64) -> Option<(Trajectory, f64)> {
     let nodes = ray.readings.len();
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid: Grid::new(0.0, ray.step * (nodes - 1) as f64, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -58,8 +58,8 @@ fn ray<'a>(
     functions: &'a [Vec<f64>; 3],
     direction: &'a [Vec<f64>; 3],
     readings: &'a [f64],
-) -> Ray<'a> {
-    Ray {
+) -> SearchRay<'a> {
+    SearchRay {
         functions: functions.each_ref().map(Vec::as_slice),
         direction: direction.each_ref().map(Vec::as_slice),
         initial: State {
@@ -83,12 +83,12 @@ fn every_trial(nodes: usize) {
     // One lane, part of a row, whole rows, and half a row beside one, two and three; the two longest leave no mass.
     for count in [1, 7, 8, 19, 28, 32, 44, 50, 52] {
         let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
-        let layout = Layout::new(ray, &lengths);
+        let layout = LaneLayout::new(ray, &lengths);
         // One thread's rows and another one's.
-        let (rows, mut trials) = (layout.rows(), [Trials::default(), Trials::default()]);
+        let (rows, mut trials) = (layout.rows(), [StepBatch::default(), StepBatch::default()]);
         trials[0].run(ray, &layout, 0..rows.div_ceil(2));
         trials[1].run(ray, &layout, rows.div_ceil(2)..rows);
-        let found = trials.each_ref().map(Trials::costs).concat();
+        let found = trials.each_ref().map(StepBatch::costs).concat();
         let lowest = layout.lowest(&found);
         let alone: Vec<_> = lengths.iter().map(|a| by_itself(&ray, *a)).collect();
         let costs: Vec<f64> = (alone.iter())
@@ -118,14 +118,14 @@ fn every_trial(nodes: usize) {
             let place = layout.place(which);
             let states = trials.iter().find_map(|trials| trials.states(place));
             let mut states = states.expect("states of every trial");
-            let is_whole = replay(&device, ray.initial, states, ray.step, &mut again);
+            let is_whole = reconstruct(&device, ray.initial, states, ray.step, &mut again);
             assert!(is_whole && again == motion, "trial {which} of {count}");
             // A last bit is seen, in whatever part.
             let parts = nodes.div_ceil(part(nodes));
             let state = &mut states[which % 2][which % parts];
             *state = state.next_up();
             assert!(
-                !replay(&device, ray.initial, states, ray.step, &mut again),
+                !reconstruct(&device, ray.initial, states, ray.step, &mut again),
                 "trial {which} of {count}"
             );
         }
@@ -138,7 +138,7 @@ fn costs_that_are_as_good_as_equal_are_all_candidates() {
     let [functions, direction] = functions(41);
     let readings = [0.3; 41];
     let ray = ray(&functions, &direction, &readings);
-    let layout = Layout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
+    let layout = LaneLayout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
     // Within the margin, and beyond it.
     let mut costs = [1.0; LANES];
     (costs[1], costs[2], costs[3]) = (0.5, 0.5 * (1.0 + 1e-12), 0.5 * (1.0 + 1e-9));

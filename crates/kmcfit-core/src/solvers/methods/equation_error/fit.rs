@@ -16,7 +16,7 @@ use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::reason::{Reason, UnsupportedRecord};
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
-use crate::system::Device;
+use crate::system::NodalCoefficients;
 
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.
 const FAR: f64 = 1e4;
@@ -330,7 +330,7 @@ impl<'a> Cost<'a> {
         for (experiment, measured) in self.experiments() {
             let device = device(problem, experiment, theta);
             let errors = measured.errors(problem, &device);
-            let mut nodal: Device = problem.functions.empty_device();
+            let mut nodal: NodalCoefficients = problem.functions.empty_device();
             for (f, values) in nodal.functions_mut().enumerate() {
                 for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
                     let push = 2.0 * measured.weight * error * measured.response(problem, f, i);

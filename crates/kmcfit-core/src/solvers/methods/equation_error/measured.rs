@@ -1,14 +1,14 @@
 //! What the readings themselves say of a motion: its state and what drives it, without a simulation.
 
-use crate::functions::Functions;
-use crate::objective::View;
+use crate::functions::Parameterization;
+use crate::objective::SimulatedRecord;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment, Loss};
 use crate::signal::zero_phase;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
 use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
-use crate::system::{Device, Grid, Place, Stepwise};
+use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
 /// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
@@ -19,7 +19,7 @@ const MOST_LEFT_OUT: usize = 4;
 
 /// The state of an experiment at some times, and what drives it there.
 pub(super) struct Measured {
-    pub places: Vec<Place>,
+    pub places: Vec<TimePoint>,
     /// Index of the first time among the readings of the channel, where it is one channel's.
     first: usize,
     /// Displacement, m.
@@ -131,12 +131,12 @@ impl Measured {
             excitation.and_then(|e| e.base.as_ref()),
         ];
         let [force, base] = parts.map(|part| {
-            let nodes = part.map(Stepwise::at_nodes);
+            let nodes = part.map(StageSamples::at_nodes);
             let at = |node: &usize| nodes.as_ref().map_or(0.0, |f| f[*node]);
             motion.nodes.iter().map(at).collect::<Vec<f64>>()
         });
         let stride = motion.nodes.windows(2).map(|w| w[1] - w[0]).min();
-        let place = |node: &usize| Place::node(*node, experiment.nodes);
+        let place = |node: &usize| TimePoint::node(*node, experiment.nodes);
         Self {
             places: motion.nodes.iter().map(place).collect(),
             first: 0,
@@ -160,8 +160,8 @@ impl Measured {
     }
 
     /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
-    pub fn errors(&self, problem: &Problem, device: &Device) -> Vec<f64> {
-        let error = |(i, place): (usize, &Place)| {
+    pub fn errors(&self, problem: &Problem, device: &NodalCoefficients) -> Vec<f64> {
+        let error = |(i, place): (usize, &TimePoint)| {
             let forces = device.functions().enumerate();
             let force =
                 |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
@@ -224,7 +224,7 @@ impl Measured {
     /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
     /// the filter took from the reading, so that model less reading is minus the equation's error
     /// over the mass; the readings at the ends, which are left out, stand for themselves.
-    pub fn predict(&self, problem: &Problem, channel: &Channel, view: View) -> Vec<f64> {
+    pub fn predict(&self, problem: &Problem, channel: &Channel, view: SimulatedRecord) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
         }
@@ -238,7 +238,7 @@ impl Measured {
 }
 
 /// The value at a place of a function that is linear between nodes.
-fn blend(values: &[f64], place: Place) -> f64 {
+fn blend(values: &[f64], place: TimePoint) -> f64 {
     let [left, right] = [values[place.step], values[place.step + 1]];
     match place.fraction {
         0.0 => left,
@@ -253,7 +253,7 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     let spacing = (times[steps] - times[0]) / steps as f64;
     let in_place = |(i, t): (usize, &f64)| {
         let distance = (t - times[0] - i as f64 * spacing).abs();
-        distance <= Place::SAME_TIME * spacing
+        distance <= TimePoint::SAME_TIME * spacing
     };
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
@@ -381,7 +381,7 @@ impl Measurements {
 }
 
 /// The mass of the first device that has function `index` of the list.
-fn mass_of(functions: &Functions, index: usize) -> Option<usize> {
+fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
     let mut devices = functions.assemblies().iter();
     let device = devices.find(|assembly| assembly.contains(&index))?;
     device.first().copied()
@@ -409,13 +409,13 @@ mod tests {
 
     /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
     fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
-        let between = |step| Place {
+        let between = |step| TimePoint {
             step,
             fraction: 0.5,
         };
-        let node = |i| Place::node(i, NODES);
+        let node = |i| TimePoint::node(i, NODES);
         let places = vec![node(3), node(5), between(6), between(9), node(12), node(18)];
-        let time = |p: &Place| (p.step as f64 + p.fraction) * STEP;
+        let time = |p: &TimePoint| (p.step as f64 + p.fraction) * STEP;
         let all: Vec<[f64; 3]> = places.iter().map(|p| state(time(p))).collect();
         let part = |j: usize| all.iter().map(|state| state[j]).collect::<Vec<f64>>();
         Measured {
@@ -484,7 +484,7 @@ mod tests {
                     .map(|i| spacing * (7.0 + i as f64 + late(i)))
                     .collect()
             };
-            let found = equal_spacing(&times(0.1 * Place::SAME_TIME)).expect("equal");
+            let found = equal_spacing(&times(0.1 * TimePoint::SAME_TIME)).expect("equal");
             assert!((found / spacing - 1.0).abs() < 1e-12);
             assert_eq!(equal_spacing(&times(0.1)), None, "{spacing}");
         }

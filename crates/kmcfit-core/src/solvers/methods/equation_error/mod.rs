@@ -20,7 +20,7 @@ use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
 use crate::system::quadrature::trapezoid_weights;
-use crate::system::{Device, Place, Term};
+use crate::system::{NodalCoefficients, Term, TimePoint};
 use measured::Measured;
 
 /// A pull towards the start, relative to the equation's own weight: it decides what the equation
@@ -206,7 +206,7 @@ fn root_weight(
 }
 
 /// The device of an experiment for the parameters `theta`.
-fn device(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> Device {
+fn device(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
     let mut device = problem.functions.empty_device();
     problem
         .functions
@@ -226,7 +226,9 @@ fn add_rows(
     let functions = &problem.functions;
     let assembly = functions.assembly(experiment.device);
     let errors = measured.errors(problem, &device(problem, experiment, start));
-    for (i, (&Place { step, fraction }, error)) in measured.places.iter().zip(errors).enumerate() {
+    for (i, (&TimePoint { step, fraction }, error)) in
+        measured.places.iter().zip(errors).enumerate()
+    {
         let mut entries = Vec::new();
         for (which, &f) in assembly.iter().enumerate() {
             let first = functions.ranges()[f].start;

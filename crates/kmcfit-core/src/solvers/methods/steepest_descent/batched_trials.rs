@@ -6,14 +6,14 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::simd::{LANES, Row};
-use crate::simulate::fast::step_batch::{Layout, Ray, Trials, replay};
+use crate::simulate::fast::step_batch::{LaneLayout, SearchRay, StepBatch, reconstruct};
 use crate::simulate::{is_linear_midpoint, reference};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 
 /// Storage of the trials of a point, in two batches of at most four rows.
 #[derive(Default)]
-pub(super) struct BatchedTrials([Trials; 2]);
+pub(super) struct BatchedTrials([StepBatch; 2]);
 
 impl BatchedTrials {
     /// The lowest trial, if it lowers the cost.
@@ -21,14 +21,14 @@ impl BatchedTrials {
         &mut self,
         work: &mut CountedEvaluator,
         point: &Iterate,
-        ray: Ray,
+        ray: SearchRay,
         lengths: &[f64],
         spare: &mut Vec<Evaluation>,
     ) -> Option<Best> {
         let problem = work.problem();
         work.forwards(lengths.len() as u64, || {
             let (_, channel, _) = problem.one_full_record()?;
-            let layout = Layout::new(ray, lengths);
+            let layout = LaneLayout::new(ray, lengths);
             let costs = self.costs(ray, &layout);
             let mut best = None;
             for which in layout.lowest(&costs) {
@@ -55,7 +55,7 @@ impl BatchedTrials {
     }
 
     /// The sums of squares of all rows.
-    fn costs(&mut self, ray: Ray, layout: &Layout) -> Vec<Row> {
+    fn costs(&mut self, ray: SearchRay, layout: &LaneLayout) -> Vec<Row> {
         let rows = layout.rows();
         let middle = rows.div_ceil(2);
         let [first, second] = &mut self.0;
@@ -82,7 +82,7 @@ fn move_to(
     let (oscillator, device) = (&problem.oscillator, &evaluation.device);
     let motion = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
-    let is_whole = replay(device, initial, states, oscillator.grid.step(), motion);
+    let is_whole = reconstruct(device, initial, states, oscillator.grid.step(), motion);
     if !is_whole && reference::forward_into(oscillator, device, initial, None, motion).is_err() {
         return false;
     }
@@ -97,7 +97,7 @@ pub(super) fn ray<'a>(
     problem: &'a Problem,
     point: &'a Iterate,
     lengths: &[f64],
-) -> Option<Ray<'a>> {
+) -> Option<SearchRay<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
     let oscillator = &problem.oscillator;
     let nodes = experiment.nodes;
@@ -112,7 +112,7 @@ pub(super) fn ray<'a>(
         let (damping, stiffness) = others.split_at(nodes);
         [mass, damping, stiffness]
     };
-    let ray = fits.then(|| Ray {
+    let ray = fits.then(|| SearchRay {
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,

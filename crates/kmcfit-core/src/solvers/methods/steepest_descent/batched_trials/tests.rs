@@ -1,18 +1,18 @@
 use super::*;
-use crate::functions::{Basis, CoefficientFunction, Functions, Quantity};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::objective::GradientKind;
 use crate::record::{Channel, Experiment};
 use crate::simulate::Purpose;
 use crate::solvers::methods::steepest_descent::lengths;
 use crate::solvers::{FitSettings, Solver};
-use crate::system::{Grid, Method, Oscillator, State, Term};
+use crate::system::{Grid, Method, State, System, Term};
 
 const NODES: usize = 401;
 
 /// The paper's problem, smaller.
 fn problem() -> Problem {
     let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
-    let oscillator = Oscillator {
+    let oscillator = System {
         grid,
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -21,11 +21,11 @@ fn problem() -> Problem {
         CoefficientFunction::free(quantity, Basis::Nodal, &grid, vec![start; NODES])
     };
     let list = vec![
-        nodal(Quantity::Mass, 2.0),
-        nodal(Quantity::Damping, 1.0),
-        nodal(Quantity::Stiffness, 1.0),
+        nodal(CoefficientKind::Mass, 2.0),
+        nodal(CoefficientKind::Damping, 1.0),
+        nodal(CoefficientKind::Stiffness, 1.0),
     ];
-    let functions = Functions::new(list, NODES, grid.step()).expect("functions");
+    let functions = Parameterization::new(list, NODES, grid.step()).expect("functions");
     let times = grid.times().into_iter();
     let readings = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
     let spacing = grid.step();

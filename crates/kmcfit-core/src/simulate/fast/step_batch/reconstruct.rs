@@ -4,15 +4,15 @@ use super::part;
 use super::rows::{Steps, Values};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 use crate::simulate::Trajectory;
-use crate::system::{Device, State};
+use crate::system::{NodalCoefficients, State};
 
 /// The motion of `device` from the displacements and velocities where its eight parts begin, by divisions alone.
 ///
 /// Whether it is the motion that one step after the other gives from `initial`, to the last bit: the first part begins there, and
 /// each ends where the next begins.
 /// Otherwise what is in `trajectory` is of no use.
-pub(crate) fn replay(
-    device: &Device,
+pub(crate) fn reconstruct(
+    device: &NodalCoefficients,
     initial: State,
     states: [Row; 2],
     step: f64,
