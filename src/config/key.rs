@@ -1,6 +1,6 @@
 //! Keys of a model file: meaning, kind of value, unit, default and an example of each.
 //!
-//! [`keys!`] declares the struct that reads a map together with this documentation, so that the reader, `kmcfit explain` and
+//! `keys!` declares the struct that reads a map together with this documentation, so that the reader, `kmcfit explain` and
 //! the JSON schema cannot disagree.
 
 /// What may stand behind a key.

@@ -37,6 +37,18 @@ pub(crate) fn may_start_thread() -> io::Result<()> {
     HOST.get().map_or(Ok(()), |host| (host.may_start_thread)())
 }
 
+/// Provides the clock of the process to the tests of timings.
+#[cfg(test)]
+pub(crate) fn provide_clock() {
+    static START: std::sync::LazyLock<std::time::Instant> =
+        std::sync::LazyLock::new(std::time::Instant::now);
+    provide(Host {
+        clock: || START.elapsed(),
+        has_memory: |_| true,
+        may_start_thread: || Ok(()),
+    });
+}
+
 /// An instant of the host's clock.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant(Duration);

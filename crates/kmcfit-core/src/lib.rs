@@ -74,6 +74,8 @@
 //! assert!(error < 1e-9, "{error}");
 //! ```
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
+// Items of the public API refer to internals, which `--document-private-items` shows.
+#![allow(rustdoc::private_intra_doc_links)]
 #![allow(
     clippy::result_large_err,
     reason = "what failed is returned to be used again"

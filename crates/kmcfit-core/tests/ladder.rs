@@ -50,6 +50,7 @@ fn problem() -> Problem {
 
 #[test]
 fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
+    common::provide_clock();
     let problem = problem();
     let settings = FitSettings {
         solver: Solver::GaussNewton,

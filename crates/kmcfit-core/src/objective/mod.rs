@@ -32,7 +32,7 @@ pub struct Evaluation {
     pub regularisation: f64,
     /// The main device at this point.
     pub device: NodalCoefficients,
-    /// The other devices of [`Parameterization::assemblies`](crate::functions::Functions::assemblies).
+    /// The other devices of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
     pub own_devices: Vec<NodalCoefficients>,
     /// The scalars at this point.
     pub scalars: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Functions::assemblies).
+    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
     pub fn device_of(&self, which: usize) -> &NodalCoefficients {
         match which {
             0 => &self.device,
@@ -74,7 +74,7 @@ impl Problem {
 
     /// Cost, devices and motions for the parameters `theta`.
     ///
-    /// The cost is the sum over the channels of [`Channel::cost`] plus the sum over the penalties
+    /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
     /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
     /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors

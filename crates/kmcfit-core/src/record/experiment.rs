@@ -18,7 +18,7 @@ pub struct Experiment {
     pub drive: Input,
     /// Number of nodes of its motion: a record may end before the grid does.
     pub nodes: usize,
-    /// Which device of [`Parameterization::assemblies`] moves.
+    /// Which device of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies) moves.
     pub device: usize,
     /// What was measured; none for an experiment that is only simulated.
     pub channels: Vec<Channel>,

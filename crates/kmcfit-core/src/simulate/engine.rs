@@ -11,7 +11,7 @@ use crate::system::{Excitation, Method, NodalCoefficients, State, System, System
 /// Purpose of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// The bits of [`reference`]. The paper's run is chaotic in the rounding: its history depends on every bit.
+    /// The bits of [`reference`](mod@super::reference). The paper's run is chaotic in the rounding: its history depends on every bit.
     Reproduction,
     /// Results to machine precision, as fast as possible.
     Estimation,
@@ -19,7 +19,7 @@ pub enum Purpose {
 
 /// Implementation of response and discrete adjoint.
 ///
-/// | engine | equals [`reference`] to | applies to |
+/// | engine | equals [`reference`](mod@super::reference) to | applies to |
 /// |---|---|---|
 /// | [`Reference`](Self::Reference) | bits | every system |
 /// | [`Prefactored`](Self::Prefactored) | machine precision | every system |

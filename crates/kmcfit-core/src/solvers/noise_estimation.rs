@@ -150,6 +150,7 @@ mod tests {
     /// Work and time of both, the motions of the first, and the place of the second.
     #[test]
     fn a_fit_with_another_round_has_the_work_of_both() {
+        crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")

@@ -393,6 +393,7 @@ mod tests {
     /// Iterations, work and time of both parts, and the numbers of the iterations one after the other.
     #[test]
     fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
+        crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")

@@ -2,12 +2,12 @@
 //!
 //! | function | equation |
 //! |---|---|
-//! | [`forward`] | Eq. 2, the response |
-//! | [`tangent`] | its linearisation |
-//! | [`discrete_adjoint`] | the exact transpose of the linearisation |
-//! | [`continuous_adjoint`] | Eq. 13, with the gradients of Eqs. 15-17 |
-//! | [`step_jacobians`] | the linearisation of each step by itself |
-//! | [`observe`] | displacement, velocity or acceleration at any time |
+//! | `forward` | Eq. 2, the response |
+//! | `tangent` | its linearisation |
+//! | `discrete_adjoint` | the exact transpose of the linearisation |
+//! | `continuous_adjoint` | Eq. 13, with the gradients of Eqs. 15-17 |
+//! | `step_jacobians` | the linearisation of each step by itself |
+//! | `observe` | displacement, velocity or acceleration at any time |
 //!
 //! The order of operations is the paper's. Everything in [`fast`](super::fast) equals one of these functions to a
 //! stated tolerance.
