@@ -12,7 +12,7 @@
 //! 2. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
 //!    runs; [`results`] makes output folders, journals and files crash-safe.
 //! 3. [`cli`] is one file per command.
-// All output passes `cli::output`, all changes of files `results`, all thread starts `threads`.
+// All output passes `cli::output`, all changes of files `results`, all thread starts `threads` of the core.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 #![allow(
     clippy::result_large_err,

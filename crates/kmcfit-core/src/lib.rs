@@ -2,22 +2,21 @@
 //!
 //! Modules, in the order in which data flow:
 //!
-//! 1. `system`: time grid, integrator, force terms, nodal coefficients, input; `record`: inputs, channels, sensors,
-//!    noise models; `functions`: from parameters to mass, damping and stiffness at the nodes, their roughness and
-//!    variation; `problem`: system, records, penalties and constraints.
-//! 2. `simulate`: from nodal coefficients to the response, its linearisation, its adjoints.
-//! 3. `objective`: the cost of the parameters and its gradient, from one simulation per point.
-//! 4. `constraints`: from statements about the functions to rows and cones in the parameters.
-//! 5. `qp`: the convex subproblems; without active inequalities by an elimination along time or a sparse factorisation,
+//! 1. `system`: time grid, integrators, elements; `functions`: from parameters to mass, damping and stiffness at the nodes.
+//! 2. `record`: inputs, channels, sensors, weights; `constraints`: rows and cones in the parameters.
+//! 3. `problem`: system, records, penalties and constraints.
+//! 4. `simulate`: the response, its linearisation and its adjoints, plainly (`reference`) and specialised (`fast`).
+//! 5. `objective`: the cost of the parameters and its gradient, from one simulation per point.
+//! 6. `qp`: the convex subproblems; without active inequalities by an elimination along time or a sparse factorisation,
 //!    otherwise by Clarabel.
-//! 6. `solvers`: steepest descent, L-BFGS, projected gradient, Gauss–Newton, the equation error; starting points, the
+//! 7. `solvers`: steepest descent, L-BFGS, projected gradient, Gauss–Newton, the equation error; starting points, the
 //!    choice of a weight.
-//! 7. `diagnostics`: tests of the residuals, comparison of models.
 //! 8. `identifiability`: what records can determine, confidence bands, experiment design; `study`: profiles,
-//!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction.
+//!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction; `assessment`: tests of a fit.
 //! 9. `builder`: a problem in a few lines of Rust.
 //!
-//! Beside these, `signal` has interpolation, excitation, filters and spectra; `simd` vector arithmetic.
+//! Beside these, `diagnostics` has tests of residuals, `signal` interpolation, excitation, filters and spectra, `simd` vector
+//! arithmetic, `host` the services of the host and `threads` second threads.
 //!
 //! # Example
 //!
@@ -99,7 +98,7 @@ mod study;
 mod system;
 mod threads;
 
-// The public API, by topic. A snapshot of it (`api.txt`) makes it grow only on purpose.
+// The public API, by topic. `tests/api.rs` holds it to `api.txt`: it grows only on purpose.
 
 // Problems.
 pub use builder::{BuildError, Builder, Part, Record};
