@@ -19,7 +19,7 @@ pub enum SweepLaw {
 /// phases in rad.
 ///
 /// ```
-/// use kmcfit_core::Shape;
+/// use kmcfit_core::internals::signal::Shape;
 /// let step = Shape::Step { amplitude: 2.0, at: 1.0 };
 /// assert_eq!((step.value_before(1.0), step.value(1.0)), (0.0, 2.0));
 /// ```
