@@ -1,6 +1,6 @@
 //! `kmcfit compare`
 
-use super::fit::{begun, fit_into};
+use super::fit::{begun, fit_into, note_discarded};
 use super::progress::Progress;
 use super::{Failure, NOT_CONVERGED, OK, inputs, interrupt, print, say, unwritable};
 use crate::config::{Model, ModelFile, Purpose, build};
@@ -75,6 +75,7 @@ fn begin(
 ) -> Result<u8, Failure> {
     let children = children(&entries, folder)?;
     let heading = heading(&entries, runs);
+    note_discarded(folder, &heading)?;
     let journal = AnalysisJournal::begin(folder.path(), COMPARE_JOURNAL, &heading)
         .map_err(|error| unwritable(folder.path(), &error))?;
     finish(entries, (folder, children), journal, (as_json, false))

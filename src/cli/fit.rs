@@ -75,13 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let flag = interrupt::flag();
     let claim = fit_claim(&model).inputs(inputs(&file));
     let folder = OutputFolder::prepare(&output_path(arguments), claim)?;
-    if let Ok(Some(_)) = FitJournal::heading(folder.path()) {
-        say(
-            "note",
-            "Discarding the unfinished fit in this folder and starting over; use `kmcfit resume` to \
-             continue one.",
-        );
-    }
+    note_discarded(&folder, &heading)?;
     let printed = Printed {
         json: arguments.json,
         timings: arguments.timings,
@@ -89,6 +83,26 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let journal = begun(&folder, &heading)?;
     run_in(&folder, model, flag, (heading.figures, journal), &printed)
+}
+
+/// Says that unfinished work of the same command on the same inputs is discarded.
+///
+/// # Errors
+/// If the folder holds unfinished work on other inputs.
+pub(super) fn note_discarded(folder: &OutputFolder, heading: &Heading) -> Result<(), InputError> {
+    if folder.discards(heading)? {
+        say(
+            "note",
+            format!(
+                "Discarding the unfinished {} in this folder and starting over; use `kmcfit resume` to continue one.",
+                match heading.command.as_str() {
+                    "compare" => "comparison",
+                    command => command,
+                }
+            ),
+        );
+    }
+    Ok(())
 }
 
 /// A new journal.

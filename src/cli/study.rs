@@ -1,7 +1,7 @@
 //! `kmcfit study`
 
 use super::compare::{children, claim, entries, files_of, side_by_side, verdict};
-use super::fit::search;
+use super::fit::{note_discarded, search};
 use super::progress::Progress;
 use super::{
     Failure, NOT_CONVERGED, OK, Overrides, inputs, interrupt, print, say, stem, unwritable,
@@ -148,8 +148,11 @@ fn journal(
 ) -> Result<AnalysisJournal, InputError> {
     match go_on {
         true => AnalysisJournal::resume(folder.path(), STUDY_JOURNAL, heading),
-        false => AnalysisJournal::begin(folder.path(), STUDY_JOURNAL, heading)
-            .map_err(|error| unwritable(folder.path(), &error)),
+        false => {
+            note_discarded(folder, heading)?;
+            AnalysisJournal::begin(folder.path(), STUDY_JOURNAL, heading)
+                .map_err(|error| unwritable(folder.path(), &error))
+        }
     }
 }
 

@@ -112,7 +112,7 @@ impl<'a> Stage<'a> {
     pub fn commit(mut self) -> io::Result<()> {
         let refused = |error: InputError| io::Error::other(error.to_string());
         let before = Manifest::read(self.folder).map_err(refused)?;
-        let manifest = Manifest::new(self.claim.command, std::mem::take(&mut self.records));
+        let manifest = Manifest::new(self.claim.command, self.records.clone());
         self.add(MANIFEST, &manifest.text())?;
         self.sync()?;
         let plan = self.plan(before.as_ref(), &manifest)?;
@@ -143,14 +143,16 @@ impl<'a> Stage<'a> {
             };
             let state = known.as_ref().map(|record| record.state(&path));
             let is_free = match state {
-                Some(state) => state != FileState::Changed,
+                Some(state) => !matches!(state, FileState::Other(_)),
                 None => path.symlink_metadata().is_err(),
             };
             if !is_free {
                 return Err(in_the_way(&path));
             }
+            let record = self.records.get(name).cloned();
             put.push(Put {
                 name: name.clone(),
+                record: record.unwrap_or_else(|| FileRecord::of(manifest.text().as_bytes())),
                 replaces: known.filter(|_| state == Some(FileState::Unchanged)),
             });
         }
@@ -183,7 +185,18 @@ struct Plan {
 #[derive(Debug, Serialize, Deserialize)]
 struct Put {
     name: String,
+    record: FileRecord,
     replaces: Option<FileRecord>,
+}
+
+impl Put {
+    /// Whether a file stands at `place` which is not the replaced one.
+    fn is_done(&self, place: &Path) -> bool {
+        let is_old = |old: &FileRecord| old.state(place) == FileState::Unchanged;
+        let has_old = self.replaces.as_ref().is_some_and(is_old);
+        let has_new = self.record.state(place) == FileState::Unchanged;
+        has_new || (place.symlink_metadata().is_ok() && !has_old)
+    }
 }
 
 impl Plan {
@@ -207,6 +220,19 @@ impl Plan {
         let names = names.chain(self.remove.keys().map(String::as_str));
         let folders = names.filter_map(|name| Path::new(name).parent());
         folders.collect::<BTreeSet<_>>().into_iter()
+    }
+
+    /// The first new file that stands neither in the exchange folder `new` with its contents nor in its place.
+    fn damaged(&self, folder: &Path, new: &Path) -> Option<&str> {
+        let is_damaged = |put: &&Put| match put.record.state(&new.join(&put.name)) {
+            FileState::Unchanged => false,
+            FileState::Missing => !put.is_done(&folder.join(&put.name)),
+            FileState::Other(_) => true,
+        };
+        self.put
+            .iter()
+            .find(is_damaged)
+            .map(|put| put.name.as_str())
     }
 
     fn is_sound(&self) -> bool {
@@ -384,10 +410,15 @@ pub(super) fn complete_locked(folder: &Path) -> Result<(), InputError> {
         &exchange.join(PLAN),
         "the plan of an exchange",
         LONGEST_PLAN,
-    )?;
+    );
+    let text =
+        text.map_err(|error| unusable("the plan of this exchange cannot be read").found(error))?;
     let plan: Option<Plan> = serde_json::from_str(&text).ok();
     let plan = plan.filter(Plan::is_sound);
     let plan = plan.ok_or_else(|| unusable("the plan of this exchange is damaged"))?;
+    if let Some(name) = plan.damaged(folder, &exchange.join(NEW)) {
+        return Err(unusable("a file of this exchange is missing or damaged").found(name));
+    }
     run(folder, &exchange, &plan).map_err(|error| {
         InputError::file(folder, "a run that was killed cannot be completed here")
             .found(error)

@@ -149,7 +149,16 @@ impl Heading {
         }
     }
 
-    fn text_of_command(&self) -> String {
+    /// Whether another heading names the same inputs, in the same order.
+    pub(super) fn has_inputs_of(&self, other: &Self) -> bool {
+        let place = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+        self.inputs
+            .iter()
+            .map(place)
+            .eq(other.inputs.iter().map(place))
+    }
+
+    pub(super) fn text_of_command(&self) -> String {
         let inputs = self.inputs.iter().map(|input| input.display().to_string());
         let words = std::iter::once(self.command.clone()).chain(inputs);
         words.collect::<Vec<_>>().join(" ")

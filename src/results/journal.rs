@@ -136,14 +136,14 @@ fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
     (format!("{chain:016x}") == digits).then_some((json, mark))
 }
 
-/// The command whose work a journal or checkpoint holds; `None` for a file without the heading of a journal and its
-/// checksum, which kmcfit did not write.
-pub(super) fn command_of(path: &Path) -> Option<String> {
+/// The heading of a journal or checkpoint; `None` for a file without the heading of a journal and its checksum, which
+/// kmcfit did not write.
+pub(super) fn heading_of(path: &Path) -> Option<Heading> {
     let (file, _) = open(path, "a journal").ok()?;
     let line = first_line(file).ok()?;
     let (json, _) = checked(&line, Mark::default())?;
     let heading: Heading = serde_json::from_slice(json).ok()?;
-    (!path.is_symlink()).then_some(heading.command)
+    (!path.is_symlink()).then_some(heading)
 }
 
 /// The first line of a file, as far as a heading may be long.

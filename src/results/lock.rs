@@ -46,7 +46,12 @@ impl Lock {
         match file.map(locked) {
             Some(Ok(lock)) => Ok(Some(lock)),
             Some(Err(TryLockError::WouldBlock)) => Err(Taken),
-            Some(Err(TryLockError::Error(_))) | None => Ok(None),
+            Some(Err(TryLockError::Error(_))) => {
+                // A file system without locks: the file serves nobody.
+                let _ = system::remove_file(path);
+                Ok(None)
+            }
+            None => Ok(None),
         }
     }
 }

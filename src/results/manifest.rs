@@ -50,6 +50,9 @@ impl FileRecord {
     }
 }
 
+const CHANGED: &str = "this file was changed since kmcfit wrote it";
+const UNREADABLE: &str = "this file cannot be read, to see whether kmcfit wrote it";
+
 /// What stands where the manifest names a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileState {
@@ -57,8 +60,8 @@ pub enum FileState {
     Missing,
     /// The file with the contents that were recorded.
     Unchanged,
-    /// Something else.
-    Changed,
+    /// Something else, as a message describes it.
+    Other(&'static str),
 }
 
 impl FileRecord {
@@ -66,13 +69,16 @@ impl FileRecord {
     pub fn state(&self, path: &Path) -> FileState {
         match path.symlink_metadata() {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => FileState::Missing,
-            Ok(metadata) if metadata.is_file() && metadata.len() == self.bytes => {
-                match digest_of_file(path) {
-                    Ok(found) if found == self.sha256 => FileState::Unchanged,
-                    _ => FileState::Changed,
-                }
+            Err(_) => FileState::Other(UNREADABLE),
+            Ok(metadata) if !metadata.is_file() => {
+                FileState::Other("something else stands in the place of a file that kmcfit wrote")
             }
-            _ => FileState::Changed,
+            Ok(metadata) if metadata.len() != self.bytes => FileState::Other(CHANGED),
+            Ok(_) => match digest_of_file(path) {
+                Ok(found) if found == self.sha256 => FileState::Unchanged,
+                Ok(_) => FileState::Other(CHANGED),
+                Err(_) => FileState::Other(UNREADABLE),
+            },
         }
     }
 }
@@ -113,11 +119,15 @@ impl Manifest {
         match path.symlink_metadata() {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Ok(metadata) if metadata.is_file() => {}
-            _ => return Err(unknown("this is not a file")),
+            Ok(_) => return Err(unknown("this is not a file")),
+            Err(error) => return Err(unknown("the manifest cannot be read").found(error)),
         }
         let text = read_text(&path, "the manifest of an output folder", LONGEST)?;
-        let manifest: Self = serde_json::from_str(&text)
-            .map_err(|error| unknown("this is not a manifest of kmcfit").found(error))?;
+        let manifest: Self = serde_json::from_str(&text).map_err(|error| {
+            let (line, column) = (error.line(), error.column());
+            unknown("this is not a manifest of kmcfit")
+                .found(format!("other text at line {line}, column {column}"))
+        })?;
         if manifest.format != FORMAT {
             return Err(unknown("the manifest has another format version")
                 .found(manifest.format)
@@ -194,9 +204,10 @@ mod tests {
         std::fs::write(&path, "1,2\n").expect("room");
         assert_eq!(record.state(&path), FileState::Unchanged);
         std::fs::write(&path, "1,3\n").expect("room");
-        assert_eq!(record.state(&path), FileState::Changed);
+        assert_eq!(record.state(&path), FileState::Other(CHANGED));
         std::fs::remove_file(&path).expect("removed");
         std::fs::create_dir(&path).expect("a folder");
-        assert_eq!(record.state(&path), FileState::Changed);
+        let state = record.state(&path);
+        assert!(matches!(state, FileState::Other(text) if text != CHANGED));
     }
 }

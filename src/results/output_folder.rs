@@ -2,12 +2,14 @@
 
 use super::claim::Claim;
 use super::exchange::{self, Stage};
+use super::heading::Heading;
 use super::journal;
 use super::lock::Lock;
 use super::manifest::{FileState, MANIFEST, Manifest};
 use super::system;
 use super::work_folder::{self, WorkFolder};
 use crate::error::{InputError, Place};
+use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -43,13 +45,20 @@ impl OutputFolder {
     /// a file that the claim covers is an input, was not written by kmcfit or was changed since. The error names
     /// the file, and nothing in the folder has changed.
     pub fn prepare(path: &Path, claim: Claim) -> Result<Self, InputError> {
-        let refuse = |problem: &str, error: &io::Error| {
+        let refuse = |problem: &str, folder: &Path, error: &io::Error| {
             InputError::new(Place::Argument("--out".into()), problem)
-                .found(format!("{}: {error}", path.display()))
+                .found(format!("{}: {error}", folder.display()))
                 .expected("a folder that can be written to")
         };
         let is_new = !path.exists();
-        system::create_folders(path).map_err(|e| refuse("the output folder cannot be made", &e))?;
+        system::create_folders(path).map_err(|e| {
+            let error = refuse("the output folder cannot be created", existing(path), &e);
+            match e.kind() {
+                // The text names the file in the way.
+                io::ErrorKind::Other => error.found(e),
+                _ => error,
+            }
+        })?;
         let lock = Lock::take(path).map_err(|_| taken(path))?;
         exchange::complete_locked(path)?;
         work_folder::remove_leftovers(path);
@@ -64,8 +73,11 @@ impl OutputFolder {
         folder.check_inputs(manifest.as_ref())?;
         folder.check_places(manifest.as_ref())?;
         folder.check_journals()?;
-        WorkFolder::create_in(path)
-            .map_err(|e| refuse("the output folder cannot be written to", &e))?;
+        for folder in folder.folders(manifest.as_ref()) {
+            work_folder::remove_leftovers(&folder);
+            WorkFolder::create_in(&folder)
+                .map_err(|e| refuse("a folder for results cannot be written to", &folder, &e))?;
+        }
         Ok(folder)
     }
 
@@ -84,6 +96,53 @@ impl OutputFolder {
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The folders that exist already and into which results are put.
+    fn folders(&self, manifest: Option<&Manifest>) -> BTreeSet<PathBuf> {
+        let old = manifest
+            .into_iter()
+            .flat_map(|manifest| manifest.files.keys());
+        let names = self.claim.fixed().chain(old.map(String::as_str));
+        let parents = names.filter_map(|name| Path::new(name).parent());
+        let families = self
+            .claim
+            .families
+            .iter()
+            .map(|family| Path::new(family.folder));
+        let folders = parents.chain(families).map(|name| self.path.join(name));
+        let folders = folders.chain([self.path.clone()]);
+        folders.filter(|folder| folder.is_dir()).collect()
+    }
+
+    /// Whether beginning the work of `heading` discards unfinished work of the same command on the same inputs.
+    ///
+    /// # Errors
+    /// If the unfinished work has other inputs: it is not discarded.
+    pub fn discards(&self, heading: &Heading) -> Result<bool, InputError> {
+        let mut is_discarded = false;
+        for name in journal::NAMES {
+            let path = self.path.join(name);
+            let Some(before) = journal::heading_of(&path) else {
+                continue;
+            };
+            if !heading.has_inputs_of(&before) {
+                return Err(self.unfinished(&path, &before));
+            }
+            is_discarded = true;
+        }
+        Ok(is_discarded)
+    }
+
+    fn unfinished(&self, journal: &Path, before: &Heading) -> InputError {
+        InputError::file(journal, "this folder holds unfinished work")
+            .found(format!("the journal of `kmcfit {}`", before.text_of_command()))
+            .expected("a folder without it")
+            .hint(format!(
+                "finish it with `kmcfit resume {}`, give another folder with --out, or remove the journal to discard \
+                 the work",
+                self.path.display()
+            ))
     }
 
     /// Begins to write results.
@@ -153,13 +212,11 @@ impl OutputFolder {
             for (name, record) in &manifest.files {
                 let path = self.path.join(name);
                 self.check_parent(name)?;
-                if record.state(&path) == FileState::Changed {
-                    return Err(InputError::file(
-                        &path,
-                        "this file was changed since kmcfit wrote it, and would be replaced",
-                    )
-                    .expected("the file as it was written, or none")
-                    .hint("move it away, or give another folder with --out"));
+                if let FileState::Other(problem) = record.state(&path) {
+                    let problem = format!("{problem}, and would be replaced");
+                    return Err(InputError::file(&path, problem)
+                        .expected("the file as it was written, or none")
+                        .hint("move it away, or give another folder with --out"));
                 }
             }
         }
@@ -214,24 +271,25 @@ impl OutputFolder {
     fn check_journals(&self) -> Result<(), InputError> {
         for name in journal::NAMES {
             let path = self.path.join(name);
-            match journal::command_of(&path) {
-                Some(command) if command != self.claim.command => {
-                    return Err(InputError::file(
-                        &path,
-                        "this folder holds unfinished work of another command",
-                    )
-                    .found(format!("the journal of `kmcfit {command}`"))
-                    .expected("a folder without it")
-                    .hint(format!(
-                        "finish it with `kmcfit resume {}`, or give another folder with --out",
-                        self.path.display()
-                    )));
+            match journal::heading_of(&path) {
+                Some(before) if before.command != self.claim.command => {
+                    return Err(self.unfinished(&path, &before));
                 }
                 None if self.claim.journals.contains(&name) => self.check_missing(name)?,
                 _ => {}
             }
         }
         Ok(())
+    }
+}
+
+/// The folder itself, or the nearest one above it that exists.
+fn existing(folder: &Path) -> &Path {
+    let mut above = folder.ancestors();
+    let above = above.find(|above| above.exists()).unwrap_or(folder);
+    match above.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => above,
     }
 }
 

@@ -120,10 +120,15 @@ pub fn create_folders(folder: &Path) -> io::Result<()> {
         return Ok(());
     }
     faults::check(Operation::Create)?;
-    match folder.ancestors().find(|above| above.is_file()) {
-        Some(file) => Err(io::Error::other(format!(
-            "{} is a file, not a folder",
-            file.display()
+    let is_no_folder = |above: &&Path| above.symlink_metadata().is_ok() && !above.is_dir();
+    match folder.ancestors().find(is_no_folder) {
+        Some(other) => Err(io::Error::other(format!(
+            "{} is {}, not a folder",
+            other.display(),
+            match other.is_symlink() {
+                true => "a link that leads to no folder",
+                false => "a file",
+            }
         ))),
         None => fs::create_dir_all(folder),
     }

@@ -338,3 +338,48 @@ fn every_operation_fails_and_all_later_ones() {
 fn a_kill_at_every_operation() {
     check_all(Mode::Kill);
 }
+
+/// A file of an exchange that was damaged after the kill is not put into place, and neither are the others.
+#[test]
+fn a_damaged_exchange_is_refused() {
+    if !cfg!(debug_assertions) {
+        eprintln!("SKIPPED: faults are injected in builds with debug assertions only");
+        return;
+    }
+    let template = bench();
+    let fit = ["fit", "model.yaml", "--out", "run"];
+    template.run_to(0, &fit);
+    let exchange = "run/.kmcfit-exchange";
+    let killed = (1..).find_map(|number| {
+        let bench = Workbench::in_memory();
+        crate::tree::copy(&template.path(""), &bench.path(""));
+        let (_, was_reached) = run_with(&bench, &fit, &format!("{number}!"));
+        assert!(was_reached, "no exchange in {number} operations");
+        let has_new = bench.path(&format!("{exchange}/new/result.json")).exists();
+        has_new.then_some(bench)
+    });
+    let killed = killed.expect("an exchange");
+    let damages: [(&str, &dyn Fn(&Path)); 4] = [
+        ("new/result.json", &|path| {
+            fs::write(path, "{}").expect("room")
+        }),
+        ("new/result.json", &|path| {
+            fs::remove_file(path).expect("removed")
+        }),
+        ("plan.json", &|path| fs::remove_file(path).expect("removed")),
+        ("plan.json", &|path| fs::write(path, "{}").expect("room")),
+    ];
+    for (name, damage) in damages {
+        let bench = Workbench::in_memory();
+        crate::tree::copy(&killed.path(""), &bench.path(""));
+        damage(&bench.path(&format!("{exchange}/{name}")));
+        let before = tree(&bench.path("run"));
+        let (code, _, stderr) = bench.run(&["predict", "run", "--initial", "1,0"]);
+        assert_eq!(code, 2, "{name}: {stderr}");
+        assert!(
+            stderr.contains(exchange) && stderr.contains("hint: move it away"),
+            "{stderr}"
+        );
+        assert!(tree(&bench.path("run")) == before, "{name}");
+    }
+}

@@ -132,7 +132,7 @@ fn unfinished_work_of_another_command_is_refused() {
     let bench = Workbench::with_small_model();
     let fit = ["fit", "model.yaml", "--out", "run"];
     bench.run_to(0, &[&fit[..], &["--set", "fit.stop.iterations=4"]].concat());
-    let journal = r#"{"format":2,"version":"","command":"fit","inputs":[],"figures":true,"checkpoint":null,"sources":[]}"#;
+    let journal = r#"{"format":2,"version":"","command":"fit","inputs":["model.yaml"],"figures":true,"checkpoint":null,"sources":[]}"#;
     let heading = serde_json::from_str(journal).expect("a heading");
     let text = kmcfit::results::with_checksums(&heading, b"").expect("text");
     std::fs::create_dir(bench.path("killed")).expect("a folder");
@@ -220,4 +220,80 @@ fn leftovers_of_killed_runs_are_removed() {
     let whole = tree(&bench.path("run"));
     let settled = settled(&whole);
     assert_eq!(whole.len(), settled.len() + 3, "{:?}", whole.keys());
+}
+
+/// A folder below that cannot be written to is named before the fit, not after it.
+#[test]
+#[cfg(unix)]
+fn a_read_only_folder_below_is_refused_before_the_fit() {
+    let bench = Workbench::with_small_model();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    let program = bench.path("kmcfit");
+    std::fs::copy(env!("CARGO_BIN_EXE_kmcfit"), &program).expect("a copy");
+    // The administrator may write to every folder.
+    let line = format!(
+        "chmod -R a+rwX . && chmod 555 run/figures && exec setpriv --reuid=65534 --clear-groups '{}' fit model.yaml --out run",
+        program.display()
+    );
+    let can = std::process::Command::new("setpriv")
+        .args(["--reuid=65534", "--clear-groups", "true"])
+        .status();
+    if !can.is_ok_and(|status| status.success()) {
+        eprintln!("SKIPPED: this process may not change its user");
+        return;
+    }
+    let output = std::process::Command::new("sh")
+        .args(["-c", &line])
+        .current_dir(bench.path(""))
+        .output()
+        .expect("a shell");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.starts_with("error: --out: "), "{stderr}");
+    assert!(stderr.contains("run/figures"), "{stderr}");
+    assert!(!bench.path("run/fit.journal").exists());
+}
+
+/// What stands in the place of an output folder is named.
+#[test]
+#[cfg(unix)]
+fn other_things_in_the_place_of_the_folder_are_named() {
+    let bench = Workbench::with_small_model();
+    std::os::unix::fs::symlink("nowhere", bench.path("link")).expect("a link");
+    bench.write("file", "mine");
+    for (out, what) in [
+        ("link/run", "a link"),
+        ("link", "a link"),
+        ("file", "a file"),
+    ] {
+        let stderr = refused(&bench, &["fit", "model.yaml", "--out", out], "--out");
+        assert!(stderr.contains(what), "{stderr}");
+        assert!(!stderr.contains("os error"), "{stderr}");
+    }
+}
+
+/// Unfinished work on another model is not discarded; on the same model it is, with a note.
+#[test]
+fn unfinished_work_on_another_model_is_refused() {
+    for (command, journal) in [("fit", "fit"), ("study", "study"), ("compare", "compare")] {
+        let bench = Workbench::with_small_model();
+        bench.write("other.yaml", MODEL);
+        let text = format!(
+            r#"{{"format":2,"version":"","command":"{command}","inputs":["other.yaml"],"figures":true,"checkpoint":null,"sources":[]}}"#
+        );
+        let heading = serde_json::from_str(&text).expect("a heading");
+        let text = kmcfit::results::with_checksums(&heading, b"").expect("text");
+        let journal = format!("killed/{journal}.journal");
+        std::fs::create_dir(bench.path("killed")).expect("a folder");
+        std::fs::write(bench.path(&journal), text).expect("room");
+        let stderr = refused(
+            &bench,
+            &[command, "model.yaml", "--out", "killed"],
+            &journal,
+        );
+        assert!(stderr.contains("other.yaml"), "{stderr}");
+        let (code, _, stderr) = bench.run(&[command, "./other.yaml", "--out", "killed"]);
+        assert!(code == 0 || code == 3, "{stderr}");
+        assert!(stderr.contains("Discarding the unfinished"), "{stderr}");
+    }
 }

@@ -91,3 +91,27 @@ fn a_comparison_is_resumed() {
         std::fs::remove_dir_all(bench.path("run")).expect("removed");
     }
 }
+
+/// A signal that the process was started to ignore stays ignored.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_ignored_signal_stays_ignored() {
+    let bench = bench();
+    let line = format!(
+        "trap '' TERM; exec '{}' fit models/slow.yaml --out run",
+        env!("CARGO_BIN_EXE_kmcfit")
+    );
+    let mut child = Command::new("sh")
+        .args(["-c", &line])
+        .current_dir(bench.path(""))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("a shell");
+    wait_for_lines(&bench, "run/fit.journal", 20);
+    signal(&child, "-TERM");
+    let code = child.wait().expect("it ends").code();
+    assert!(matches!(code, Some(0 | 3)), "{code:?}");
+    let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
+    assert_ne!(result["outcome"]["status"], "interrupted");
+}
