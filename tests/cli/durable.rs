@@ -145,7 +145,7 @@ fn a_study_whose_fit_is_ended() {
     let model = bench
         .read("models/knots.yaml")
         .replace("gauss-newton", "projected-gradient");
-    let model = model.replace("{iterations: 50, tolerance: 1e-10}", "{iterations: 400}");
+    let model = model.replace("{iterations: 50, tolerance: 1.0e-10}", "{iterations: 400}");
     bench.write("models/knots.yaml", &model);
     bench.run_to(0, &["study", "models/knots.yaml", "--out", "whole"]);
     for end in ["-KILL", "-INT"] {
@@ -176,7 +176,7 @@ fn a_story_whose_fit_is_ended() {
     let slow = bench
         .read("models/knots.yaml")
         .replace("gauss-newton", "projected-gradient")
-        .replace("{iterations: 50, tolerance: 1e-10}", "{iterations: 400}");
+        .replace("{iterations: 50, tolerance: 1.0e-10}", "{iterations: 400}");
     bench.write("models/slow.yaml", &slow);
     bench.run_to(0, &["fit", "models/slow.yaml", "--out", "whole"]);
     bench.run_to(0, &["fit", "models/knots.yaml", "--out", "run/slow"]);

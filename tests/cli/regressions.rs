@@ -123,7 +123,7 @@ fn forty_thousand_nodes_run_the_same_commands() {
     let model = model
         .replace("paper.csv", "large.csv")
         .replace("nodes: 2000", "nodes: 40000")
-        .replace("{iterations: 1000, cost_ratio: 1e-6}", "{iterations: 5}");
+        .replace("{iterations: 1000, cost_ratio: 1.0e-6}", "{iterations: 5}");
     bench.write("models/large.yaml", &model);
     bench.run_to(0, &["fit", "models/large.yaml"]);
     assert_eq!(status(&bench, "runs/large"), "completed");

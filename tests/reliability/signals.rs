@@ -41,7 +41,7 @@ fn bench() -> Workbench {
     let slow = bench
         .read("models/knots.yaml")
         .replace("gauss-newton", "projected-gradient")
-        .replace("{iterations: 50, tolerance: 1e-10}", "{iterations: 400}");
+        .replace("{iterations: 50, tolerance: 1.0e-10}", "{iterations: 400}");
     assert!(slow.contains("iterations: 400"));
     bench.write("models/slow.yaml", &slow);
     bench
