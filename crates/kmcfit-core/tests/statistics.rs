@@ -8,6 +8,7 @@ use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, Value,
 };
+use kmcfit_core::internals::identifiability::{BandSettings, Bands};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::solvers::fit_with_noise;
@@ -521,4 +522,41 @@ fn readings_of_nothing_keep_their_sigma() {
     assert_eq!(sigma_of(&with_sigma), sigma_of(&problem));
     assert_eq!(fit.best.evaluation.cost, 0.0);
     assert_eq!(fit.best.parameters, [0.0]);
+}
+
+/// Standard errors and bands come from one factorisation: where the measurements leave a parameter open, both say so,
+/// and elsewhere the standard error of a constant is that of its band.
+#[test]
+fn standard_errors_and_bands_agree() {
+    let settings = BandSettings {
+        draws: 0,
+        ..BandSettings::default()
+    };
+    let both = |setup: &Setup| {
+        let problem = setup.problem(setup.clean(), 0.1);
+        let theta = setup.theta();
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let bands = Bands::at(&problem, &theta, &evaluation, &settings);
+        (problem.covariance(&evaluation), bands)
+    };
+    let mut setup = Setup::forced(ChannelKind::Displacement);
+    setup.start[0] = Some(1.1);
+    let (covariance, bands) = both(&setup);
+    let covariance = covariance.expect("a force gives the mass");
+    assert_eq!(bands.unseen, 0);
+    for (j, band) in bands.functions.iter().enumerate() {
+        let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
+        assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
+    }
+    // Of a free response the ratios to the mass are known, and none of the functions.
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start[0] = Some(1.1);
+    let (covariance, bands) = both(&setup);
+    assert!(covariance.is_none());
+    assert_eq!(bands.unseen, 1);
+    for band in &bands.functions {
+        assert!(band.standard_error.iter().all(|e| e.is_infinite()));
+    }
+    let ratio = bands.ratio("k/m").expect("a stiffness");
+    assert!(ratio.standard_error.iter().all(|e| e.is_finite()));
 }

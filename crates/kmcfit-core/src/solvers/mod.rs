@@ -6,7 +6,6 @@
 mod active_set;
 mod checkpoint;
 mod counts;
-mod covariance;
 mod evaluator;
 mod executor;
 mod fit;
@@ -37,7 +36,7 @@ pub use fit::{Attempt, Fit};
 pub use history::IterationRecord;
 pub use iterate::Iterate;
 pub use linearization::FEW_PARAMETERS;
-pub(crate) use linearization::{add_priors, linear_readings, weighted_jacobian};
+pub(crate) use linearization::{add_penalties, add_priors, linear_readings, weighted_jacobian};
 pub use methods::equation_error::{Measurements, equation_error};
 pub use no_response::without_motion;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};

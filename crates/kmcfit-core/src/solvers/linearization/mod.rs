@@ -9,8 +9,8 @@ mod structured;
 mod tests;
 
 pub(super) use halves::{halfway, in_halves};
-pub(crate) use penalties::add_priors;
-pub(super) use penalties::{add_penalties, add_variations};
+pub(super) use penalties::add_variations;
+pub(crate) use penalties::{add_penalties, add_priors};
 pub(super) use reduced::Reduced;
 pub(crate) use reduced::weighted_jacobian;
 
