@@ -42,7 +42,7 @@ pub mod objective {
     pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
 }
 pub mod problem {
-    pub use crate::problem::Problem;
+    pub use crate::problem::{Problem, ProblemError};
 }
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};

@@ -205,6 +205,12 @@ impl Parameterization {
     /// If `theta` has another number of parameters.
     #[must_use]
     pub fn with_start(mut self, theta: &[f64]) -> Self {
+        self.set_start(theta);
+        self
+    }
+
+    /// Moves the start of the search.
+    pub(crate) fn set_start(&mut self, theta: &[f64]) {
         assert_eq!(theta.len(), self.parameters(), "one start per parameter");
         for (function, range) in self.list.iter_mut().zip(&self.ranges) {
             function.start.copy_from_slice(&theta[range.clone()]);
@@ -213,7 +219,6 @@ impl Parameterization {
         for (scalar, start) in self.scalars.iter_mut().zip(&theta[scalars]) {
             scalar.start = *start;
         }
-        self
     }
 
     /// A device of the right shape, all zero.

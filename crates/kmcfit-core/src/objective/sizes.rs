@@ -218,7 +218,7 @@ mod tests {
             .build()
             .unwrap();
         if !other_is_read {
-            problem.experiments[1].channels.clear();
+            problem.parts_mut().experiments[1].channels.clear();
         }
         problem
     }

@@ -103,7 +103,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
     let readings = problem.reading_count() as f64;
     let share = (problem.parameters() as f64 / readings).min(0.5);
     let mut largest = 0.0f64;
-    let experiments = problem.experiments.iter_mut();
+    let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
         for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
             let Weighting::Estimated { sigma: before } = *channel.weighting() else {

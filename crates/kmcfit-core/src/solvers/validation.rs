@@ -37,7 +37,8 @@ pub fn predict_held_out(
         ..experiment.clone()
     };
     alone.name.clone_from(&experiment.name);
-    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone]);
+    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone])
+        .expect("a record that fits the grid and its own scalars");
     let mut start = alone.start();
     let first = states_from_readings(&alone).into_iter().next().flatten();
     if let Some(state) = first {

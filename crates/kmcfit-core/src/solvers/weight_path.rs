@@ -99,7 +99,7 @@ impl Problem {
     pub fn with_penalty_factor(&self, which: &[usize], factor: f64) -> Self {
         let mut problem = self.clone();
         for &i in which {
-            problem.penalties[i].weight *= factor;
+            problem.parts_mut().penalties[i].weight *= factor;
         }
         problem
     }

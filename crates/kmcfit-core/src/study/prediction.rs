@@ -138,6 +138,6 @@ fn with_run(problem: &Problem, run: &Run) -> Problem {
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
     experiment.device = run.device;
-    seen.experiments = vec![experiment.with_channel(channel)];
+    seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

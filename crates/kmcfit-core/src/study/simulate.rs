@@ -42,7 +42,7 @@ pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
 pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
     let mut simulated = problem.clone();
     let mut first = 0;
-    let experiments = simulated.experiments.iter_mut();
+    let experiments = simulated.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&evaluation.predictions) {
         for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
             let part = &noise[first..first + predicted.len()];

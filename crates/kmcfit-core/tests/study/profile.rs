@@ -227,7 +227,7 @@ fn a_nodal_function_has_a_profile() {
     list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(oscillator, list, values, Some(sigma));
     let rows = Basis::Nodal.roughness(&problem.oscillator.grid, 2);
-    problem.penalties.push(Penalty::new(0, 2, 1e4, rows));
+    problem.penalize(Penalty::new(0, 2, 1e4, rows)).unwrap();
     let settings = crate::common::synthetic::settings();
     let best = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let q = Linear::value(&problem, 0, 12.5).unwrap();
@@ -248,14 +248,18 @@ fn a_nodal_function_has_a_profile() {
 /// parameter's diagonal of `(J'J)^-1`: the covariance is `V SSR/(n - p)`.
 #[test]
 fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
-    let mut problem = linear(4);
-    for experiment in &mut problem.experiments {
-        let plain = |c: &Channel| {
-            let weights = vec![1.0; c.len()];
-            c.clone().with_weighting(Weighting::Trapezoid(weights))
-        };
-        experiment.channels = experiment.channels.iter().map(plain).collect();
-    }
+    let problem = linear(4);
+    let problem = problem
+        .with(|parts| {
+            for experiment in &mut parts.experiments {
+                let plain = |c: &Channel| {
+                    let weights = vec![1.0; c.len()];
+                    c.clone().with_weighting(Weighting::Trapezoid(weights))
+                };
+                experiment.channels = experiment.channels.iter().map(plain).collect();
+            }
+        })
+        .unwrap();
     let best = optimum(&problem);
     let covariance = problem
         .covariance(&problem.evaluate(&best).unwrap())
@@ -285,7 +289,11 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
             [0.0, 10.0],
         );
     }
-    problem.constraints.groups.push(group);
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let best = optimum(&problem);
     let misfit = problem.evaluate(&best).unwrap().misfit;
     let q = Linear::mean(&problem, 2);

@@ -49,7 +49,7 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
     let right = value - of.constant;
     let time = of.time.unwrap_or(problem.oscillator.grid.start());
     group.push(of.entries.iter().copied(), [right, right], [time, time]);
-    held.constraints.groups.push(group);
+    held.parts_mut().constraints.groups.push(group);
     held
 }
 
@@ -324,7 +324,7 @@ impl<'a> Walk<'a> {
             return End::Rise;
         }
         let mut without = self.problem.clone();
-        let constraints = &mut without.constraints;
+        let constraints = &mut without.parts_mut().constraints;
         constraints.groups.retain(|g| !new.contains(&g.name));
         constraints.cones.retain(|g| !new.contains(&g.name));
         match self.fit(&without, end.value, &end.point.parameters) {
