@@ -121,7 +121,7 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
         starts,
         seed: 1,
         threads,
-        ladder: false,
+        attempts: false,
         settings: model.settings.clone(),
     }
 }

@@ -107,13 +107,13 @@ pub use functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
     Variation,
 };
-pub use problem::{Problem, ProblemError};
+pub use problem::{Problem, ProblemError, ProblemParts};
 pub use record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
-pub use simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
+pub use simulate::{Cause, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
     Attempt, Counts, Fit, FitSettings, Initial, Optimality, Outcome, Reason, Solver, StartStrategy,

@@ -7,6 +7,9 @@ use crate::system::System;
 use std::ops::{Deref, Range};
 use thiserror::Error;
 
+/// Up to so many parameters Jacobians are formed by one tangent solve each, and covariances and bands with every fit.
+pub const FEW_PARAMETERS: usize = 64;
+
 /// The parts of a problem. [`Problem::new`] and [`Problem::with`] check that they fit each other.
 #[derive(Debug, Clone)]
 pub struct ProblemParts {

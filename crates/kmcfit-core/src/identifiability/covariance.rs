@@ -7,13 +7,11 @@ use super::linear::{null_space, right_svd};
 use super::sensitivity::Sensitivity;
 use crate::functions::Penalty;
 use crate::objective::Evaluation;
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use nalgebra::{DMatrix, DVector};
 
 /// A direction whose singular value is below this share of the largest is not identifiable.
 const UNSEEN: f64 = 1e-11;
-/// Most parameters whose covariance is formed.
-const MOST_PARAMETERS: usize = 64;
 /// Constraint rows closer to dependent than this are so.
 const DEPENDENT: f64 = 1e-10;
 
@@ -30,6 +28,7 @@ pub(super) struct Information {
 }
 
 /// `Cov = F F^T` on the directions that are seen, nothing on the others.
+#[derive(Clone)]
 pub(super) struct Factor {
     /// Directions x rank.
     pub root: DMatrix<f64>,
@@ -190,7 +189,7 @@ impl Problem {
     /// noise is neither given nor left by the fit.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
         let (n, readings) = (self.parameters(), self.reading_count());
-        if n == 0 || n > MOST_PARAMETERS || readings <= n {
+        if n == 0 || n > FEW_PARAMETERS || readings <= n {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);

@@ -1,4 +1,4 @@
-//! Which further record would show most.
+//! Experiment design: the information that a further record adds.
 //!
 //! At the present parameters each candidate is simulated and its Jacobian put below that of the records
 //! there are. **New directions** are those by which the rank grows. For the directions that are seen

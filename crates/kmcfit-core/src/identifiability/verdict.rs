@@ -1,4 +1,4 @@
-//! What the bands say of each function and ratio, in words.
+//! Classification of functions and ratios by their bands.
 
 use super::bands::{Band, Bands};
 use super::linear::{span_words, spans};

@@ -1,7 +1,6 @@
 //! Experiments that took no part in the fit.
 
-use super::checkpoint::Observer;
-use super::executor::search;
+use super::executor::search_unobserved;
 use super::settings::{FitSettings, Solver};
 use super::state_estimation::states_from_readings;
 use crate::functions::{CoefficientFunction, Parameterization, ScalarParameter};
@@ -53,12 +52,6 @@ pub fn predict_held_out(
         solver: Solver::GaussNewton,
         ..settings.clone()
     };
-    let found = search(
-        &alone,
-        &start,
-        &settings,
-        None,
-        &mut Observer::new(&mut |_| {}),
-    )?;
+    let found = search_unobserved(&alone, &start, &settings)?;
     Ok((alone, found.best.evaluation))
 }

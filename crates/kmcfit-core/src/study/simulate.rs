@@ -17,9 +17,8 @@ pub fn stream(seed: u64, index: usize) -> ChaCha8Rng {
 /// stated one, or where none is stated the root of the unweighted residuals' mean square, all
 /// channels without sigma together, made unbiased by `n / (n - p)`.
 pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
-    let predictions = evaluation.predictions.iter().flatten();
     let (mut squares, mut count) = (0.0, 0usize);
-    for (channel, predicted) in problem.channels().zip(predictions) {
+    for (channel, predicted) in problem.predicted(evaluation) {
         if !channel.weighting().is_sigma() {
             squares += channel.residuals(predicted).map(|r| r * r).sum::<f64>();
             count += channel.len();

@@ -1,4 +1,4 @@
-//! How large a change of a function is large.
+//! Natural scales of the functions: the size at which a change of one matters.
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
@@ -7,8 +7,8 @@ use crate::record::{ChannelKind, Experiment, LONG_RECORD_STEPS};
 use crate::signal::Spectrum;
 use crate::simd::sum::{dot, largest};
 use crate::simulate::Trajectory;
-use crate::system::quadrature::curvature_into;
-use crate::system::{MOST_TERMS, Term};
+use crate::system::Term;
+use crate::system::quadrature::curvature;
 use std::f64::consts::TAU;
 
 impl Problem {
@@ -84,64 +84,26 @@ impl Problem {
     }
 }
 
-/// The sums over the nodes of `y''^2` and of `phi^2` of each term; of a long motion in lanes.
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term. Descents along the gradient alone depend on every bit
+/// of them: of short records they are in order.
 fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
-    let Trajectory {
-        displacement: y,
-        velocity: v,
-    } = motion;
-    let mut acceleration = [0.0; PART];
-    let mut sums = vec![0.0; terms.len() + 1];
-    let mut phi = [[0.0; PART]; MOST_TERMS];
-    for from in (0..motion.nodes()).step_by(PART) {
-        let range = from..(from + PART).min(motion.nodes());
-        curvature_into(y, step, from, &mut acceleration[..range.len()]);
-        let (y, v) = (&y[range.clone()], &v[range.clone()]);
-        for (term, phi) in terms.iter().zip(&mut phi) {
-            if !matches!(term, Term::Damping | Term::Stiffness) {
-                let pairs = y.iter().zip(v);
-                let values = phi.iter_mut().zip(pairs);
-                values.for_each(|(phi, (y, v))| *phi = term.phi(*y, *v));
-            }
+    let (y, v) = (&motion.displacement, &motion.velocity);
+    let square = |values: &[f64]| match values.len() > LONG_RECORD_STEPS {
+        true => dot(values, values),
+        false => values.iter().fold(0.0, |sum, x| sum + x * x),
+    };
+    let of = |term: &Term| match term {
+        Term::Damping => square(v),
+        Term::Stiffness => square(y),
+        _ => {
+            let values = y.iter().zip(v).map(|(y, v)| term.phi(*y, *v));
+            square(&values.collect::<Vec<f64>>())
         }
-        let seen = terms.iter().zip(&phi).map(|(term, phi)| match term {
-            Term::Damping => v,
-            Term::Stiffness => y,
-            _ => &phi[..range.len()],
-        });
-        let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
-            .chain(seen)
-            .collect();
-        if motion.nodes() > LONG_RECORD_STEPS {
-            for (column, sum) in columns.iter().zip(&mut sums) {
-                *sum += dot(column, column);
-            }
-            continue;
-        }
-        for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {
-            add_squares(columns, sums);
-        }
-    }
-    sums
-}
-
-/// Nodes whose terms are looked at together.
-const PART: usize = 256;
-
-/// Adds the squares of each column in their order: up to four sums side by side, as each waits for
-/// itself.
-fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
-    let column = |c: usize| columns[c.min(columns.len() - 1)];
-    let (zero, one, two, three) = (column(0), column(1), column(2), column(3));
-    let mut four = [0.0; 4];
-    four[..sums.len()].copy_from_slice(sums);
-    for (((a, b), c), d) in zero.iter().zip(one).zip(two).zip(three) {
-        four[0] += a * a;
-        four[1] += b * b;
-        four[2] += c * c;
-        four[3] += d * d;
-    }
-    sums.copy_from_slice(&four[..sums.len()]);
+    };
+    let inertia = square(&curvature(y, step));
+    std::iter::once(inertia)
+        .chain(terms.iter().map(of))
+        .collect()
 }
 
 /// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
