@@ -160,10 +160,10 @@ impl Forward<'_> {
                 from,
                 &mut stages,
             );
-            for k in 0..MOST_TERMS {
-                if let Some(j) = self.kinds[k] {
+            for (k, (kind, steady)) in self.kinds.iter().zip(steady).enumerate() {
+                if let Some(j) = *kind {
                     // Rates of constants are those of the first eight steps.
-                    if from > 0 && steady[k] {
+                    if from > 0 && steady {
                         continue;
                     }
                     let values = &self.equation.device.coefficients[j];
