@@ -5,10 +5,11 @@ use crate::diagnostics::median_size;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment, LONG_RECORD_STEPS};
 use crate::signal::Spectrum;
-use crate::simd::sum::{dot, largest};
+use crate::simd::LANES;
+use crate::simd::sum::largest;
 use crate::simulate::Trajectory;
 use crate::system::Term;
-use crate::system::quadrature::curvature;
+use crate::system::quadrature::curvature_at;
 use std::f64::consts::TAU;
 
 impl Problem {
@@ -84,26 +85,34 @@ impl Problem {
     }
 }
 
-/// The sums over the nodes of `y''^2` and of `phi^2` of each term. Descents along the gradient alone depend on every bit
-/// of them: of short records they are in order.
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term.
 fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     let (y, v) = (&motion.displacement, &motion.velocity);
-    let square = |values: &[f64]| match values.len() > LONG_RECORD_STEPS {
-        true => dot(values, values),
-        false => values.iter().fold(0.0, |sum, x| sum + x * x),
-    };
+    let inertia = sum_of_squares(y.len(), |i| curvature_at(y, step, i));
     let of = |term: &Term| match term {
-        Term::Damping => square(v),
-        Term::Stiffness => square(y),
-        _ => {
-            let values = y.iter().zip(v).map(|(y, v)| term.phi(*y, *v));
-            square(&values.collect::<Vec<f64>>())
-        }
+        Term::Damping => sum_of_squares(v.len(), |i| v[i]),
+        Term::Stiffness => sum_of_squares(y.len(), |i| y[i]),
+        _ => sum_of_squares(y.len(), |i| term.phi(y[i], v[i])),
     };
-    let inertia = square(&curvature(y, step));
     std::iter::once(inertia)
         .chain(terms.iter().map(of))
         .collect()
+}
+
+/// Sum of the squares of `count` values, of many in eight sums side by side. Descents along the gradient alone depend on
+/// every bit: few are added in order.
+fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
+    let lane = if count > LONG_RECORD_STEPS {
+        LANES - 1
+    } else {
+        0
+    };
+    let mut sums = [0.0; LANES];
+    for i in 0..count {
+        let x = value(i);
+        sums[i & lane] += x * x;
+    }
+    sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
 
 /// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`

@@ -39,6 +39,15 @@ impl NodalCoefficients {
         std::iter::once(self.mass.as_slice()).chain(self.coefficients.iter().map(Vec::as_slice))
     }
 
+    /// Function `f` of that list.
+    #[inline(always)]
+    pub(crate) fn function_mut(&mut self, f: usize) -> &mut Vec<f64> {
+        match f {
+            0 => &mut self.mass,
+            f => &mut self.coefficients[f - 1],
+        }
+    }
+
     /// As [`NodalCoefficients::functions`], mutable.
     pub fn functions_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
         std::iter::once(&mut self.mass).chain(self.coefficients.iter_mut())

@@ -67,6 +67,16 @@ pub fn curvature(f: &[f64], dt: f64) -> Vec<f64> {
     d
 }
 
+/// [`curvature`] at node `i`.
+#[inline(always)]
+pub fn curvature_at(f: &[f64], dt: f64, i: usize) -> f64 {
+    let middle = i.clamp(1, f.len() - 2);
+    match i.cmp(&middle) {
+        std::cmp::Ordering::Greater => second(f[i], f[i - 1], f[i - 2], dt),
+        _ => second(f[middle - 1], f[middle], f[middle + 1], dt),
+    }
+}
+
 #[inline(always)]
 fn second(a: f64, b: f64, c: f64, dt: f64) -> f64 {
     (a - 2.0 * b + c) / dt / dt

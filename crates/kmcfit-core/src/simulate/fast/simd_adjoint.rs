@@ -3,8 +3,8 @@
 
 use super::step_linearisation::{self, StepLinearisation, Wanted};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
-use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
+use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{FUNCTIONS, Method, NodalCoefficients, State, SystemTangent};
 
 /// As [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()), to 40 machine precisions of the largest
@@ -17,14 +17,27 @@ pub(crate) fn gradient(
     source: &Trajectory,
 ) -> SystemTangent {
     let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
-    let initial = simd::run(Back {
+    let gradient = CoefficientGradient::AtNodes(&mut device);
+    let initial = back(equation, method, trajectory, source, gradient);
+    SystemTangent { device, initial }
+}
+
+/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
+/// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
+pub(crate) fn back(
+    equation: EquationOfMotion,
+    method: Method,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+    gradient: CoefficientGradient,
+) -> State {
+    simd::run(Back {
         equation,
         method,
         trajectory,
         source,
-        gradient: &mut device,
-    });
-    SystemTangent { device, initial }
+        gradient,
+    })
 }
 
 struct Back<'a> {
@@ -32,8 +45,7 @@ struct Back<'a> {
     method: Method,
     trajectory: &'a Trajectory,
     source: &'a Trajectory,
-    /// Zero at first.
-    gradient: &'a mut NodalCoefficients,
+    gradient: CoefficientGradient<'a>,
 }
 
 impl Kernel for Back<'_> {
@@ -42,12 +54,15 @@ impl Kernel for Back<'_> {
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> State {
         let (equation, source) = (&self.equation, self.source);
-        let gradient = self.gradient;
+        let mut gradient = self.gradient;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
-        let wanted = Wanted {
-            ends: [true; FUNCTIONS],
-            sum: [false; FUNCTIONS],
+        let mut wanted = Wanted::default();
+        let asked = match &gradient {
+            CoefficientGradient::AtNodes(_) => &mut wanted.ends,
+            CoefficientGradient::Summed(_) => &mut wanted.sum,
         };
+        asked[..=equation.terms.len()].fill(true);
         let mut maps = StepLinearisation::NOTHING;
         let mut x = [source.displacement[last], source.velocity[last]];
         let mut to = last;
@@ -78,12 +93,26 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[0]),
                 Eight::load(arithmetic, &ends[1]),
             ];
-            for (f, values) in gradient.functions_mut().enumerate() {
-                let left = share(arithmetic, &maps.left[f], ends);
-                let right = share(arithmetic, &maps.right[f], ends);
-                set(arithmetic, left, right, to - from, &mut values[from..]);
+            for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
+                match &mut gradient {
+                    CoefficientGradient::AtNodes(device) => {
+                        let left = share(arithmetic, &maps.left[f], ends);
+                        let right = share(arithmetic, &maps.right[f], ends);
+                        let values = &mut device.function_mut(f)[from..];
+                        set(arithmetic, left, right, to - from, values);
+                    }
+                    CoefficientGradient::Summed(_) => {
+                        let share = share(arithmetic, &maps.sum[f], ends);
+                        *sum = (Eight::load(arithmetic, sum) + share).row();
+                    }
+                }
             }
             to = from;
+        }
+        if let CoefficientGradient::Summed(all) = gradient {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
+            }
         }
         State {
             displacement: x[0],
