@@ -36,7 +36,7 @@ fn message(mass: &str) -> String {
 }
 
 fn functions(mass: &str) -> Parameterization {
-    read(mass).unwrap().problem.functions
+    read(mass).unwrap().problem.functions.clone()
 }
 
 fn basis(mass: &str) -> Basis {

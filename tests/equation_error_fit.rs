@@ -110,14 +110,14 @@ fn problem_of(
 ) -> Problem {
     let grid = oscillator.grid;
     let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
-    let mut problem = Problem::new(oscillator, functions, vec![experiment]);
+    let mut problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
     let measurements = Measurements::of(&problem).unwrap();
     let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();
     for (j, basis) in bases.iter().enumerate() {
         if let Some(basis @ (Basis::Nodal | Basis::BSpline { .. })) = basis {
             let weight = measurements.period_weight(&problem, j, 1);
             let rows = basis.roughness(&grid, 1);
-            problem.penalties.push(Penalty::new(j, 1, weight, rows));
+            problem.penalize(Penalty::new(j, 1, weight, rows)).unwrap();
         }
     }
     problem
@@ -407,7 +407,11 @@ fn constraints_and_soft_constraints() {
         group
     };
     let mut bounded = plain.clone();
-    bounded.constraints.groups.push(group(None));
+    bounded = bounded
+        .with(|parts| {
+            parts.constraints.groups.push(group(None));
+        })
+        .unwrap();
     let bounded = run(&bounded);
     assert_eq!(bounded.outcome.status, Status::Converged);
     assert_eq!(bounded.counts.qp, 1);
@@ -425,7 +429,11 @@ fn constraints_and_soft_constraints() {
     let mut before = free.best.evaluation.cost;
     for weight in [1e-4, 1e-2, 1e4] {
         let mut soft = plain.clone();
-        soft.soft.push(group(Some(weight)));
+        soft = soft
+            .with(|parts| {
+                parts.soft.push(group(Some(weight)));
+            })
+            .unwrap();
         let soft = run(&soft);
         let cost = soft.best.evaluation.cost;
         assert!(
@@ -452,7 +460,11 @@ fn bounds_on_functions_of_unlike_size() {
     for j in 0..NODES {
         group.push([(j, 1.0)], [0.0, f64::INFINITY], [0.0, 60.0]);
     }
-    problem.constraints.groups.push(group);
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let bounded = run(&problem);
     assert_eq!(
         bounded.outcome.status,
@@ -476,7 +488,7 @@ fn readings_without_a_motion() {
     let still = channel(ChannelKind::Acceleration, &grid, vec![1.0; 21]);
     let experiment = Experiment::free("still", REST, 21).with_channel(still);
     let functions = Parameterization::new(free_at_nodes(21), 21, grid.step()).unwrap();
-    let problem = Problem::new(oscillator, functions, vec![experiment]);
+    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
     let found = run(&problem);
     assert_eq!(found.outcome.status, Status::Failed);
     assert_snapshot!(found.outcome.reason.to_string(), @"still: the acceleration is too short or does not oscillate");
@@ -489,7 +501,11 @@ fn readings_without_a_motion() {
             .remarks(&offset)
             .is_empty()
     );
-    offset.oscillator.terms[0] = Term::CubicStiffness;
+    offset = offset
+        .with(|parts| {
+            parts.oscillator.terms[0] = Term::CubicStiffness;
+        })
+        .unwrap();
     let remarks = Measurements::of(&offset).unwrap().remarks(&offset);
     assert_snapshot!(remarks[0], @"shaken: the acceleration is integrated above 1.015 Hz alone, so forces that are not proportional to the motion are seen with an error, and a constant offset is not seen");
     let excitation = Excitation {
@@ -506,7 +522,7 @@ fn readings_without_a_motion() {
         .with_excitation(excitation)
         .with_channel(channel);
     let functions = Parameterization::new(constants(None), NODES, oscillator.grid.step()).unwrap();
-    let problem = Problem::new(oscillator, functions, vec![experiment]);
+    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
     assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations");
 }
 
@@ -561,7 +577,11 @@ fn model_files() {
         CostKind::EquationError
     );
     let mut unweighted = built.problem.clone();
-    unweighted.penalties[0].weight = 2.0;
+    unweighted = unweighted
+        .with(|parts| {
+            parts.penalties[0].weight = 2.0;
+        })
+        .unwrap();
     assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the readings, with y, y' and y'' from the readings and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
@@ -684,7 +704,11 @@ fn two_periods_are_left_out_beside_a_known_force() {
         let share = count as f64 / expected;
         assert!((0.9..1.1).contains(&share), "{count} {expected}");
     }
-    problem.experiments[0].excitation = None;
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].excitation = None;
+        })
+        .unwrap();
     assert_eq!(left_out(&problem), [1, 1]);
 }
 
@@ -706,6 +730,10 @@ fn half_of_a_short_record_is_left() {
         spacing: grid.step(),
     };
     let short = Channel::new(channel.kind(), times, values, weighting, &grid, NODES).unwrap();
-    problem.experiments[0].channels = vec![short];
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels = vec![short];
+        })
+        .unwrap();
     assert_eq!(left_out(&problem), [readings / 4; 2]);
 }

@@ -45,7 +45,7 @@ pub fn paper(nodes: usize) -> Problem {
     ];
     let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
     let record = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
-    Problem::new(oscillator, functions, vec![record])
+    Problem::new(oscillator, functions, vec![record]).unwrap()
 }
 
 fn paper_readings(oscillator: &System) -> Vec<f64> {
@@ -77,7 +77,7 @@ pub fn model(name: &str, changes: &[(&str, &str)]) -> Model {
 
 /// `models/paper-smooth.yaml` on `nodes` nodes.
 pub fn smooth(nodes: usize) -> Model {
-    let oscillator = paper(nodes).oscillator;
+    let oscillator = paper(nodes).oscillator.clone();
     let mut table = String::from("t_s,y_m\n");
     for (t, y) in oscillator
         .grid
@@ -121,7 +121,7 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
         starts,
         seed: 1,
         threads,
-        ladder: false,
+        attempts: false,
         settings: model.settings.clone(),
     }
 }
@@ -184,5 +184,8 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         stopping: Stopping::default(),
         interrupt: None,
     };
-    (Problem::new(oscillator, functions, vec![record]), settings)
+    (
+        Problem::new(oscillator, functions, vec![record]).unwrap(),
+        settings,
+    )
 }

@@ -55,11 +55,11 @@ fn said(text: &str) -> String {
 /// The names of all rows and cones.
 fn names(constraints: &str) -> Vec<String> {
     let model = read(&text(constraints)).unwrap_or_else(|error| panic!("{error}"));
-    let set = model.problem.constraints;
+    let set = model.problem.constraints.clone();
     let rows = set
         .groups
         .into_iter()
-        .chain(model.problem.soft)
+        .chain(model.problem.soft.clone())
         .map(|g| g.name);
     rows.chain(set.cones.into_iter().map(|g| g.name)).collect()
 }

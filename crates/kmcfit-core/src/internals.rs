@@ -42,7 +42,7 @@ pub mod objective {
     pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
 }
 pub mod problem {
-    pub use crate::problem::Problem;
+    pub use crate::problem::{Problem, ProblemError, ProblemParts};
 }
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
@@ -70,13 +70,14 @@ pub mod simulate {
     };
 }
 pub mod solvers {
+    pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
-        ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, FEW_PARAMETERS, Fit,
-        FitSettings, Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality,
-        PathPoint, Solver, SolverState, StartProjection, StartStrategy, Status, Stopping,
-        WeightPath, WeightRule, active_constraints, choose_weight, choose_weight_watched,
-        equation_error, fit, fit_from, fit_with_noise, fit_with_noise_watched, predict_held_out,
-        states_from_readings, timed, without_motion,
+        ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, Fit, FitSettings,
+        Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
+        Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
+        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error, fit,
+        fit_from, fit_with_noise, fit_with_noise_watched, predict_held_out, states_from_readings,
+        timed, without_motion,
     };
 }
 pub mod study {

@@ -57,7 +57,7 @@
 //! let weighting = Weighting::Integral { spacing: grid.step() };
 //! let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
 //! let record = Experiment::free("free decay", initial, nodes).with_channel(channel);
-//! let problem = Problem::new(oscillator, functions, vec![record]);
+//! let problem = Problem::new(oscillator, functions, vec![record]).unwrap();
 //!
 //! let settings = FitSettings {
 //!     solver: Solver::GaussNewton,
@@ -107,13 +107,13 @@ pub use functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
     Variation,
 };
-pub use problem::Problem;
+pub use problem::{Problem, ProblemError, ProblemParts};
 pub use record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
-pub use simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
+pub use simulate::{Cause, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
     Attempt, Counts, Fit, FitSettings, Initial, Optimality, Outcome, Reason, Solver, StartStrategy,

@@ -1,37 +1,174 @@
-//! The validated, immutable problem that everything below the configuration works on.
+//! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
 
-use crate::constraints::{Constraints, RowGroup};
-use crate::functions::{Parameterization, Penalty, Variation};
+use crate::constraints::{ConeGroup, Constraints, RowGroup};
+use crate::functions::{Design, Parameterization, Penalty, Variation};
 use crate::record::{Channel, Experiment, Weighting};
 use crate::system::System;
+use std::ops::{Deref, Range};
+use thiserror::Error;
 
-/// What is fitted: an oscillator, how its functions are represented, and the records.
+/// Up to so many parameters Jacobians are formed by one tangent solve each, and covariances and bands with every fit.
+pub const FEW_PARAMETERS: usize = 64;
+
+/// The parts of a problem. [`Problem::new`] and [`Problem::with`] check that they fit each other.
 #[derive(Debug, Clone)]
-pub struct Problem {
+pub struct ProblemParts {
     /// Grid, stepper and terms.
     pub oscillator: System,
     /// Mass and one function per term.
     pub functions: Parameterization,
     /// The records.
     pub experiments: Vec<Experiment>,
-    /// What the functions pay for being rough.
+    /// Penalties on roughness.
     pub penalties: Vec<Penalty>,
-    /// What the functions pay for jumping.
+    /// Penalties on total variation.
     pub variations: Vec<Variation>,
-    /// What the functions must satisfy.
+    /// Constraints on the functions.
     pub constraints: Constraints,
-    /// What the functions may break at a price.
+    /// Constraints that may be violated at a penalty.
     pub soft: Vec<RowGroup>,
 }
 
+/// A problem to be fitted: parts that fit each other, which can be read and not changed in place.
+#[derive(Debug, Clone)]
+pub struct Problem(ProblemParts);
+
+/// Parts of a problem that do not fit each other.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ProblemError {
+    /// The functions have another number of nodes than the grid.
+    #[error("functions on {functions} nodes, a grid of {grid}")]
+    Nodes {
+        /// Nodes of the functions.
+        functions: usize,
+        /// Nodes of the grid.
+        grid: usize,
+    },
+    /// A system has not one function for the mass and one for each term.
+    #[error("{found} functions for a mass and {terms} terms")]
+    Functions {
+        /// Number of functions.
+        found: usize,
+        /// Number of terms.
+        terms: usize,
+    },
+    /// A record does not fit the grid or the functions.
+    #[error("record `{name}`: {reason}")]
+    Record {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// A penalty is of a function that is not there, or of another number of parameters.
+    #[error("a penalty does not fit function {function}")]
+    Penalty {
+        /// Index of the function.
+        function: usize,
+    },
+    /// A constraint is about a parameter that is not there.
+    #[error("`{name}` is about a parameter that is not there")]
+    Constraint {
+        /// Name of the constraint.
+        name: String,
+    },
+}
+
+impl Deref for Problem {
+    type Target = ProblemParts;
+
+    fn deref(&self) -> &ProblemParts {
+        &self.0
+    }
+}
+
+impl ProblemParts {
+    /// Whether all parts fit each other.
+    fn check(&self) -> Result<(), ProblemError> {
+        let (functions, grid) = (self.functions.nodes(), self.oscillator.grid.nodes());
+        if functions != grid {
+            return Err(ProblemError::Nodes { functions, grid });
+        }
+        let terms = self.oscillator.terms.len();
+        for found in self.functions.assemblies().iter().map(Vec::len) {
+            if found != 1 + terms {
+                return Err(ProblemError::Functions { found, terms });
+            }
+        }
+        for experiment in &self.experiments {
+            if let Some(reason) = self.mismatch(experiment) {
+                let name = experiment.name.clone();
+                return Err(ProblemError::Record { name, reason });
+            }
+        }
+        let penalties = self.penalties.iter().map(|p| (p.function, &p.rows));
+        let variations = self.variations.iter().map(|v| (v.function, &v.rows));
+        for (function, rows) in penalties.chain(variations) {
+            self.check_penalty(function, rows)?;
+        }
+        let groups = self.constraints.groups.iter().chain(&self.soft);
+        self.check_rows(groups, &self.constraints.cones)
+    }
+
+    fn check_penalty(&self, function: usize, rows: &Design) -> Result<(), ProblemError> {
+        let parameters = self.functions.ranges().get(function).map(Range::len);
+        match parameters.is_some_and(|n| rows.has_columns(n)) {
+            true => Ok(()),
+            false => Err(ProblemError::Penalty { function }),
+        }
+    }
+
+    fn check_rows<'a>(
+        &self,
+        groups: impl Iterator<Item = &'a RowGroup>,
+        cones: &'a [ConeGroup],
+    ) -> Result<(), ProblemError> {
+        let groups = groups.map(|group| (&group.name, &group.rows));
+        let each = |group: &'a ConeGroup| group.cones.iter().map(|cone| (&group.name, &cone.rows));
+        let mut all = groups.chain(cones.iter().flat_map(each));
+        match all.find(|(_, rows)| rows.width() > self.functions.parameters()) {
+            Some((name, _)) => Err(ProblemError::Constraint { name: name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Why a record does not fit the grid or the functions.
+    fn mismatch(&self, record: &Experiment) -> Option<&'static str> {
+        let scalars = self.functions.scalars().len();
+        let sensors = record.channels.iter().flat_map(|c| c.sensor().indices());
+        let mut indices = sensors.chain(record.sought).flatten();
+        let mut places = record.channels.iter().flat_map(|c| c.places());
+        let excitation = record.excitation.as_ref();
+        match () {
+            () if !(2..=self.oscillator.grid.nodes()).contains(&record.nodes) => {
+                Some("fewer than two nodes, or more than the grid has")
+            }
+            () if record.device >= self.functions.assemblies().len() => {
+                Some("a set of functions that is not there")
+            }
+            () if indices.any(|i| i >= scalars) => Some("a nuisance parameter that is not there"),
+            () if excitation.is_some_and(|e| !e.covers(record.nodes)) => {
+                Some("a force or base that ends before it does")
+            }
+            () if places.any(|place| place.step + 1 >= record.nodes) => {
+                Some("a measurement after its last node")
+            }
+            () => None,
+        }
+    }
+}
+
 impl Problem {
-    /// A problem without regularisation or constraints.
+    /// A problem without penalties or constraints.
+    ///
+    /// # Errors
+    /// A [`ProblemError`] if the parts do not fit each other.
     pub fn new(
         oscillator: System,
         functions: Parameterization,
         experiments: Vec<Experiment>,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ProblemError> {
+        let parts = ProblemParts {
             oscillator,
             functions,
             experiments,
@@ -39,7 +176,53 @@ impl Problem {
             variations: Vec::new(),
             constraints: Constraints::default(),
             soft: Vec::new(),
-        }
+        };
+        parts.check().map(|()| Self(parts))
+    }
+
+    /// The problem with its parts changed.
+    ///
+    /// # Errors
+    /// A [`ProblemError`] if they do not fit each other any more.
+    pub fn with(mut self, change: impl FnOnce(&mut ProblemParts)) -> Result<Self, ProblemError> {
+        change(&mut self.0);
+        self.0.check().map(|()| self)
+    }
+
+    /// Adds constraints; groups with a penalty weight are soft.
+    ///
+    /// # Errors
+    /// A [`ProblemError`] if one is about a parameter that is not there; then none is added.
+    pub fn constrain(&mut self, mut rows: Constraints) -> Result<(), ProblemError> {
+        self.check_rows(rows.groups.iter(), &rows.cones)?;
+        self.0.soft.extend(rows.take_soft());
+        self.0.constraints.extend(rows);
+        Ok(())
+    }
+
+    /// Adds a penalty on roughness.
+    ///
+    /// # Errors
+    /// A [`ProblemError`] if it is of a function that is not there, or of another number of parameters.
+    pub fn penalize(&mut self, penalty: Penalty) -> Result<(), ProblemError> {
+        self.check_penalty(penalty.function, &penalty.rows)?;
+        self.0.penalties.push(penalty);
+        Ok(())
+    }
+
+    /// Adds a penalty on total variation.
+    ///
+    /// # Errors
+    /// As [`Problem::penalize`].
+    pub fn penalize_variation(&mut self, variation: Variation) -> Result<(), ProblemError> {
+        self.check_penalty(variation.function, &variation.rows)?;
+        self.0.variations.push(variation);
+        Ok(())
+    }
+
+    /// The parts, for changes that keep them fitting each other.
+    pub(crate) fn parts_mut(&mut self) -> &mut ProblemParts {
+        &mut self.0
     }
 
     /// Number of parameters of functions and scalars.
@@ -50,6 +233,14 @@ impl Problem {
     /// The start of the search.
     pub fn start(&self) -> Vec<f64> {
         self.functions.start()
+    }
+
+    /// Moves the start of the search.
+    ///
+    /// # Panics
+    /// If `theta` has another number of parameters.
+    pub fn start_from(&mut self, theta: &[f64]) {
+        self.0.functions.set_start(theta);
     }
 
     /// The part of `theta` that belongs to the scalars.
@@ -79,7 +270,7 @@ impl Problem {
     pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
         let grid = &self.oscillator.grid;
-        for experiment in &mut part.experiments {
+        for experiment in &mut part.0.experiments {
             let length = (experiment.nodes - 1) as f64 * grid.step();
             let end = grid.start() + share * length;
             for channel in &mut experiment.channels {

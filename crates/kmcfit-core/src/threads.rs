@@ -8,7 +8,7 @@
 use crate::host;
 use std::cell::Cell;
 use std::io;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 
 thread_local! {
@@ -53,22 +53,25 @@ pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
 ///
 /// # Panics
 /// If one of them does.
-pub fn both<A, B: Send>(own: impl FnOnce() -> A, other: impl Fn() -> B + Sync) -> (A, B) {
+pub fn both<A, B: Send>(own: impl FnOnce() -> A, other: impl FnOnce() -> B + Send) -> (A, B) {
     if !spare() {
         return (own(), other());
     }
+    // Taken by the second thread, or by this one where there is no other.
+    let other = Mutex::new(Some(other));
+    let take = || other.lock().unwrap_or_else(PoisonError::into_inner).take();
     std::thread::scope(|scope| {
         let second = spawn_scoped(scope, || {
             share();
-            other()
+            take().map(|other| other())
         });
         let own = sharing(own);
-        let other = match second.map(ScopedJoinHandle::join) {
-            Ok(Ok(other)) => other,
+        let found = match second.map(ScopedJoinHandle::join) {
+            Ok(Ok(found)) => found,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => other(),
+            Err(_) => take().map(|other| other()),
         };
-        (own, other)
+        (own, found.expect("taken once"))
     })
 }
 

@@ -28,10 +28,8 @@ fn capped(cap: f64) -> Problem {
     ];
     let mut problem = common::problem_of(oscillator, list, observed.displacement, None);
     let statement = Statement::DampingRatio { max: cap };
-    let functions: &Parameterization = &problem.functions;
-    problem.constraints = statement
-        .build(&problem.oscillator.grid, functions)
-        .unwrap();
+    let rows = statement.build(&problem.oscillator.grid, &problem.functions);
+    problem.constrain(rows.unwrap()).unwrap();
     problem
 }
 
@@ -97,7 +95,11 @@ fn a_cap_that_is_not_reached_is_not_reported() {
 #[test]
 fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     let mut problem = capped(0.2);
-    problem.constraints = Default::default();
+    problem = problem
+        .with(|parts| {
+            parts.constraints = Default::default();
+        })
+        .unwrap();
     let mut wide = RowGroup::new("c <= 0.5");
     wide.push(
         [(0, 1.0)],
@@ -107,7 +109,11 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     let mut tight = RowGroup::new("-2 c >= -0.8");
     tight.push([(0, -2.0)], [-0.8, f64::INFINITY], [0.0, common::DURATION]);
     for groups in [[wide.clone(), tight.clone()], [tight, wide]] {
-        problem.constraints.groups = groups.to_vec();
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups = groups.to_vec();
+            })
+            .unwrap();
         let start = problem.functions.start();
         let found = fit(&problem, &start, &settings(), &mut |_| {}).unwrap();
         assert!((found.best.parameters[0] - 0.4).abs() < 1e-12);
@@ -135,8 +141,12 @@ fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup
         CoefficientFunction::constant(CoefficientKind::Stiffness, k, NODES),
     ];
     let observed = plain.experiments[0].channels[0].observed().to_vec();
-    let mut problem = common::problem_of(plain.oscillator, list, observed, Some(sigma));
-    problem.constraints.groups = groups;
+    let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, Some(sigma));
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups = groups;
+        })
+        .unwrap();
     let settings = FitSettings {
         stopping: Stopping::exactly(0),
         ..settings()
@@ -228,12 +238,25 @@ fn with_sum_below(cap: f64) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.4, NODES),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 0.4, NODES),
     ];
-    problem.functions = Parameterization::new(list, NODES, problem.oscillator.grid.step()).unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.functions =
+                Parameterization::new(list, NODES, parts.oscillator.grid.step()).unwrap();
+        })
+        .unwrap();
     let mut group = RowGroup::new("sum");
     let times = [0.0, common::DURATION];
     group.push([(0, 1.0), (1, 1.0)], [f64::NEG_INFINITY, cap], times);
-    problem.constraints = Default::default();
-    problem.constraints.groups = vec![group];
+    problem = problem
+        .with(|parts| {
+            parts.constraints = Default::default();
+        })
+        .unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups = vec![group];
+        })
+        .unwrap();
     problem
 }
 
@@ -272,10 +295,14 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1 * unit, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![unit; NODES]),
     ];
-    problem = common::problem_of(problem.oscillator, list, observed, None);
+    problem = common::problem_of(problem.oscillator.clone(), list, observed, None);
     let statement = Statement::DampingRatio { max: cap };
     let built = statement.build(&problem.oscillator.grid, &problem.functions);
-    problem.constraints = built.unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.constraints = built.unwrap();
+        })
+        .unwrap();
     problem
 }
 
@@ -321,7 +348,7 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     ];
     let (grid, observed) = (problem.oscillator.grid, &problem.experiments[0].channels[0]);
     let observed = observed.observed().to_vec();
-    problem = common::problem_of(problem.oscillator, list, observed, None);
+    problem = common::problem_of(problem.oscillator.clone(), list, observed, None);
     let best = |problem: &Problem| {
         let start = problem.functions.start();
         fit(problem, &start, &settings(), &mut |_| {}).unwrap().best
@@ -332,7 +359,11 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     for exponent in 6..18 {
         let max = ratio * (1.0 - 0.5f64.powi(exponent));
         let statement = Statement::DampingRatio { max };
-        problem.constraints = statement.build(&grid, &problem.functions).unwrap();
+        problem = problem
+            .with(|parts| {
+                parts.constraints = statement.build(&grid, &parts.functions).unwrap();
+            })
+            .unwrap();
         let at = best(&problem);
         let active = active_constraints(&problem, &at);
         let [cap] = active.as_slice() else {
@@ -353,8 +384,16 @@ fn a_start_that_is_pressed_against_its_bound_is_the_minimum() {
     let mut group = RowGroup::new("c <= 0.1");
     let times = [0.0, common::DURATION];
     group.push([(0, 1.0)], [f64::NEG_INFINITY, 0.1], times);
-    problem.constraints = Default::default();
-    problem.constraints.groups = vec![group];
+    problem = problem
+        .with(|parts| {
+            parts.constraints = Default::default();
+        })
+        .unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups = vec![group];
+        })
+        .unwrap();
     let settings = FitSettings {
         solver: Solver::ProjectedGradient,
         ..settings()

@@ -232,7 +232,7 @@ impl Case {
             method: self.method,
             terms: TERMS.iter().map(|(_, term, _)| *term).collect(),
         };
-        Problem::new(oscillator, functions, vec![experiment])
+        Problem::new(oscillator, functions, vec![experiment]).unwrap()
     }
 
     /// J and its derivative with respect to parameter `seed`, by the independent evaluation.
@@ -384,10 +384,11 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
         }
     });
     let functions = Parameterization::new(list.collect(), grid.nodes(), grid.step()).unwrap();
-    Problem {
-        functions: functions.with_scalars(problem.functions.scalars().to_vec()),
-        ..problem.clone()
-    }
+    let functions = functions.with_scalars(problem.functions.scalars().to_vec());
+    problem
+        .clone()
+        .with(|parts| parts.functions = functions)
+        .unwrap()
 }
 
 proptest! {

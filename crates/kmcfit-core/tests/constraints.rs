@@ -527,7 +527,7 @@ fn problem(functions: Parameterization) -> Problem {
         velocity: 0.0,
     };
     let experiment = Experiment::free("none", initial, oscillator.grid.nodes());
-    Problem::new(oscillator, functions, vec![experiment])
+    Problem::new(oscillator, functions, vec![experiment]).unwrap()
 }
 
 #[test]
@@ -550,16 +550,20 @@ fn a_contradiction_names_exactly_the_two() {
     let mut problem = problem(functions);
     for statement in &statements {
         let rows = built(statement, &problem.functions);
-        problem.constraints.extend(rows);
+        problem = problem
+            .with(|parts| {
+                parts.constraints.extend(rows);
+            })
+            .unwrap();
     }
     let start = problem.functions.start();
     assert_eq!(
         problem.feasible_start(&start),
         StartProjection::Contradiction(vec!["mass >= 1".into(), "mean of mass = 0.5".into()])
     );
-    problem
-        .constraints
-        .groups
-        .retain(|g: &RowGroup| g.name != "mean of mass = 0.5");
+    let kept = |g: &RowGroup| g.name != "mean of mass = 0.5";
+    let problem = problem
+        .with(|parts| parts.constraints.groups.retain(kept))
+        .unwrap();
     assert_eq!(problem.feasible_start(&start), StartProjection::Kept(start));
 }

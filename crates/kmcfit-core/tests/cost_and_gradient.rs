@@ -51,7 +51,11 @@ fn with_a_sigma_and_with_penalties() {
     let grid = problem.oscillator.grid;
     let sigma = Weighting::Sigma(0.1);
     let channel = Channel::displacement_at_nodes(readings.clone(), 1, sigma, &grid);
-    problem.experiments[0].channels = vec![channel];
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels = vec![channel];
+        })
+        .unwrap();
     agree(&problem, &uneven(&problem));
 
     let parts = [2.0, 1.0, 1.0].map(|start| Part::nodal(start).smooth(1, 0.3));
@@ -76,7 +80,11 @@ fn of_everything_else() {
     let half: Vec<f64> = readings.iter().copied().step_by(2).collect();
     let spacing = 2.0 * grid.step();
     let channel = Channel::displacement_at_nodes(half, 2, Weighting::Integral { spacing }, &grid);
-    problem.experiments[0].channels = vec![channel];
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels = vec![channel];
+        })
+        .unwrap();
     agree(&problem, &uneven(&problem));
 
     let parts = [

@@ -35,7 +35,12 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     ];
     let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
     if silent_force {
-        problem.experiments[0].excitation = Some(Excitation::force_at_nodes(&vec![0.0; NODES]));
+        problem = problem
+            .with(|parts| {
+                parts.experiments[0].excitation =
+                    Some(Excitation::force_at_nodes(&vec![0.0; NODES]));
+            })
+            .unwrap();
     }
     problem
 }
@@ -61,11 +66,19 @@ fn close(found: f64, expected: f64) {
 #[test]
 fn the_mass_keeps_its_mean_where_nothing_fixes_the_scale() {
     let mut with_zero = problem(None, false);
-    with_zero.constraints.groups.push(fixed(1, 0.0));
+    with_zero = with_zero
+        .with(|parts| {
+            parts.constraints.groups.push(fixed(1, 0.0));
+        })
+        .unwrap();
     let mut bounded = problem(None, false);
     let mut group = RowGroup::new("mass > 0");
     group.push([(0, 1.0)], [0.05, f64::INFINITY], [0.0, 0.0]);
-    bounded.constraints.groups.push(group);
+    bounded = bounded
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let cases = [
         ("nothing", problem(None, false)),
         ("a function fixed at zero", problem(Some(0.0), false)),
@@ -90,7 +103,11 @@ fn a_fixed_function_or_value_sets_the_scale() {
     // k = 3 is demanded, so m is 2 k/m apart from it; an equality far smaller than the start as well.
     for value in [3.0, 3e-7] {
         let mut demanded = problem(None, false);
-        demanded.constraints.groups.push(fixed(2, value));
+        demanded = demanded
+            .with(|parts| {
+                parts.constraints.groups.push(fixed(2, value));
+            })
+            .unwrap();
         let found = equation_error(&demanded, &demanded.functions.start()).unwrap();
         assert!(
             (found[0] / (value / 1.5) - 1.0).abs() < 5e-3,
@@ -140,7 +157,11 @@ fn irregular_velocities_are_integrated() {
     let values = maker.seen(kind, &times, &[]);
     let weighting = Weighting::Sigma(1e-3);
     let channel = Channel::new(kind, times, values, weighting, &grid, NODES).unwrap();
-    problem.experiments[0].channels = vec![channel];
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels = vec![channel];
+        })
+        .unwrap();
     let found = equation_error(&problem, &problem.functions.start()).unwrap();
     // The damping is known, so the scale is: to the few per cent of a start.
     let ratio = found[1] / found[0];
@@ -173,7 +194,7 @@ fn the_start_knows_no_unit_of_mass_or_length() {
         let observed = observed.iter().map(|y| y * length).collect();
         let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
         let weight = weight * (length / unit).powi(2);
-        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        problem.penalize(Penalty::new(2, 1, weight, rows)).unwrap();
         let found = equation_error(&problem, &problem.functions.start()).unwrap();
         found.iter().map(|k| k / unit).collect()
     };
@@ -211,7 +232,7 @@ fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
         ];
         let observed = observed.clone();
         let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
-        problem.penalties.push(Penalty::new(2, 1, weight, rows));
+        problem.penalize(Penalty::new(2, 1, weight, rows)).unwrap();
         equation_error(&problem, &problem.functions.start()).unwrap()
     };
     let most = |a: &[f64], b: &[f64]| {

@@ -93,7 +93,7 @@ fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Proble
         experiment
     });
     let records = records.collect();
-    Problem::new(oscillator, functions, records)
+    Problem::new(oscillator, functions, records).unwrap()
 }
 
 /// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside readings whose
@@ -105,14 +105,18 @@ fn smooth(mut problem: Problem, scale_fixed: bool) -> Problem {
     for function in 0..3 {
         let rows = Basis::Nodal.roughness(&grid, 2);
         problem
-            .penalties
-            .push(Penalty::new(function, 2, SMOOTHNESS, rows));
+            .penalize(Penalty::new(function, 2, SMOOTHNESS, rows))
+            .unwrap();
     }
     if scale_fixed {
         let first = problem.functions.ranges()[2].start;
         let mut group = RowGroup::new("k(0) = 1");
         group.push([(first, 1.0)], [1.0, 1.0], [0.0, 0.0]);
-        problem.constraints.groups.push(group);
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups.push(group);
+            })
+            .unwrap();
     }
     problem
 }
@@ -217,16 +221,24 @@ fn the_rank_of_the_records_is_that_of_the_table() {
     theta.extend(device.coefficients.iter().flatten());
     let sensitivity = |records: Records, silent: usize| {
         let mut problem = problem(nodes, &device, records);
-        problem.oscillator.method = Method::Midpoint;
-        for excitation in problem
-            .experiments
-            .iter_mut()
-            .filter_map(|e| e.excitation.as_mut())
-        {
-            let mut force = excitation.force.as_ref().unwrap().at_nodes();
-            force[..silent].fill(0.0);
-            *excitation = Excitation::force_at_nodes(&force);
-        }
+        problem = problem
+            .with(|parts| {
+                parts.oscillator.method = Method::Midpoint;
+            })
+            .unwrap();
+        problem = problem
+            .with(|parts| {
+                for excitation in parts
+                    .experiments
+                    .iter_mut()
+                    .filter_map(|e| e.excitation.as_mut())
+                {
+                    let mut force = excitation.force.as_ref().unwrap().at_nodes();
+                    force[..silent].fill(0.0);
+                    *excitation = Excitation::force_at_nodes(&force);
+                }
+            })
+            .unwrap();
         rank(weighted_jacobian(&problem, &theta))
     };
     for (words, records, expected) in table {

@@ -336,7 +336,7 @@ impl Case {
             experiment
         });
         let records = records.collect();
-        Problem::new(oscillator, functions, records)
+        Problem::new(oscillator, functions, records).unwrap()
     }
 
     /// Fits from the start values and compares all parameters, each relative to the larger of itself
@@ -689,7 +689,9 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     let mut problem = case.problem();
     for function in [1, 2, 4] {
         let rows = Basis::Nodal.roughness(&grid(), 2);
-        problem.penalties.push(Penalty::new(function, 2, 1e2, rows));
+        problem
+            .penalize(Penalty::new(function, 2, 1e2, rows))
+            .unwrap();
     }
     let found = run(&problem);
     let truth = case.truth();
@@ -764,7 +766,11 @@ fn a_prior_pulls_towards_its_mean() {
     let mut scalars = problem.functions.scalars().to_vec();
     let (mean, sigma) = (INITIAL.displacement + 1e-3, 1e-4);
     scalars[0].prior = Some(Prior { mean, sigma });
-    problem.functions = problem.functions.clone().with_scalars(scalars);
+    problem = problem
+        .with(|parts| {
+            parts.functions = parts.functions.clone().with_scalars(scalars);
+        })
+        .unwrap();
     let truth = case.truth();
     let found = run(&problem).best.parameters;
     let last = truth.len() - 1;

@@ -67,8 +67,15 @@ fn problem(units: Units) -> Problem {
             sigma: sigma * PRIOR.sigma,
         }),
     };
-    problem.functions = problem.functions.with_scalars(SIZES.map(scalar).to_vec());
-    let channel = problem.experiments[0].channels.remove(0);
+    problem = problem
+        .with(|parts| {
+            parts.functions = parts
+                .functions
+                .clone()
+                .with_scalars(SIZES.map(scalar).to_vec());
+        })
+        .unwrap();
+    let channel = problem.experiments[0].channels[0].clone();
     assert_eq!(*channel.weighting(), Weighting::Sigma(sigma));
     let sensor = Sensor {
         gain: Value::Known(units.length),
@@ -76,7 +83,11 @@ fn problem(units: Units) -> Problem {
         drift: Value::Sought(1),
     };
     let channel = channel.with_sensor(sensor);
-    problem.experiments[0].channels.push(channel);
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels[0] = channel;
+        })
+        .unwrap();
     problem
 }
 
@@ -166,7 +177,11 @@ fn check(units: Units, share: f64, is_clipped: bool, programs: u64) {
     let mut group = RowGroup::new("offset");
     let first = bounded.functions.scalar_range().start;
     group.push([(first, 1.0)], [f64::NEG_INFINITY, most], [0.0, 0.0]);
-    bounded.constraints.groups.push(group);
+    bounded = bounded
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     for iteration in 1..=3u64 {
         let damping = 0.1f64.powi(iteration as i32 + 1);
         let (next, clipped) = squares.step(&theta, damping, most);

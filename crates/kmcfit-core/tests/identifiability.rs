@@ -70,7 +70,7 @@ fn with_records(
         record.excitation = excitation;
         record
     });
-    Problem::new(oscillator.clone(), functions, records.collect())
+    Problem::new(oscillator.clone(), functions, records.collect()).unwrap()
 }
 
 /// One value per node for each function, starting at the device itself.
@@ -335,7 +335,11 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    fixed.functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
+    fixed = fixed
+        .with(|parts| {
+            parts.functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
+        })
+        .unwrap();
     assert!(gauge(&fixed).is_empty());
     assert_eq!(count(&fixed).symmetry, Symmetry::None);
 
@@ -351,7 +355,11 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
     );
     for group in [value, mean] {
         let mut held = open.clone();
-        held.constraints.groups.push(group);
+        held = held
+            .with(|parts| {
+                parts.constraints.groups.push(group);
+            })
+            .unwrap();
         let found = gauge(&held);
         assert_eq!(found.constant().count(), 0);
         assert_eq!(found.over_time().count(), nodes - 1);
@@ -360,7 +368,11 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         assert_eq!(counted.symmetry, Symmetry::Function);
         let mut smooth = held.clone();
         let rows = Basis::Nodal.roughness(&oscillator.grid, 2);
-        smooth.penalties.push(Penalty::new(0, 2, 1.0, rows));
+        smooth = smooth
+            .with(|parts| {
+                parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
+            })
+            .unwrap();
         assert_eq!(count(&smooth).symmetry, Symmetry::None);
     }
 }
@@ -435,12 +447,16 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
         let mut noisy = problem.clone();
         let grid = &problem.oscillator.grid;
         let values = with_noise(&clean.displacement, sigma, seed);
-        noisy.experiments[0].channels = vec![Channel::displacement_at_nodes(
-            values,
-            1,
-            Weighting::Sigma(sigma),
-            grid,
-        )];
+        noisy = noisy
+            .with(|parts| {
+                parts.experiments[0].channels = vec![Channel::displacement_at_nodes(
+                    values,
+                    1,
+                    Weighting::Sigma(sigma),
+                    grid,
+                )];
+            })
+            .unwrap();
         let fit = run(&noisy);
         let bands = Bands::at(
             &noisy,
@@ -515,8 +531,8 @@ fn bands_of_functions_on_knots_cover_the_truth() {
     let rows = [mass.roughness(&grid, 2), damping.roughness(&grid, 1)];
     for (function, (rows, order)) in rows.into_iter().zip([2, 1]).enumerate() {
         problem
-            .penalties
-            .push(Penalty::new(function, order, 1.0, rows));
+            .penalize(Penalty::new(function, order, 1.0, rows))
+            .unwrap();
     }
     coverage(&problem, &truth, 0.1);
 }
@@ -562,7 +578,11 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
     let mut held = problem.clone();
     let mut group = RowGroup::new("k(0) = 1");
     group.push([(3, 1.0)], [1.0, 1.0], [0.0, 0.0]);
-    held.constraints.groups.push(group);
+    held = held
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let bands = Bands::at(&held, &theta, &here, &BandSettings::default());
     assert_eq!(bands.unseen, 0);
     assert!(
@@ -599,7 +619,11 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     let open = Bands::at(&problem, &theta, &here, &BandSettings::default());
     let mut group = RowGroup::new("damping >= 0");
     group.push([(0, 1.0)], [0.0, f64::INFINITY], [0.0, 25.0]);
-    problem.constraints.groups.push(group);
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
     let damping = &bands.functions[1];
     assert!(damping.sides.iter().all(|s| *s == Side::Above));
@@ -629,12 +653,16 @@ fn without_sigma_the_residuals_say_it() {
     let bands = |weighting: Weighting| {
         let mut problem = with_sigma.clone();
         let grid = &oscillator.grid;
-        problem.experiments[0].channels = vec![Channel::displacement_at_nodes(
-            values.clone(),
-            1,
-            weighting,
-            grid,
-        )];
+        problem = problem
+            .with(|parts| {
+                parts.experiments[0].channels = vec![Channel::displacement_at_nodes(
+                    values.clone(),
+                    1,
+                    weighting,
+                    grid,
+                )];
+            })
+            .unwrap();
         let fit = run(&problem);
         Bands::at(
             &problem,
@@ -774,14 +802,17 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let mut problem = with_records(&oscillator, list, &device, &[free(0)]);
-    let record = &mut problem.experiments[0];
-    let part = record.channels[0].first(half);
+    let problem = with_records(&oscillator, list, &device, &[free(0)]);
+    let part = problem.experiments[0].channels[0].first(half);
     let (times, values) = (part.times().to_vec(), part.observed().to_vec());
     let weighting = part.weighting().clone();
     let part = Channel::new(part.kind(), times, values, weighting, &grid, half).unwrap();
-    record.channels[0] = part;
-    record.nodes = half;
+    let problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels[0] = part;
+            parts.experiments[0].nodes = half;
+        })
+        .unwrap();
     // Half of the knots are beyond the last reading.
     assert_eq!(count(&problem).seen_at_most, 7);
     assert_eq!(spectrum(&problem).rank, 7);
@@ -822,19 +853,22 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     ];
     let bare = with_records(&oscillator, list, &device, &[free(0)]);
     let mut problem = bare.clone();
-    problem
-        .penalties
-        .push(Penalty::new(0, 2, 3e4, basis.roughness(&grid, 2)));
+    let rows = basis.roughness(&grid, 2);
+    problem.penalize(Penalty::new(0, 2, 3e4, rows)).unwrap();
     let theta = problem.start();
     let clean = problem.evaluate(&theta).unwrap().predictions[0][0].clone();
     let record = |problem: &Problem, values: Vec<f64>| {
         let mut noisy = problem.clone();
-        noisy.experiments[0].channels = vec![Channel::displacement_at_nodes(
-            values,
-            1,
-            Weighting::Sigma(sigma),
-            &grid,
-        )];
+        noisy = noisy
+            .with(|parts| {
+                parts.experiments[0].channels = vec![Channel::displacement_at_nodes(
+                    values,
+                    1,
+                    Weighting::Sigma(sigma),
+                    &grid,
+                )];
+            })
+            .unwrap();
         noisy
     };
     let errors = |problem: &Problem| {
@@ -941,10 +975,14 @@ fn the_scale_by_bases_and_drives() {
 
     // A base that moves pushes with m b'': that scales too.
     let mut problem = nodal(&oscillator, &device, &[free(0)]);
-    problem.experiments[0].excitation = Some(Excitation {
-        force: None,
-        base: Some(StageSamples::linear(&vec![1.5; nodes])),
-    });
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].excitation = Some(Excitation {
+                force: None,
+                base: Some(StageSamples::linear(&vec![1.5; nodes])),
+            });
+        })
+        .unwrap();
     assert_eq!(count(&problem).symmetry, Symmetry::Function);
     assert_eq!(
         Gauge::at(&problem, &problem.start()).over_time().count(),

@@ -87,7 +87,11 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
     for solver in SOLVERS {
         let mut problem = problem(&knots());
         // The data push against it from the first iteration on, and no clipping will do.
-        problem.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+            })
+            .unwrap();
         let solved = run(&problem, solver, Stopping::default().program_iterations);
         assert_eq!(solved.outcome.status, Status::Converged, "{solver:?}");
         // Without an iteration every program is refused.
@@ -110,7 +114,11 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
 #[test]
 fn a_program_that_stalls_on_the_way_costs_nothing_that_was_reached() {
     let mut problem = problem(&knots());
-    problem.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
+        })
+        .unwrap();
     let ends: Vec<Fit> = (4..=16)
         .step_by(2)
         .map(|limit| run(&problem, Solver::GaussNewton, limit))
@@ -141,7 +149,11 @@ fn badly_scaled_constraints_cost_no_point() {
     for (i, group) in groups.into_iter().enumerate() {
         for solver in SOLVERS {
             let mut problem = problem(&knots());
-            problem.constraints.groups = vec![group.clone()];
+            problem = problem
+                .with(|parts| {
+                    parts.constraints.groups = vec![group.clone()];
+                })
+                .unwrap();
             let start = match problem.feasible_start(&problem.functions.start()) {
                 StartProjection::Kept(start) => start,
                 StartProjection::Moved { parameters, .. } => parameters,
@@ -149,7 +161,11 @@ fn badly_scaled_constraints_cost_no_point() {
                 StartProjection::Unsolved(_) => continue,
                 other => panic!("{i} {solver:?}: {other:?}"),
             };
-            problem.functions = problem.functions.clone().with_start(&start);
+            problem = problem
+                .with(|parts| {
+                    parts.functions = parts.functions.clone().with_start(&start);
+                })
+                .unwrap();
             let found = run(&problem, solver, 100);
             println!("{i} {solver:?}: {:?}", found.outcome);
             keeps_the_best_point(&problem, &found);
@@ -163,10 +179,14 @@ fn badly_scaled_constraints_cost_no_point() {
 fn contradictory_constraints_are_infeasible_where_nobody_looked_before() {
     for solver in SOLVERS {
         let mut problem = problem(&knots());
-        problem.constraints.groups = vec![
-            falling([0.1, UNBOUNDED], 1.0),
-            falling([-UNBOUNDED, -0.1], 1.0),
-        ];
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups = vec![
+                    falling([0.1, UNBOUNDED], 1.0),
+                    falling([-UNBOUNDED, -0.1], 1.0),
+                ];
+            })
+            .unwrap();
         let found = run(&problem, solver, 100);
         assert_eq!(found.outcome.status, Status::Infeasible, "{solver:?}");
         assert_eq!(found.best.parameters, problem.functions.start());
@@ -195,10 +215,14 @@ fn a_start_is_moved_to_where_there_is_a_mass() {
             .zip(row.values().iter().copied());
         group.push(entries, [value, value], [0.0, 0.0]);
     }
-    problem.constraints = Constraints {
-        groups: vec![group],
-        cones: Vec::new(),
-    };
+    problem = problem
+        .with(|parts| {
+            parts.constraints = Constraints {
+                groups: vec![group],
+                cones: Vec::new(),
+            };
+        })
+        .unwrap();
     let start = problem.functions.start();
     let least = |theta: &[f64]| {
         let mass = problem.functions.device(theta).mass;

@@ -93,11 +93,15 @@ fn jumps(k: &[f64]) -> Vec<usize> {
 fn total_variation_finds_the_jump_and_both_levels() {
     let (mut problem, cells) = problem();
     let rows = Design::Sparse(differences());
-    problem.variations = vec![Variation {
-        function: 2,
-        weight: 300.0,
-        rows,
-    }];
+    problem = problem
+        .with(|parts| {
+            parts.variations = vec![Variation {
+                function: 2,
+                weight: 300.0,
+                rows,
+            }];
+        })
+        .unwrap();
     let k = stiffness(&problem);
     let jump = cells.windows(2).position(|w| w[0] != w[1]).unwrap() + 1;
     assert_eq!(jumps(&k), [jump]);
@@ -129,7 +133,11 @@ fn squared_smoothness_smears_the_jump() {
     };
     let rows = basis.roughness(&problem.oscillator.grid, 1);
     for weight in [1e2, 1e3, 1e4] {
-        problem.penalties = vec![Penalty::new(2, 1, weight, rows.clone())];
+        problem = problem
+            .with(|parts| {
+                parts.penalties = vec![Penalty::new(2, 1, weight, rows.clone())];
+            })
+            .unwrap();
         let k = stiffness(&problem);
         let worst = k
             .iter()

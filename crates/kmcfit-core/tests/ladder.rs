@@ -45,7 +45,7 @@ fn problem() -> Problem {
     let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment])
+    Problem::new(oscillator, functions, vec![experiment]).unwrap()
 }
 
 #[test]
@@ -153,7 +153,10 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
     let step = oscillator.grid.step();
     let functions = Parameterization::new(list.collect(), nodes, step).unwrap();
-    (Problem::new(oscillator, functions, vec![experiment]), truth)
+    (
+        Problem::new(oscillator, functions, vec![experiment]).unwrap(),
+        truth,
+    )
 }
 
 #[test]
@@ -226,7 +229,7 @@ fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
     ];
     let functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
     let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
-    let problem = Problem::new(oscillator, functions, vec![experiment]);
+    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
     assert!(problem.supports_continuous() && !problem.truncated(0.5).supports_continuous());
     let settings = FitSettings {
         solver: Solver::GaussNewton,

@@ -313,7 +313,11 @@ fn the_order_of_records_and_those_without_readings_do_not_matter() {
             velocity: 0.0,
         };
         let unused = Experiment::free("unused", state, both.oscillator.grid.nodes());
-        more.experiments.push(unused);
+        more = more
+            .with(|parts| {
+                parts.experiments.push(unused);
+            })
+            .unwrap();
         let with_unused = fitted(&more);
         assert_eq!(fit.best.parameters, with_unused.best.parameters, "{case:?}");
         assert_eq!(fit.best.evaluation.cost, with_unused.best.evaluation.cost);

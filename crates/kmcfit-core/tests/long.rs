@@ -142,7 +142,10 @@ fn problem(
             velocity: 0.0,
         };
     }
-    (Problem::new(oscillator, functions, vec![experiment]), truth)
+    (
+        Problem::new(oscillator, functions, vec![experiment]).unwrap(),
+        truth,
+    )
 }
 
 /// Largest error of the stiffness relative to the truth there, and relative to its standard deviation

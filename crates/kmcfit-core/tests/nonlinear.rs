@@ -62,7 +62,7 @@ impl Case {
         let experiment = Experiment::free("driven", REST, nodes)
             .with_excitation(self.excitation.clone())
             .with_channel(channel);
-        Problem::new(self.oscillator.clone(), functions, vec![experiment])
+        Problem::new(self.oscillator.clone(), functions, vec![experiment]).unwrap()
     }
 
     /// All constants to one per cent, and as near as the noise allows.

@@ -40,16 +40,19 @@ fn problem(sigma: f64) -> Problem {
         size: 0.7,
         prior: None,
     };
-    problem.functions = problem.functions.with_scalars(vec![offset]);
-    let channel = problem.experiments[0].channels.remove(0);
+    problem = problem
+        .with(|parts| {
+            parts.functions = parts.functions.clone().with_scalars(vec![offset]);
+        })
+        .unwrap();
+    let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
         offset: Value::Sought(0),
         ..Sensor::default()
     };
-    problem.experiments[0]
-        .channels
-        .push(channel.with_sensor(sensor));
     problem
+        .with(|parts| parts.experiments[0].channels[0] = channel.with_sensor(sensor))
+        .unwrap()
 }
 
 /// `J(x) = q x^2 + r` at the distance x from the mean. The first step goes where the linear model is zero, by

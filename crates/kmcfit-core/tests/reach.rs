@@ -65,11 +65,15 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Nod
     ];
     let mut problem = common::problem_of(oscillator, list, observed, None);
     // Weak enough not to move the answer, which it does not charge; it makes it the only one.
-    problem
-        .penalties
-        .push(Penalty::new(0, 2, 1.0, basis.roughness(&grid, 2)));
+    let rows = basis.roughness(&grid, 2);
+    problem.penalize(Penalty::new(0, 2, 1.0, rows)).unwrap();
     if constrained {
-        problem.constraints.groups = constraints(&problem, basis);
+        let groups = constraints(&problem, basis);
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups = groups;
+            })
+            .unwrap();
     }
     (problem, truth)
 }

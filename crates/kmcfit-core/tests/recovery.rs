@@ -253,8 +253,16 @@ fn positivity_alone_does_not_find_the_device() {
         .collect();
     let mut problem = common::problem_of(oscillator, list, observed, None);
     common::add_physics(&mut problem, 1.0, true);
-    problem.penalties.clear();
-    problem.constraints.groups.retain(|g| g.name != "k(0) = 1");
+    problem = problem
+        .with(|parts| {
+            parts.penalties.clear();
+        })
+        .unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups.retain(|g| g.name != "k(0) = 1");
+        })
+        .unwrap();
     let start = problem.functions.start();
     let rule = Stopping {
         cost_ratio: Some(1e-7),

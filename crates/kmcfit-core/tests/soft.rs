@@ -64,7 +64,11 @@ fn run(problem: &Problem) -> Fit {
 #[test]
 fn a_high_price_is_a_hard_constraint() {
     let mut hard = problem();
-    hard.constraints.groups.push(heavy(None));
+    hard = hard
+        .with(|parts| {
+            parts.constraints.groups.push(heavy(None));
+        })
+        .unwrap();
     let hard = run(&hard);
     let free = run(&problem());
     let prices = [1e0, 1e2, 1e4, 1e6, 1e8];
@@ -74,7 +78,11 @@ fn a_high_price_is_a_hard_constraint() {
     for price in prices {
         let group = heavy(Some(price));
         let mut soft = problem();
-        soft.soft.push(group.clone());
+        soft = soft
+            .with(|parts| {
+                parts.soft.push(group.clone());
+            })
+            .unwrap();
         let found = run(&soft);
         let theta = &found.best.parameters;
         let (rows, largest) = group.slack(theta);
@@ -152,7 +160,11 @@ fn a_row_in_other_units_is_the_same_at_its_price() {
         }
         group.soft = Some(1e2 / (factor * factor));
         let mut problem = problem();
-        problem.soft.push(group);
+        problem = problem
+            .with(|parts| {
+                parts.soft.push(group);
+            })
+            .unwrap();
         run(&problem)
     };
     // Powers of two, so that all is the same but for the exponents.

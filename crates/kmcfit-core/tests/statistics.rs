@@ -8,6 +8,7 @@ use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, Value,
 };
+use kmcfit_core::internals::identifiability::{BandSettings, Bands};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::solvers::fit_with_noise;
@@ -158,6 +159,7 @@ impl Setup {
             functions,
             vec![experiment.with_channel(channel)],
         )
+        .unwrap()
     }
 
     /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
@@ -295,12 +297,16 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
     let theta = setup.theta();
     let found = |values: Vec<f64>| {
         let mut problem = setup.problem(values, 0.1);
-        let channel = problem.experiments[0].channels.remove(0);
+        let channel = problem.experiments[0].channels[0].clone();
         let weighting = Weighting::Integral {
             spacing: DURATION / (NODES - 1) as f64,
         };
         let channel = channel.with_weighting(weighting);
-        problem.experiments[0].channels.push(channel);
+        problem = problem
+            .with(|parts| {
+                parts.experiments[0].channels[0] = channel;
+            })
+            .unwrap();
         let evaluation = problem.evaluate(&theta).unwrap();
         let covariance = problem.covariance(&evaluation);
         (problem, evaluation, covariance)
@@ -333,12 +339,20 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.2; NODES]),
             CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, vec![4.0; knots]),
         ];
-        problem.functions = Parameterization::new(list, NODES, grid.step()).unwrap();
+        problem = problem
+            .with(|parts| {
+                parts.functions = Parameterization::new(list, NODES, grid.step()).unwrap();
+            })
+            .unwrap();
         let times = grid.times()[..readings].to_vec();
         let values = setup.clean()[..readings].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
-        problem.experiments[0].channels = vec![channel.unwrap()];
+        problem = problem
+            .with(|parts| {
+                parts.experiments[0].channels = vec![channel.unwrap()];
+            })
+            .unwrap();
         problem.covariance(&problem.evaluate(&problem.start()).unwrap())
     };
     // The stiffness at the last knot moves the last reading by next to nothing: one knot fewer is seen.
@@ -360,7 +374,11 @@ fn what_the_readings_do_not_see_has_no_covariance() {
         let values = setup.clean()[50..50 + readings].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
-        problem.experiments[0].channels = vec![channel.unwrap()];
+        problem = problem
+            .with(|parts| {
+                parts.experiments[0].channels = vec![channel.unwrap()];
+            })
+            .unwrap();
         problem.covariance(&problem.evaluate(&setup.theta()).unwrap())
     };
     assert!(covariance(&setup, 3).is_some());
@@ -379,15 +397,23 @@ fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
         size: 1.0,
         prior: None,
     };
-    problem.functions = problem.functions.with_scalars(vec![offset]);
-    let channel = problem.experiments[0].channels.remove(0);
+    problem = problem
+        .with(|parts| {
+            parts.functions = parts.functions.clone().with_scalars(vec![offset]);
+        })
+        .unwrap();
+    let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
         offset: Value::Sought(0),
         ..Sensor::default()
     };
     let weighting = Weighting::Estimated { sigma: 1.0 };
     let channel = channel.with_sensor(sensor).with_weighting(weighting);
-    problem.experiments[0].channels.push(channel);
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels[0] = channel;
+        })
+        .unwrap();
     problem
 }
 
@@ -435,7 +461,11 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     let mut problem = with_an_offset(noisy[0].clone(), &setup);
     let other = with_an_offset(noisy[1].clone(), &setup);
     let other = other.experiments[0].channels[0].clone();
-    problem.experiments[0].channels.push(other);
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].channels.push(other);
+        })
+        .unwrap();
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigmas, fit) = found.unwrap();
 
@@ -512,13 +542,54 @@ fn readings_of_nothing_keep_their_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let mut problem = with_an_offset(vec![0.0; NODES], &setup);
-    problem.experiments[0].initial = State {
-        displacement: 0.0,
-        velocity: 0.0,
-    };
+    problem = problem
+        .with(|parts| {
+            parts.experiments[0].initial = State {
+                displacement: 0.0,
+                velocity: 0.0,
+            };
+        })
+        .unwrap();
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigma, fit) = found.unwrap();
     assert_eq!(sigma_of(&with_sigma), sigma_of(&problem));
     assert_eq!(fit.best.evaluation.cost, 0.0);
     assert_eq!(fit.best.parameters, [0.0]);
+}
+
+/// Standard errors and bands come from one factorisation: where the measurements leave a parameter open, both say so,
+/// and elsewhere the standard error of a constant is that of its band.
+#[test]
+fn standard_errors_and_bands_agree() {
+    let settings = BandSettings {
+        draws: 0,
+        ..BandSettings::default()
+    };
+    let both = |setup: &Setup| {
+        let problem = setup.problem(setup.clean(), 0.1);
+        let theta = setup.theta();
+        let evaluation = problem.evaluate(&theta).unwrap();
+        let bands = Bands::at(&problem, &theta, &evaluation, &settings);
+        (problem.covariance(&evaluation), bands)
+    };
+    let mut setup = Setup::forced(ChannelKind::Displacement);
+    setup.start[0] = Some(1.1);
+    let (covariance, bands) = both(&setup);
+    let covariance = covariance.expect("a force gives the mass");
+    assert_eq!(bands.unseen, 0);
+    for (j, band) in bands.functions.iter().enumerate() {
+        let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
+        assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
+    }
+    // Of a free response the ratios to the mass are known, and none of the functions.
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup.start[0] = Some(1.1);
+    let (covariance, bands) = both(&setup);
+    assert!(covariance.is_none());
+    assert_eq!(bands.unseen, 1);
+    for band in &bands.functions {
+        assert!(band.standard_error.iter().all(|e| e.is_infinite()));
+    }
+    let ratio = bands.ratio("k/m").expect("a stiffness");
+    assert!(ratio.standard_error.iter().all(|e| e.is_finite()));
 }

@@ -113,7 +113,11 @@ fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f6
     let each = (1..=seeds).map(|seed| {
         let mut problem = nodal_problem(&truth, nodes, false, seed);
         let rows = Basis::Nodal.roughness(&problem.oscillator.grid, order_of_mass);
-        problem.penalties[0] = Penalty::new(0, order_of_mass, 1.0, rows);
+        problem = problem
+            .with(|parts| {
+                parts.penalties[0] = Penalty::new(0, order_of_mass, 1.0, rows);
+            })
+            .unwrap();
         let (path, _) = path(&problem, WeightRule::Gcv);
         let error = |theta: &[f64]| common::errors(&problem.functions.device(theta), &truth)[0];
         let errors: Vec<f64> = path.points.iter().map(|p| error(&p.parameters)).collect();

@@ -108,8 +108,8 @@ fn add(
         name: name.clone(),
         key: key.to_owned(),
     }));
-    problem.constraints.extend(rows);
-    Ok(())
+    let added = problem.constrain(rows);
+    added.map_err(|why| file.error_at(key, why.to_string()))
 }
 
 /// The equation of motion needs a mass above zero: what holds it at or below is refused.

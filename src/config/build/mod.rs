@@ -148,12 +148,12 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     };
     let built = experiments::build(file, purpose, &grid, records, &assemblies)?;
     let functions = functions.with_scalars(built.scalars);
-    let mut problem = Problem::new(oscillator, functions, built.fitted);
+    let mut problem = Problem::new(oscillator, functions, built.fitted)
+        .map_err(|why| file.error_at("functions", why.to_string()))?;
     let measured = fit::measurements(file, purpose, &problem, &mut warnings)?;
     let weight_rule = penalties::build(file, &mut problem, measured.as_ref(), &mut warnings)?;
-    penalties::add_variations(file, &mut problem);
+    penalties::add_variations(file, &mut problem)?;
     let places = constraints::build(file, &mut problem, &assemblies, &mut warnings)?;
-    problem.soft = problem.constraints.take_soft();
     experiments::unidentifiable(file, &problem)?;
     start_from_readings(file, &mut problem);
     let settings = fit::build(file, &problem, weight_rule.is_some())?;
@@ -254,7 +254,7 @@ fn start_from_readings(file: &ModelFile, problem: &mut Problem) {
             }
         }
     }
-    problem.functions = problem.functions.clone().with_start(&start);
+    problem.start_from(&start);
 }
 
 /// Names in a row: `a`, `a and b`, `a, b and c`.

@@ -69,7 +69,8 @@ pub(super) fn build(
                 search.penalties.push(problem.penalties.len());
             }
             if weight > 0.0 {
-                problem.penalties.push(penalty);
+                let added = problem.penalize(penalty);
+                added.map_err(|why| file.error_at(&key, why.to_string()))?;
             }
         }
     }
@@ -77,19 +78,21 @@ pub(super) fn build(
 }
 
 /// Adds the total variation of the functions to the problem.
-pub(super) fn add_variations(file: &ModelFile, problem: &mut Problem) {
+pub(super) fn add_variations(file: &ModelFile, problem: &mut Problem) -> Result<(), InputError> {
     let grid = problem.oscillator.grid;
     let bases: Vec<Option<Basis>> = problem.functions.iter().map(|f| f.basis.clone()).collect();
     for (j, (slot, basis)) in slots(file).iter().zip(bases).enumerate() {
         let weight = slot.spec.variation.as_ref().map_or(0.0, |v| v.weight.0);
         if let (Some(basis), true) = (basis, weight > 0.0) {
-            problem.variations.push(Variation {
+            let added = problem.penalize_variation(Variation {
                 function: j,
                 weight,
                 rows: Design::Sparse(basis.changes(&grid)),
             });
+            added.map_err(|why| file.error_at(&slot.key, why.to_string()))?;
         }
     }
+    Ok(())
 }
 
 fn penalty(

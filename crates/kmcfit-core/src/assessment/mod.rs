@@ -13,12 +13,9 @@ pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
 use crate::identifiability::{BandSettings, Bands, Judgement, verdicts};
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
 use nalgebra::DMatrix;
-
-/// Up to so many parameters the bands are computed with every fit: some milliseconds.
-const FEW_PARAMETERS: usize = 64;
 
 /// Assessment of a fit of a simulated response.
 #[derive(Debug, Clone)]

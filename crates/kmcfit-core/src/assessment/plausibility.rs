@@ -147,8 +147,7 @@ impl Plausibility {
 /// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the readings, too.
 fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
-    let predictions = evaluation.predictions.iter().flatten();
-    for (channel, predicted) in problem.channels().zip(predictions) {
+    for (channel, predicted) in problem.predicted(evaluation) {
         let found = diagnostics(channel, predicted);
         let is_judged = tells_errors || channel.weighting().sigma(0).is_some();
         if is_judged && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {

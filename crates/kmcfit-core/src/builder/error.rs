@@ -1,9 +1,10 @@
-//! What a builder refuses.
+//! The error of a builder.
 
-use std::fmt;
+use thiserror::Error;
 
 /// Something that cannot be meant: which part of the problem, and what is wrong with it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{part}: {problem}")]
 pub struct BuildError {
     /// The part: a function, a record, a demand or the grid.
     pub part: String,
@@ -19,11 +20,3 @@ impl BuildError {
         }
     }
 }
-
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.part, self.problem)
-    }
-}
-
-impl std::error::Error for BuildError {}

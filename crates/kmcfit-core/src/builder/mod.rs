@@ -173,9 +173,10 @@ impl Builder {
             terms: self.terms(&parts)?,
         };
         let functions = functions.with_scalars(scalars);
-        let mut problem = Problem::new(oscillator, functions, experiments);
-        problem.penalties = penalties;
-        problem.variations = variations;
+        let problem = Problem::new(oscillator, functions, experiments);
+        let mut problem = problem.map_err(|why| BuildError::new("problem", why.to_string()))?;
+        problem.parts_mut().penalties = penalties;
+        problem.parts_mut().variations = variations;
         self.constrain(&parts, &mut problem)?;
         begin_at_readings(&mut problem);
         into_the_constraints(&mut problem)?;
@@ -258,9 +259,9 @@ impl Builder {
                 return Err(BuildError::new(format!("{statement:?}"), problem));
             }
             rows.groups.iter_mut().for_each(|group| group.soft = price);
-            problem.constraints.extend(rows);
+            let added = problem.constrain(rows);
+            added.map_err(|why| BuildError::new("demands", why.to_string()))?;
         }
-        problem.soft = problem.constraints.take_soft();
         Ok(())
     }
 }
@@ -296,7 +297,7 @@ fn begin_at_readings(problem: &mut Problem) {
             }
         }
     }
-    problem.functions = problem.functions.clone().with_start(&start);
+    problem.start_from(&start);
 }
 
 /// Moves the start into the constraints.
@@ -311,7 +312,7 @@ fn into_the_constraints(problem: &mut Problem) -> Result<(), BuildError> {
     match problem.feasible_start(&problem.start()) {
         StartProjection::Kept(_) => Ok(()),
         StartProjection::Moved { parameters, .. } => {
-            problem.functions = problem.functions.clone().with_start(&parameters);
+            problem.start_from(&parameters);
             Ok(())
         }
         StartProjection::Contradiction(names) | StartProjection::ContradictionAmong(names) => {

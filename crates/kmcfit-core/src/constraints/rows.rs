@@ -58,6 +58,11 @@ impl Rows {
         self.right.len()
     }
 
+    /// One more than the largest column of an entry.
+    pub fn width(&self) -> usize {
+        self.columns.iter().max().map_or(0, |j| j + 1)
+    }
+
     /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.right.is_empty()

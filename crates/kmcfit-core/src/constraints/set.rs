@@ -1,4 +1,4 @@
-//! What the functions must satisfy.
+//! Constraints as groups of linear rows and second-order cones.
 
 use super::Rows;
 
@@ -110,6 +110,13 @@ impl Constraints {
     pub fn are_simple(&self) -> bool {
         let simple = |g: &RowGroup| (0..g.rows.len()).all(|i| g.single(i).is_some());
         self.cones.is_empty() && self.groups.iter().all(simple)
+    }
+
+    /// `theta` moved by a step, and then into the bounds of single parameters.
+    pub fn moved(&self, theta: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut moved: Vec<f64> = theta.iter().zip(step).map(|(t, d)| t + d).collect();
+        self.clip(&mut moved);
+        moved
     }
 
     /// Moves every parameter that a row bounds alone exactly into its bounds.

@@ -1,4 +1,4 @@
-//! Constraints that may be broken at a price.
+//! Soft constraints: violated at a penalty.
 
 use super::RowGroup;
 

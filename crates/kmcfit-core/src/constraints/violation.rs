@@ -1,4 +1,4 @@
-//! How far a point is outside.
+//! Violations of constraints, relative to the scale of each row.
 
 use super::{Cone, Constraints, RowGroup};
 

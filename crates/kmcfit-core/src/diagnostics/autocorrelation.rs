@@ -1,4 +1,4 @@
-//! How a sequence of residuals resembles itself a little later.
+//! Autocorrelation of residuals.
 
 /// Number of lags that are looked at in a sequence of `count` readings: a tenth of them, at most 50.
 ///

@@ -1,4 +1,4 @@
-//! Which of several models of the same readings: fit against number of parameters.
+//! Information criteria for several models of the same samples.
 //!
 //! With Gaussian errors, minus twice the log-likelihood is, up to a constant that all models of the
 //! same readings share, the chi-square where sigma is known, and `n ln(SSR/n)` where it is estimated

@@ -1,4 +1,4 @@
-//! What residuals may have that is neither noise nor motion: single readings far off, an offset, a drift.
+//! Patterns of residuals beside noise: outliers, an offset, a drift.
 
 /// Readings are far off beyond so many robust standard deviations: of white noise one in a billion is.
 const FAR: f64 = 6.0;

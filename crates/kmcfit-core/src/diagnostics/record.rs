@@ -1,4 +1,4 @@
-//! What one channel of one record leaves.
+//! Residual diagnostics of one channel of a record.
 
 use super::{Whiteness, autocorrelation, default_lags, fit_percent, rms, whiteness};
 

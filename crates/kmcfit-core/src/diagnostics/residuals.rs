@@ -1,4 +1,4 @@
-//! How far a model is from the readings, in one number.
+//! The size of residuals, in one number.
 //!
 //! Readings and model values come in pairs; a pair with a value that is not finite is a missing
 //! reading and is left out, and so are values beyond the end of the shorter slice.

@@ -32,6 +32,15 @@ impl Design {
         unit.into_iter().chain(entries)
     }
 
+    /// Whether it is of so many parameters.
+    pub fn has_columns(&self, parameters: usize) -> bool {
+        match self {
+            Design::Empty => parameters == 0,
+            Design::Identity => true,
+            Design::Sparse(matrix) => matrix.ncols() == parameters,
+        }
+    }
+
     /// `values += B theta`.
     pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
         match self {

@@ -5,24 +5,22 @@
 //! is `theta^T (B^T W B) theta'` with the trapezoid weights `W`.
 
 pub mod basis;
-mod collection;
+mod coefficient_kind;
 mod design;
 mod gram;
+mod parameterization;
 mod penalty;
-mod quantity;
 mod ratios;
-mod runs;
 mod scalar;
 mod variation;
 
 pub use basis::Basis;
-pub use collection::Parameterization;
+pub use coefficient_kind::CoefficientKind;
 pub use design::Design;
 pub use gram::Gram;
+pub use parameterization::Parameterization;
 pub use penalty::Penalty;
-pub use quantity::CoefficientKind;
 pub use ratios::Ratios;
-pub(crate) use runs::RowRuns;
 pub use scalar::{Prior, ScalarParameter, Value};
 pub use variation::Variation;
 

@@ -1,4 +1,4 @@
-//! Smoothness: what a function pays for its roughness.
+//! Penalties on the roughness of a function.
 
 use super::Design;
 use nalgebra_sparse::CsrMatrix;

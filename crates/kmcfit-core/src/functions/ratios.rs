@@ -1,4 +1,4 @@
-//! What a free motion can show: the ratios of the functions.
+//! Ratios of stiffness and damping to mass, natural frequency and damping ratio.
 
 use crate::system::NodalCoefficients;
 

@@ -1,4 +1,4 @@
-//! Total variation: what a function pays for its jumps, however sharp.
+//! Penalties on the total variation of a function.
 
 use super::Design;
 

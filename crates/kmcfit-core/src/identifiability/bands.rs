@@ -1,4 +1,4 @@
-//! How far the functions may be off: standard errors and bands.
+//! Confidence bands of functions and ratios.
 //!
 //! Without penalties the covariance of the parameters is `(J^T W J)^-1` (Cramér and Rao, for Gaussian
 //! noise and the linearised predictions). With penalties it is the sandwich
@@ -17,11 +17,11 @@
 //! band is infinite.
 
 use super::active::{ActiveRow, active_rows};
+use super::band::{Band, Side};
 use super::covariance::{Factor, Information};
 use super::directions::Directions;
 use super::linear::{span_words, spans};
 use super::sensitivity::Sensitivity;
-use crate::diagnostics::NORMAL_975;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::Term;
@@ -68,58 +68,6 @@ impl Default for BandSettings {
     }
 }
 
-/// To which sides of the value its band reaches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
-    /// Both.
-    Both,
-    /// Only above: a lower bound is active.
-    Above,
-    /// Only below: an upper bound is active.
-    Below,
-    /// Neither: an equality, or nothing is sought.
-    Neither,
-}
-
-/// The band of one function or ratio over time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Band {
-    /// `mass`, ..., `k/m`, `c/m`, `natural frequency`, `damping ratio`.
-    pub name: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// Values at the times of [`Bands::times`]; NaN where a frequency or damping ratio is not defined,
-    /// which a note says.
-    pub values: Vec<f64>,
-    /// Standard errors; infinite where not seen.
-    pub standard_error: Vec<f64>,
-    /// Sides that the band reaches to.
-    pub sides: Vec<Side>,
-    /// Number of standard errors of the band that holds at all times at once with probability 95 %;
-    /// `None` if not simulated.
-    pub simultaneous: Option<f64>,
-    /// What is to be said of it.
-    pub notes: Vec<String>,
-}
-
-impl Band {
-    /// Lower and upper end of the band of `factor` standard errors at index `i`.
-    pub fn ends(&self, i: usize, factor: f64) -> [f64; 2] {
-        let (value, width) = (self.values[i], factor * self.standard_error[i]);
-        match self.sides[i] {
-            Side::Both => [value - width, value + width],
-            Side::Above => [value, value + width],
-            Side::Below => [value - width, value],
-            Side::Neither => [value, value],
-        }
-    }
-
-    /// The band that holds at each time with probability 95 %.
-    pub fn pointwise(&self, i: usize) -> [f64; 2] {
-        self.ends(i, NORMAL_975)
-    }
-}
-
 /// Bands of all functions and of the ratios of the main device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
@@ -138,7 +86,7 @@ pub struct Bands {
 }
 
 /// A value over time that is linear in the parameters, to first order.
-struct Linear {
+struct Linearised {
     /// Answer to each column of the covariance's root, with all active rows held, and with only the
     /// equalities held.
     roots: [DMatrix<f64>; 2],
@@ -160,7 +108,6 @@ impl Bands {
         let affordable = (MOST_WORK / readings).sqrt() as usize;
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
-        let coarse = directions.is_coarse();
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information = Information::new(problem, theta, sensitivity);
         let active = active_rows(problem, theta);
@@ -168,14 +115,9 @@ impl Bands {
         let bounded = active.iter().any(|r| !r.equality);
         let all: Vec<&ActiveRow> = active.iter().collect();
         let loose = information.factor(&equal);
-        let tight = if bounded {
-            information.factor(&all)
-        } else {
-            Factor {
-                root: loose.root.clone(),
-                unseen: loose.unseen.clone(),
-                variance: loose.variance,
-            }
+        let tight = match bounded {
+            true => information.factor(&all),
+            false => loose.clone(),
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
         let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
@@ -191,41 +133,19 @@ impl Bands {
             active: &active,
             settings,
         };
-        let linears: Vec<Linear> = (0..problem.functions.ranges().len())
+        let linearised: Vec<Linearised> = (0..problem.functions.ranges().len())
             .map(|f| maker.function(f))
             .collect();
         let values = problem.functions.values(theta);
-        let functions = linears.iter().enumerate().map(|(f, linear)| {
+        let functions = linearised.iter().enumerate().map(|(f, linear)| {
             let function = problem.functions.get(f);
             let at_nodes = maker.nodes.iter().map(|i| values[f][*i]).collect();
             let unit = function.quantity.unit();
             maker.band(function.name(), unit, at_nodes, linear, Some(f))
         });
         let functions = functions.collect();
-        let mut notes = Vec::new();
-        if coarse {
-            notes.push(
-                "the parameters are many: bands are those of smooth changes, rougher ones are not counted"
-                    .to_owned(),
-            );
-        }
-        if information.is_pulled() {
-            notes.push(
-                "bands are the scatter of the estimate; the bias of its smoothing is not in them"
-                    .to_owned(),
-            );
-        }
-        if !problem.variations.is_empty() {
-            notes.push("total variation is left out of the bands".to_owned());
-        }
-        if bounded {
-            let mut names: Vec<&str> = (active.iter().filter(|r| !r.equality))
-                .map(|r| r.name.as_str())
-                .collect();
-            names.dedup();
-            notes.push(format!("bounds are active: {}", names.join(", ")));
-        }
         let unseen = loose.unseen.ncols();
+        let mut notes = notes(problem, &information, &active);
         if unseen > 0 {
             notes.push(format!(
                 "directions seen by nothing: {unseen}; the bands of what they change are infinite"
@@ -233,7 +153,7 @@ impl Bands {
         }
         Self {
             functions,
-            ratios: maker.ratios(&values, &linears),
+            ratios: maker.ratios(&values, &linearised),
             sigma: tight.variance.map(f64::sqrt),
             unseen,
             notes,
@@ -245,6 +165,33 @@ impl Bands {
     pub fn ratio(&self, name: &str) -> Option<&Band> {
         self.ratios.iter().find(|b| b.name == name)
     }
+}
+
+/// Remarks on all bands: what they leave out, and the bounds that are active.
+fn notes(problem: &Problem, information: &Information, active: &[ActiveRow]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if information.sensitivity().directions.is_coarse() {
+        notes.push(
+            "the parameters are many: bands are those of smooth changes, rougher ones are not counted"
+                .to_owned(),
+        );
+    }
+    if information.is_pulled() {
+        notes.push(
+            "bands are the scatter of the estimate; the bias of its smoothing is not in them"
+                .to_owned(),
+        );
+    }
+    if !problem.variations.is_empty() {
+        notes.push("total variation is left out of the bands".to_owned());
+    }
+    let bounds = active.iter().filter(|r| !r.equality);
+    let mut names: Vec<&str> = bounds.map(|r| r.name.as_str()).collect();
+    names.dedup();
+    if !names.is_empty() {
+        notes.push(format!("bounds are active: {}", names.join(", ")));
+    }
+    notes
 }
 
 struct Maker<'a> {
@@ -266,7 +213,7 @@ impl Maker<'_> {
         self.directions.row(row.map(|(j, b)| (first + j, b)))
     }
 
-    fn function(&self, f: usize) -> Linear {
+    fn function(&self, f: usize) -> Linearised {
         let functions = &self.problem.functions;
         let range = functions.ranges()[f].clone();
         let image = |columns: &DMatrix<f64>| {
@@ -285,7 +232,7 @@ impl Maker<'_> {
             let slope = self.slope(f, *i);
             slope.iter().map(|x| x * x).sum::<f64>().sqrt()
         };
-        Linear {
+        Linearised {
             roots: self.factors.map(|factor| image(&factor.root)),
             hidden: self.factors.map(|factor| image(&factor.unseen)),
             sizes: self.nodes.iter().map(size).collect(),
@@ -297,7 +244,7 @@ impl Maker<'_> {
         name: String,
         unit: &str,
         values: Vec<f64>,
-        linear: &Linear,
+        linear: &Linearised,
         function: Option<usize>,
     ) -> Band {
         let count = self.nodes.len();
@@ -370,7 +317,7 @@ impl Maker<'_> {
     }
 
     /// The factor of the simultaneous band: the 95 % point of `max |z_i|` over the nodes.
-    fn simultaneous(&self, linear: &Linear, errors: &[f64], sides: &[Side]) -> Option<f64> {
+    fn simultaneous(&self, linear: &Linearised, errors: &[f64], sides: &[Side]) -> Option<f64> {
         if self.settings.draws == 0 {
             return None;
         }
@@ -404,94 +351,85 @@ impl Maker<'_> {
         Some(most[index.clamp(1, most.len()) - 1])
     }
 
-    /// Ratios of the main device by the delta method.
-    fn ratios(&self, values: &[Vec<f64>], linears: &[Linear]) -> Vec<Band> {
+    /// Ratios of the main system by the delta method.
+    fn ratios(&self, values: &[Vec<f64>], linearised: &[Linearised]) -> Vec<Band> {
         let assembly = self.problem.functions.assembly(0);
         let terms = &self.problem.oscillator.terms;
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;
             Some(assembly[place + 1])
         };
-        let (mass, damping, stiffness) = (assembly[0], of(Term::Damping), of(Term::Stiffness));
-        let at = |f: usize| -> Vec<f64> { self.nodes.iter().map(|i| values[f][*i]).collect() };
-        let mut bands = Vec::new();
-        let m = at(mass);
-        let over = |f: Vec<f64>| -> Vec<f64> { f.iter().zip(&m).map(|(f, m)| f / m).collect() };
-        let over_mass = |f: usize| {
-            let ratio = over(at(f));
-            let by_mass = ratio.iter().zip(&m).map(|(r, m)| -r / m).collect();
-            let by_own = m.iter().map(|m| 1.0 / m).collect();
-            (ratio, combine(linears, &[(f, by_own), (mass, by_mass)]))
+        let (m, damping, stiffness) = (assembly[0], of(Term::Damping), of(Term::Stiffness));
+        let band = |name: &str, unit: &str, functions: &[usize], ratio: Ratio| {
+            let at = |node: &usize| {
+                let at_node: Vec<f64> = functions.iter().map(|f| values[*f][*node]).collect();
+                ratio(&at_node)
+            };
+            let (ratios, slopes): (Vec<_>, Vec<_>) = self.nodes.iter().map(at).unzip();
+            let linear = combine(linearised, functions, &slopes);
+            self.band(name.into(), unit, ratios, &linear, None)
         };
+        let mut bands = Vec::new();
+        bands.extend(stiffness.map(|k| band("k/m", "1/s^2", &[k, m], over_mass)));
+        bands.extend(damping.map(|c| band("c/m", "1/s", &[c, m], over_mass)));
         if let Some(k) = stiffness {
-            let (ratio, linear) = over_mass(k);
-            bands.push(self.band("k/m".into(), "1/s^2", ratio, &linear, None));
-        }
-        if let Some(c) = damping {
-            let (ratio, linear) = over_mass(c);
-            bands.push(self.band("c/m".into(), "1/s", ratio, &linear, None));
-        }
-        if let Some(k) = stiffness {
-            let stiffness = at(k);
-            // f = sqrt(k/m)/(2 pi): df = f/2 (dk/k - dm/m).
-            let frequency: Vec<f64> = (stiffness.iter().zip(&m))
-                .map(|(k, m)| (k / m).sqrt() / TAU)
-                .collect();
-            let half = |by: &[f64]| frequency.iter().zip(by).map(|(f, p)| 0.5 * f / p).collect();
-            let by_mass: Vec<f64> = half(&m);
-            let by_mass = by_mass.into_iter().map(|x| -x).collect();
-            let linear = combine(linears, &[(k, half(&stiffness)), (mass, by_mass)]);
-            let name = "natural frequency".into();
-            bands.push(self.band(name, "Hz", frequency.clone(), &linear, None));
-            if let Some(c) = damping {
-                // zeta = c/(2 sqrt(k m)): d zeta = dc/(2 sqrt(k m)) - zeta/2 (dk/k + dm/m).
-                let root: Vec<f64> = (stiffness.iter().zip(&m))
-                    .map(|(k, m)| {
-                        if *k > 0.0 {
-                            2.0 * (k * m).sqrt()
-                        } else {
-                            f64::NAN
-                        }
-                    })
-                    .collect();
-                let zeta: Vec<f64> = at(c).iter().zip(&root).map(|(c, r)| c / r).collect();
-                let half = |by: &[f64]| zeta.iter().zip(by).map(|(z, p)| -0.5 * z / p).collect();
-                let by_damping = root.iter().map(|r| 1.0 / r).collect();
-                let parts = [(c, by_damping), (k, half(&stiffness)), (mass, half(&m))];
-                let linear = combine(linears, &parts);
-                bands.push(self.band("damping ratio".into(), "", zeta, &linear, None));
-            }
+            bands.push(band("natural frequency", "Hz", &[k, m], frequency));
+            bands.extend(damping.map(|c| band("damping ratio", "", &[c, k, m], damping_ratio)));
         }
         bands
     }
 }
 
-/// `sum_f factor_f(t) p_f(t)`.
-fn combine(linears: &[Linear], parts: &[(usize, Vec<f64>)]) -> Linear {
-    let sum = |of: &dyn Fn(&Linear) -> DMatrix<f64>| {
-        let mut total: Option<DMatrix<f64>> = None;
-        for (f, factors) in parts {
-            let mut part = of(&linears[*f]);
-            for (mut row, factor) in part.row_iter_mut().zip(factors) {
-                row *= *factor;
-            }
-            total = Some(match total {
-                None => part,
-                Some(sum) => sum + part,
-            });
-        }
-        total.expect("at least one part")
+/// A function of the coefficients at a node: its value, and its derivatives with respect to each of them.
+type Ratio = fn(&[f64]) -> (f64, Vec<f64>);
+
+/// `p/m`.
+fn over_mass(at: &[f64]) -> (f64, Vec<f64>) {
+    let ratio = at[0] / at[1];
+    (ratio, vec![1.0 / at[1], -ratio / at[1]])
+}
+
+/// `f = sqrt(k/m)/(2 pi)`: `df = f/2 (dk/k - dm/m)`.
+fn frequency(at: &[f64]) -> (f64, Vec<f64>) {
+    let frequency = (at[0] / at[1]).sqrt() / TAU;
+    let half = |p: f64| 0.5 * frequency / p;
+    (frequency, vec![half(at[0]), -half(at[1])])
+}
+
+/// `zeta = c/(2 sqrt(k m))`: `d zeta = dc/(2 sqrt(k m)) - zeta/2 (dk/k + dm/m)`.
+fn damping_ratio(at: &[f64]) -> (f64, Vec<f64>) {
+    let [c, k, m] = [at[0], at[1], at[2]];
+    let root = if k > 0.0 {
+        2.0 * (k * m).sqrt()
+    } else {
+        f64::NAN
     };
-    let nodes = linears[parts[0].0].sizes.len();
-    let size = |i: usize| {
-        let each = parts
-            .iter()
-            .map(|(f, by)| (linears[*f].sizes[i] * by[i]).abs());
+    let zeta = c / root;
+    (zeta, vec![1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
+}
+
+/// `sum_f slope_f(t) p_f(t)`, with the slopes at each node.
+fn combine(linearised: &[Linearised], functions: &[usize], slopes: &[Vec<f64>]) -> Linearised {
+    let sum = |of: &dyn Fn(&Linearised) -> &DMatrix<f64>| {
+        let parts = functions.iter().enumerate().map(|(p, f)| {
+            let mut part = of(&linearised[*f]).clone();
+            for (mut row, slopes) in part.row_iter_mut().zip(slopes) {
+                row *= slopes[p];
+            }
+            part
+        });
+        parts
+            .reduce(|sum, part| sum + part)
+            .expect("at least one function")
+    };
+    let size = |(i, slopes): (usize, &Vec<f64>)| {
+        let each = functions.iter().zip(slopes);
+        let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
         each.fold(0.0, f64::max)
     };
-    Linear {
-        roots: [sum(&|l| l.roots[0].clone()), sum(&|l| l.roots[1].clone())],
-        hidden: [sum(&|l| l.hidden[0].clone()), sum(&|l| l.hidden[1].clone())],
-        sizes: (0..nodes).map(size).collect(),
+    Linearised {
+        roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
+        hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
+        sizes: slopes.iter().enumerate().map(size).collect(),
     }
 }

@@ -1,4 +1,4 @@
-//! Which functions share one scale, and where it is fixed.
+//! Connected records: functions that share one scale, and where it is fixed.
 
 use crate::functions::CoefficientFunction;
 use crate::problem::Problem;

@@ -1,14 +1,16 @@
-//! The covariance of the parameters as a factor, and the directions that it does not bound.
+//! The covariance of the parameters: its one factorisation, with the directions that the measurements do not bound.
+//! Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are both taken from it.
 
 use super::active::ActiveRow;
 use super::directions::Directions;
 use super::linear::{null_space, right_svd};
 use super::sensitivity::Sensitivity;
 use crate::functions::Penalty;
-use crate::problem::Problem;
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use nalgebra::{DMatrix, DVector};
 
-/// A direction whose singular value is below this share of the largest is not seen.
+/// A direction whose singular value is below this share of the largest is not identifiable.
 const UNSEEN: f64 = 1e-11;
 /// Constraint rows closer to dependent than this are so.
 const DEPENDENT: f64 = 1e-10;
@@ -26,6 +28,7 @@ pub(super) struct Information {
 }
 
 /// `Cov = F F^T` on the directions that are seen, nothing on the others.
+#[derive(Clone)]
 pub(super) struct Factor {
     /// Directions x rank.
     pub root: DMatrix<f64>,
@@ -108,20 +111,7 @@ impl Information {
                 DEPENDENT,
             ),
         };
-        // Rows of zeros make the decomposition name the unseen directions too.
-        let mut reduced = self.rows() * &free;
-        if reduced.nrows() < free.ncols() {
-            reduced = reduced.resize_vertically(free.ncols(), 0.0);
-        }
-        let (values, vectors) = right_svd(&reduced);
-        let most = values.first().copied().unwrap_or(0.0);
-        let rank = values.iter().filter(|s| **s > UNSEEN * most).count();
-        let vectors = free * vectors;
-        let mut inverse_root = vectors.columns(0, rank).into_owned();
-        for (mut column, s) in inverse_root.column_iter_mut().zip(&values) {
-            column /= *s;
-        }
-        let unseen = vectors.columns(rank, vectors.ncols() - rank).into_owned();
+        let (inverse_root, unseen) = inverse_root(&self.rows(), free);
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
@@ -136,6 +126,7 @@ impl Information {
                 }
             }
         }
+        let rank = inverse_root.ncols();
         let root = match answers.nrows() >= rank && rank > 0 {
             true => &inverse_root * answers.qr().r().transpose(),
             false => &inverse_root * answers.transpose(),
@@ -166,6 +157,55 @@ impl Information {
             () if left <= 0.5 => f64::INFINITY,
             () if squares == 0.0 => self.rounding.powi(2),
             () => squares / left,
+        })
+    }
+}
+
+/// A root of `(A' A)^-1` for the matrix `A` of `rows` along the orthonormal columns of `free`, and a basis of the
+/// combinations of these columns that `A` does not determine.
+fn inverse_root(rows: &DMatrix<f64>, free: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    // Rows of zeros make the decomposition name the undetermined combinations too.
+    let mut reduced = rows * &free;
+    if reduced.nrows() < free.ncols() {
+        reduced = reduced.resize_vertically(free.ncols(), 0.0);
+    }
+    let (values, vectors) = right_svd(&reduced);
+    let most = values.first().copied().unwrap_or(0.0);
+    let rank = values.iter().filter(|s| **s > UNSEEN * most).count();
+    let vectors = free * vectors;
+    let mut root = vectors.columns(0, rank).into_owned();
+    for (mut column, s) in root.column_iter_mut().zip(&values) {
+        column /= *s;
+    }
+    let unseen = vectors.columns(rank, vectors.ncols() - rank).into_owned();
+    (root, unseen)
+}
+
+impl Problem {
+    /// Covariance of the parameters at an evaluated point, from the linearised predictions:
+    /// `(J^T W J)^-1` with `W = 1/sigma^2` where the readings have a sigma (the Cramer-Rao bound for
+    /// Gaussian noise), else times the residuals' mean square. Penalties, constraints and priors do
+    /// not count. `None` where some direction is not identifiable, there are too many parameters, or
+    /// noise is neither given nor left by the fit.
+    pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
+        let (n, readings) = (self.parameters(), self.reading_count());
+        if n == 0 || n > FEW_PARAMETERS || readings <= n {
+            return None;
+        }
+        let directions = Directions::new(self, evaluation, n, n);
+        let sensitivity = Sensitivity::along(self, evaluation, directions);
+        let (root, unseen) = inverse_root(&sensitivity.jacobian, DMatrix::identity(n, n));
+        let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
+        let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
+            true => 1.0,
+            false => squares / (readings - n) as f64,
+        };
+        // A fit that leaves nothing says nothing of the noise.
+        (unseen.ncols() == 0 && scale > 0.0).then(|| {
+            let column = |z: &[f64]| DVector::from_vec(sensitivity.directions.to_parameters(z));
+            let columns: Vec<_> = root.column_iter().map(|z| column(z.as_slice())).collect();
+            let root = DMatrix::from_columns(&columns);
+            &root * root.transpose() * scale
         })
     }
 }

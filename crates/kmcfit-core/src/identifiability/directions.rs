@@ -102,6 +102,14 @@ impl Directions {
         theta
     }
 
+    /// A Jacobian with respect to the parameters along the directions, of which there is one for each parameter.
+    pub(super) fn of_jacobian(&self, mut jacobian: DMatrix<f64>) -> DMatrix<f64> {
+        for (mut column, direction) in jacobian.column_iter_mut().zip(&self.columns) {
+            direction.iter().for_each(|(_, d)| column *= *d);
+        }
+        jacobian
+    }
+
     /// The change of the parameters that `z` stands for.
     pub fn to_parameters(&self, z: &[f64]) -> Vec<f64> {
         let mut theta = vec![0.0; self.parameters()];

@@ -1,4 +1,4 @@
-//! Which further record would show most.
+//! Experiment design: the information that a further record adds.
 //!
 //! At the present parameters each candidate is simulated and its Jacobian put below that of the records
 //! there are. **New directions** are those by which the rank grows. For the directions that are seen
@@ -157,7 +157,7 @@ pub fn rank_experiments(
 /// Whether the gauge is smaller with one more record.
 fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gauge) -> bool {
     let mut with = problem.clone();
-    with.experiments.push(record);
+    with.parts_mut().experiments.push(record);
     Gauge::at(&with, theta).directions.len() < gauge.directions.len()
 }
 
@@ -216,7 +216,7 @@ fn jacobian(
     information: &Information,
 ) -> Result<DMatrix<f64>, String> {
     let mut trial = problem.clone();
-    trial.experiments = vec![record];
+    trial.parts_mut().experiments = vec![record];
     let evaluation = trial.evaluate(theta).map_err(|b| b.to_string())?;
     let directions = information.sensitivity().directions.clone();
     let jacobian = Sensitivity::along(&trial, &evaluation, directions).jacobian;

@@ -11,6 +11,7 @@
 
 mod active;
 mod anchors;
+mod band;
 mod bands;
 mod components;
 mod counting;
@@ -31,7 +32,8 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
 }
 
 pub use anchors::anchors;
-pub use bands::{Band, BandSettings, Bands, Side};
+pub use band::{Band, Side};
+pub use bands::{BandSettings, Bands};
 pub use counting::{Symmetry, count};
 pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
 pub use gauge::Gauge;

@@ -4,7 +4,6 @@ use super::directions::Directions;
 use super::linear::right_svd;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simulate::{CoefficientGradient, Trajectory};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -57,26 +56,25 @@ impl Sensitivity {
         )
     }
 
-    /// Along given directions: one tangent solve for each, or one adjoint solve per reading where
-    /// these are fewer.
+    /// Along given directions.
     pub fn along(problem: &Problem, evaluation: &Evaluation, directions: Directions) -> Self {
         let (mut roots, mut residuals) = (Vec::new(), Vec::new());
         let mut has_sigma = Vec::new();
-        for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
-            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-                for (i, r) in channel.residuals(predicted).enumerate() {
-                    let root = channel.weight(i, r).sqrt();
-                    roots.push(root);
-                    residuals.push(root * r);
-                    has_sigma.push(channel.weighting().is_sigma());
-                }
+        for (channel, predicted) in problem.predicted(evaluation) {
+            for (i, r) in channel.residuals(predicted).enumerate() {
+                let root = channel.weight(i, r).sqrt();
+                roots.push(root);
+                residuals.push(root * r);
+                has_sigma.push(channel.weighting().is_sigma());
             }
         }
-        let jacobian = if roots.len() < directions.len() {
-            by_adjoints(problem, evaluation, &directions, &roots)
-        } else {
-            by_tangents(problem, evaluation, &directions, &roots)
+        let mut jacobian = match directions.is_coarse() {
+            true => by_tangents(problem, evaluation, &directions, roots.len()),
+            false => directions.of_jacobian(problem.predictions_jacobian(evaluation)),
         };
+        for mut column in jacobian.column_iter_mut() {
+            (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
+        }
         Self {
             jacobian,
             residuals,
@@ -116,84 +114,20 @@ fn above(values: &[f64], share: f64) -> usize {
     values.iter().filter(|s| **s > share * most).count()
 }
 
+/// One tangent solve for each direction.
 fn by_tangents(
     problem: &Problem,
     evaluation: &Evaluation,
     directions: &Directions,
-    roots: &[f64],
+    readings: usize,
 ) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(roots.len(), directions.len());
+    let mut jacobian = DMatrix::zeros(readings, directions.len());
     for k in 0..directions.len() {
         let changes = problem.predictions_tangent(evaluation, &directions.column(k));
-        let all = changes.iter().flatten().flatten().zip(roots);
-        for (entry, (change, root)) in jacobian.column_mut(k).iter_mut().zip(all) {
-            *entry = root * change;
-        }
+        let all = changes.iter().flatten().flatten();
+        (jacobian.column_mut(k).iter_mut().zip(all)).for_each(|(entry, change)| *entry = *change);
     }
     jacobian
-}
-
-fn by_adjoints(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    directions: &Directions,
-    roots: &[f64],
-) -> DMatrix<f64> {
-    // By columns, as the storage is: the transpose is turned in the end.
-    let mut transposed = DMatrix::zeros(directions.len(), roots.len());
-    let mut row = 0;
-    for (e, experiment) in problem.experiments.iter().enumerate() {
-        for channel in &experiment.channels {
-            let mut slopes = vec![0.0; channel.len()];
-            for i in 0..channel.len() {
-                slopes[i] = roots[row];
-                let gradient = reading_gradient(problem, evaluation, e, |view, parts| {
-                    channel.add_transpose(view, &slopes, parts.0, parts.1, parts.2);
-                });
-                slopes[i] = 0.0;
-                let z = directions.functional(&gradient);
-                transposed.column_mut(row).copy_from_slice(&z);
-                row += 1;
-            }
-        }
-    }
-    transposed.transpose()
-}
-
-type Parts<'a, 'b> = (
-    &'a mut Trajectory,
-    &'a mut CoefficientGradient<'b>,
-    &'a mut [f64],
-);
-
-/// Gradient in the parameters of a linear function of the predictions of experiment `e`.
-fn reading_gradient(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    e: usize,
-    add: impl FnOnce(crate::objective::SimulatedRecord, Parts),
-) -> Vec<f64> {
-    let experiment = &problem.experiments[e];
-    let view = problem.view(evaluation, e);
-    let mut source = Trajectory::zeros(experiment.nodes);
-    let mut nodal = problem.functions.empty_device();
-    let mut scalars = vec![0.0; evaluation.scalars.len()];
-    let mut direct = CoefficientGradient::AtNodes(&mut nodal);
-    add(view, (&mut source, &mut direct, &mut scalars));
-    let share = view.discrete_adjoint(&source);
-    for (total, share) in nodal.functions_mut().zip(share.device.functions()) {
-        total.iter_mut().zip(share).for_each(|(t, s)| *t += s);
-    }
-    let slopes = [share.initial.displacement, share.initial.velocity];
-    for (index, slope) in experiment.sought.into_iter().zip(slopes) {
-        if let Some(index) = index {
-            scalars[index] += slope;
-        }
-    }
-    let mut gradient = vec![0.0; problem.parameters()];
-    (problem.functions).add_transpose(&nodal, experiment.device, &mut gradient);
-    gradient[problem.functions.scalar_range()].copy_from_slice(&scalars);
-    gradient
 }
 
 /// What the readings see: `J = U S V^T`.

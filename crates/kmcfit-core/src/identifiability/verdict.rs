@@ -1,6 +1,7 @@
-//! What the bands say of each function and ratio, in words.
+//! Classification of functions and ratios by their bands.
 
-use super::bands::{Band, Bands};
+use super::band::Band;
+use super::bands::Bands;
 use super::linear::{span_words, spans};
 use crate::diagnostics::{NORMAL_975, median_size};
 use crate::objective::Evaluation;

@@ -139,7 +139,7 @@ mod tests {
             grid.nodes(),
             grid.step(),
         );
-        problem = Problem::new(problem.oscillator, functions.unwrap(), problem.experiments);
+        problem.parts_mut().functions = functions.unwrap();
         let theta = problem.start();
         let mut found = vec![0.0; theta.len()];
         let cost = problem.cost_and_gradient(&theta, &mut found).unwrap();

@@ -6,17 +6,18 @@ mod jacobian;
 mod node_aligned;
 mod prediction;
 mod refine;
-mod sizes;
+mod scales;
+mod simulated_record;
 mod verify;
-mod view;
 
 pub use gradient::{Gradient, GradientKind};
 pub use refine::Refined;
-pub use sizes::state_scales;
+pub use scales::state_scales;
+pub use simulated_record::{RecordTangent, SimulatedRecord};
 pub use verify::GradientError;
-pub use view::{RecordTangent, SimulatedRecord};
 
 use crate::problem::Problem;
+use crate::record::Channel;
 use crate::simulate::reference::tangent;
 use crate::simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
@@ -112,11 +113,7 @@ impl Problem {
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
-        self.functions.device_into(theta, 0, &mut evaluation.device);
-        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
-            self.functions.device_into(theta, i + 1, own);
-        }
-        evaluation.scalars.copy_from_slice(self.scalars(theta));
+        self.set_parameters(theta, evaluation);
         self.motions(purpose, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
@@ -126,13 +123,21 @@ impl Problem {
         Ok(())
     }
 
-    /// Motions, predictions and misfit of the devices and scalars that `evaluation` holds; its cost
-    /// and regularisation stay as they are.
-    ///
-    /// # Errors
-    /// A [`SimulationError`] if a motion does not exist.
-    pub fn evaluate_devices(&self, evaluation: &mut Evaluation) -> Result<(), SimulationError> {
-        self.motions(Purpose::Estimation, evaluation)
+    /// Functions and scalars for the parameters `theta`.
+    pub(crate) fn set_parameters(&self, theta: &[f64], evaluation: &mut Evaluation) {
+        self.functions.device_into(theta, 0, &mut evaluation.device);
+        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
+            self.functions.device_into(theta, i + 1, own);
+        }
+        evaluation.scalars.copy_from_slice(self.scalars(theta));
+    }
+
+    /// The channels of all experiments, each with its predictions.
+    pub(crate) fn predicted<'a>(
+        &'a self,
+        evaluation: &'a Evaluation,
+    ) -> impl Iterator<Item = (&'a Channel, &'a Vec<f64>)> {
+        self.channels().zip(evaluation.predictions.iter().flatten())
     }
 
     fn motions(
@@ -225,12 +230,10 @@ impl Problem {
             },
             0.0f64,
         );
-        for (experiment, predictions) in self.experiments.iter().zip(&evaluation.predictions) {
-            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-                for (place, r) in channel.places().iter().zip(channel.residuals(predicted)) {
-                    if r.abs() > worst.1.abs() {
-                        worst = (*place, r);
-                    }
+        for (channel, predicted) in self.predicted(evaluation) {
+            for (place, r) in channel.places().iter().zip(channel.residuals(predicted)) {
+                if r.abs() > worst.1.abs() {
+                    worst = (*place, r);
                 }
             }
         }

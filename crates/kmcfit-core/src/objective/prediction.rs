@@ -1,4 +1,4 @@
-//! What the model says of a channel's readings, how that changes, and the transpose.
+//! Predictions of a channel, their tangent and its transpose.
 
 use super::node_aligned::{AddTranspose, Predict};
 use super::{RecordTangent, SimulatedRecord};

@@ -47,13 +47,9 @@ impl Problem {
 
     /// `J(to) - J(from)` without the cancellation of two rounded costs.
     pub fn cost_difference(&self, from: &Evaluation, to: &Evaluation) -> f64 {
-        let predictions = from.predictions.iter().zip(&to.predictions);
-        let experiments = self.experiments.iter().zip(predictions);
-        let misfit: f64 = experiments
-            .flat_map(|(experiment, (from, to))| {
-                let channels = experiment.channels.iter().zip(from.iter().zip(to));
-                channels.map(|(channel, (from, to))| channel.cost_difference(from, to))
-            })
+        let channels = self.predicted(from).zip(to.predictions.iter().flatten());
+        let misfit: f64 = channels
+            .map(|((channel, from), to)| channel.cost_difference(from, to))
             .sum();
         misfit + (to.regularisation - from.regularisation)
     }

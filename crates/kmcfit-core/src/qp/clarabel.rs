@@ -1,6 +1,6 @@
 //! Subproblems by Clarabel.
 
-use super::{Candidate, Subproblem};
+use super::{PrimalDual, Subproblem};
 use crate::constraints::Rows;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
@@ -48,9 +48,9 @@ impl Conic {
 /// How one run of Clarabel ended: its own word, to be judged.
 pub enum Ending {
     /// A point with multipliers, whatever it is worth.
-    Point(Candidate),
+    Point(PrimalDual),
     /// Multipliers that are said to show that no point satisfies the rows.
-    Contradiction(Candidate),
+    Contradiction(PrimalDual),
     /// Nothing.
     Nothing,
 }
@@ -202,8 +202,8 @@ impl Subproblem {
     }
 
     /// The point `x` with the multipliers `duals` in the unit `unit` of the cost.
-    fn read(&self, x: &[f64], duals: &[f64], unit: f64, conic: &Conic) -> Candidate {
-        let mut candidate = Candidate::zero(self);
+    fn read(&self, x: &[f64], duals: &[f64], unit: f64, conic: &Conic) -> PrimalDual {
+        let mut candidate = PrimalDual::zero(self);
         candidate.z.copy_from_slice(&x[..self.variables]);
         for ((origin, scale), dual) in conic.origins.iter().zip(duals) {
             let multiplier = unit * scale * dual;

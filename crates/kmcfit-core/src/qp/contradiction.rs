@@ -1,7 +1,7 @@
 //! Proof that no point satisfies the rows of a program.
 
 use super::clarabel::{Ending, Settings};
-use super::{Candidate, Subproblem};
+use super::{PrimalDual, Subproblem};
 use crate::constraints::{Cone, Rows, TOLERANCE};
 
 /// A proof holds for all points within so many natural sizes of the variables: a residual of the combination is
@@ -45,7 +45,7 @@ impl Subproblem {
     /// with `R = -b / sum_j |v_j| U_j`, in the natural sizes `U_j` in which the terms of a variable are as large as those of
     /// `b`. A proof has `R` of at least 1000, and a `b` that is
     /// negative even if every row is violated by what constraints may be violated by.
-    pub fn is_contradiction(&self, candidate: &Candidate) -> bool {
+    pub fn is_contradiction(&self, candidate: &PrimalDual) -> bool {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
         SMALL.iter().any(|small| {
@@ -54,7 +54,7 @@ impl Subproblem {
         })
     }
 
-    fn proves(&self, candidate: &Candidate) -> bool {
+    fn proves(&self, candidate: &PrimalDual) -> bool {
         let mut sum = Combination {
             slope: vec![0.0; self.variables],
             terms: vec![0.0; self.variables],
@@ -95,7 +95,7 @@ impl Subproblem {
 
     /// Sets the multipliers to zero that are rounding beside the largest one, each times the size of its row: rows that have no
     /// part in the contradiction only add slopes.
-    fn leave_out_small(&self, candidate: &mut Candidate, small: f64) {
+    fn leave_out_small(&self, candidate: &mut PrimalDual, small: f64) {
         let weigh = |rows: &Rows, multipliers: &[f64]| {
             let each = multipliers.iter().enumerate();
             each.fold(0.0f64, |most, (i, y)| most.max((y * rows.scale(i)).abs()))
@@ -134,17 +134,17 @@ impl Subproblem {
             };
             match sub.run_clarabel(settings) {
                 Ending::Point(point) => point,
-                Ending::Contradiction(_) | Ending::Nothing => Candidate::zero(&sub),
+                Ending::Contradiction(_) | Ending::Nothing => PrimalDual::zero(&sub),
             }
         });
-        let mut from = from.chain(std::iter::once(Candidate::zero(&sub)));
+        let mut from = from.chain(std::iter::once(PrimalDual::zero(&sub)));
         from.any(|point| {
             let (found, _) = sub.polish(point);
-            let proof = Candidate {
+            let proof = PrimalDual {
                 equalities: found.equalities,
                 inequalities: found.inequalities,
                 cones: found.cones,
-                ..Candidate::zero(self)
+                ..PrimalDual::zero(self)
             };
             self.is_contradiction(&proof)
         })
@@ -191,9 +191,9 @@ mod tests {
     }
 
     fn proof(sub: &Subproblem, multipliers: [f64; 3]) -> bool {
-        sub.is_contradiction(&Candidate {
+        sub.is_contradiction(&PrimalDual {
             inequalities: multipliers.to_vec(),
-            ..Candidate::zero(sub)
+            ..PrimalDual::zero(sub)
         })
     }
 

@@ -4,7 +4,7 @@
 //! conditions of Karush, Kuhn and Tucker are computed from the program's data, each in a unit in which
 //! it means the same whatever the units of rows, variables and cost are.
 
-use super::{Candidate, Subproblem};
+use super::{PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
 /// Error of a sum of a few products, relative to the sum of their sizes: each product and each partial sum is rounded.
@@ -90,7 +90,7 @@ fn terms(rows: &Rows, i: usize, x: &[f64]) -> f64 {
 
 impl Subproblem {
     /// The residuals of the optimality conditions at `candidate`.
-    pub fn kkt(&self, candidate: &Candidate) -> Kkt {
+    pub fn kkt(&self, candidate: &PrimalDual) -> Kkt {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
         let z = &candidate.z;
@@ -199,7 +199,7 @@ impl Subproblem {
         z.iter().zip(curvature).zip(joined).map(size).collect()
     }
 
-    fn add_rows(&self, candidate: &Candidate, natural: &[f64], sums: &mut RowResiduals) {
+    fn add_rows(&self, candidate: &PrimalDual, natural: &[f64], sums: &mut RowResiduals) {
         let z = &candidate.z;
         let values = self.equalities.multiply(z);
         for (i, (value, right)) in values.iter().zip(self.equalities.right()).enumerate() {
@@ -234,7 +234,7 @@ impl Subproblem {
         }
     }
 
-    fn add_cones(&self, candidate: &Candidate, sums: &mut RowResiduals) {
+    fn add_cones(&self, candidate: &PrimalDual, sums: &mut RowResiduals) {
         for (cone, multipliers) in self.cones.iter().zip(&candidate.cones) {
             let values = cone.rows.multiply(&candidate.z);
             let parts: Vec<f64> = values
@@ -296,10 +296,10 @@ mod tests {
     }
 
     fn at(sub: &Subproblem, z: f64, multiplier: f64) -> Kkt {
-        sub.kkt(&Candidate {
+        sub.kkt(&PrimalDual {
             z: vec![z],
             inequalities: vec![multiplier],
-            ..Candidate::zero(sub)
+            ..PrimalDual::zero(sub)
         })
     }
 
@@ -373,7 +373,7 @@ mod tests {
         rows.push([(0, 1.0)], 0.0);
         rows.push([(1, 1.0)], 0.0);
         sub.cones.push(Cone { rows });
-        let mut candidate = Candidate::zero(&sub);
+        let mut candidate = PrimalDual::zero(&sub);
         candidate.z = vec![0.6, 0.8];
         candidate.cones[0] = vec![4.0, -2.4, -3.2];
         let kkt = sub.kkt(&candidate);
@@ -385,7 +385,7 @@ mod tests {
         sub.residuals.push([(0, 1.0)], 3.0);
         sub.absolute.push([(0, 1.0)], 0.0);
         sub.absolute_weights.push(1.0);
-        let mut candidate = Candidate::zero(&sub);
+        let mut candidate = PrimalDual::zero(&sub);
         candidate.z = vec![2.5];
         candidate.absolute = vec![0.5];
         assert_eq!(sub.kkt(&candidate).size(), 0.0);

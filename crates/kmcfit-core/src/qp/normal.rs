@@ -1,6 +1,6 @@
 //! A program in units in which its coefficients are near 1.
 
-use super::{Candidate, Subproblem};
+use super::{PrimalDual, Subproblem};
 use crate::constraints::{Cone, Rows};
 
 /// Rounds of scaling by square roots: each halves the exponents that are left, and after twelve those of
@@ -72,14 +72,14 @@ impl Normalised {
     }
 
     /// A point of the program as one of the original.
-    pub fn original(&self, point: &Candidate) -> Candidate {
+    pub fn original(&self, point: &PrimalDual) -> PrimalDual {
         let multipliers = |values: &[f64], factors: &[f64]| -> Vec<f64> {
             let pairs = values.iter().zip(factors);
             pairs.map(|(m, factor)| m * factor / self.cost).collect()
         };
         let cones = point.cones.iter().zip(&self.cones);
         let cones = cones.map(|(c, factor)| multipliers(c, &vec![*factor; c.len()]));
-        Candidate {
+        PrimalDual {
             z: product(&point.z, &self.units),
             inequalities: multipliers(&point.inequalities, &self.inequalities),
             equalities: multipliers(&point.equalities, &self.equalities),

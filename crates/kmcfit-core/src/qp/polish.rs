@@ -5,8 +5,7 @@
 //! sparse factorisation finds the minimum to machine precision; multipliers of the wrong sign and rows that are violated
 //! then correct the active set.
 
-use super::factor::Symmetric;
-use super::{Candidate, Kkt, Subproblem};
+use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
 /// Most corrections of the active set: of hundreds of rows few change after two, and sets that cycle
@@ -42,7 +41,7 @@ impl Subproblem {
     }
 
     /// The best of `from` and the minima under the active sets that follow from it, with its residuals.
-    pub fn polish(&self, from: Candidate) -> (Candidate, Kkt) {
+    pub fn polish(&self, from: PrimalDual) -> (PrimalDual, Kkt) {
         let kkt = self.kkt(&from);
         let mut best = (from, kkt);
         // A solution that is as near to its rows as constraints hold needs no repair.
@@ -81,7 +80,7 @@ impl Subproblem {
 
     /// The rows whose multipliers are larger than their distances, each in its natural size: the slack of a row
     /// relative to its terms, what it would cost relative to the cost.
-    fn active_set(&self, candidate: &Candidate) -> ActiveSet {
+    fn active_set(&self, candidate: &PrimalDual) -> ActiveSet {
         let z = &candidate.z;
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let scale = 0.5 * at_zero.max(self.value(z) - self.constant);
@@ -134,7 +133,7 @@ impl Subproblem {
 
     /// The active set after the minimum on `set`: rows whose multipliers have the wrong sign are let go, rows that are violated
     /// are held.
-    fn corrected(&self, set: &ActiveSet, at: &Candidate) -> ActiveSet {
+    fn corrected(&self, set: &ActiveSet, at: &PrimalDual) -> ActiveSet {
         let values = self.inequalities.multiply(&at.z);
         let row = |(i, held): (usize, &Held)| {
             let (lower, upper) = (self.inequalities.right()[i], self.upper[i]);
@@ -175,23 +174,10 @@ impl Subproblem {
     /// ```
     ///
     /// with `a` of the absolute values that are not held at zero.
-    fn minimum_on(&self, set: &ActiveSet, from: &Candidate) -> Option<Candidate> {
+    fn minimum_on(&self, set: &ActiveSet, from: &PrimalDual) -> Option<PrimalDual> {
         let held = self.held_rows(set);
         let (n, r) = (self.variables, self.residuals.len());
-        let signs = [vec![1i8; n], vec![-1; r + held.len()]].concat();
-        let mut matrix = Symmetric::new(signs);
-        for (j, d) in self.proximal.iter().enumerate() {
-            matrix.add(j, j, *d);
-        }
-        for i in 0..r {
-            self.residuals
-                .row(i)
-                .for_each(|(j, a)| matrix.add(j, n + i, a));
-            matrix.add(n + i, n + i, -1.0);
-        }
-        for i in 0..held.len() {
-            held.row(i).for_each(|(j, a)| matrix.add(j, n + r + i, a));
-        }
+        let matrix = self.kkt_matrix(&held);
         let mut side = [&vec![0.0; n], self.residuals.right(), held.right()].concat();
         let mut next = from.clone();
         for (i, held) in set.absolute.iter().enumerate() {
@@ -251,7 +237,7 @@ impl Subproblem {
 }
 
 /// The multipliers of the rows that [`Subproblem::held_rows`] are.
-fn held_multipliers(set: &ActiveSet, at: &Candidate) -> Vec<f64> {
+fn held_multipliers(set: &ActiveSet, at: &PrimalDual) -> Vec<f64> {
     let held = |(m, at): (&f64, &Held)| (*at != Held::Free).then_some(*m);
     let zero = |(m, at): (&f64, &Held)| (*at == Held::Zero).then_some(*m);
     let rows = at.inequalities.iter().zip(&set.rows).filter_map(held);

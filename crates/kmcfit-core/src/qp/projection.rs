@@ -86,11 +86,9 @@ pub fn project_within(
     sub.proximal.copy_from_slice(metric);
     let places = sub.constrain(constraints, theta);
     let solution = sub.solve_within(iterations);
-    let mut projected: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
-    constraints.clip(&mut projected);
     Projection {
         status: solution.status,
-        theta: projected,
+        theta: constraints.moved(theta, &solution.z),
         multipliers: solution.by_group(&places),
     }
 }

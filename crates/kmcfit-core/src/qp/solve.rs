@@ -2,7 +2,7 @@
 
 use super::clarabel::{Ending, Settings};
 use super::normal::Normalised;
-use super::{Candidate, Kkt, Subproblem};
+use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
 /// How a program ended, by kmcfit's own judgement of the point.
@@ -147,12 +147,12 @@ impl Subproblem {
             return self.solution(ConicStatus::Infeasible, None, 0);
         }
         // Where it costs nothing to stay there is no unit of the cost for an interior-point method to go by.
-        let zero = Candidate::zero(self);
+        let zero = PrimalDual::zero(self);
         let kkt = self.kkt(&zero);
         if kkt.is_solution() {
             return self.solution(ConicStatus::Solved, Some((zero, kkt)), 0);
         }
-        let mut best: Option<(Candidate, Kkt)> = None;
+        let mut best: Option<(PrimalDual, Kkt)> = None;
         let mut normalised = None;
         for (attempts, attempt) in (1..).zip(ATTEMPTS) {
             let settings = Settings {
@@ -200,12 +200,12 @@ impl Subproblem {
     }
 
     /// The point moved into its bounds and polished.
-    fn repaired(&self, mut point: Candidate) -> Candidate {
+    fn repaired(&self, mut point: PrimalDual) -> PrimalDual {
         self.clip(&mut point.z);
         self.polish(point).0
     }
 
-    fn refused(&self, best: Option<(Candidate, Kkt)>, attempts: u32) -> Solution {
+    fn refused(&self, best: Option<(PrimalDual, Kkt)>, attempts: u32) -> Solution {
         let is_reduced = best.as_ref().is_some_and(|(_, kkt)| kkt.is_reduced());
         let status = match is_reduced {
             true => ConicStatus::Almost,
@@ -217,11 +217,12 @@ impl Subproblem {
     fn solution(
         &self,
         status: ConicStatus,
-        found: Option<(Candidate, Kkt)>,
+        found: Option<(PrimalDual, Kkt)>,
         attempts: u32,
     ) -> Solution {
         let kkt = found.as_ref().map(|(_, kkt)| *kkt);
-        let mut candidate = found.map_or_else(|| Candidate::zero(self), |(candidate, _)| candidate);
+        let mut candidate =
+            found.map_or_else(|| PrimalDual::zero(self), |(candidate, _)| candidate);
         candidate.project_multipliers(self);
         let first = |cone: &Vec<f64>| cone.first().copied().unwrap_or(0.0);
         Solution {

@@ -1,7 +1,7 @@
 //! The convex subproblem and its plain solution.
 
-use super::factor::Symmetric;
-use super::{chain, dense};
+use super::ldl::Symmetric;
+use super::{chain, few_variables};
 use crate::constraints::{Cone, Rows};
 
 /// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
@@ -103,7 +103,7 @@ impl Subproblem {
     /// factorisation; absolute values are left out.
     pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         if let [target] = targets
-            && let Some(z) = dense::minimise(self, target)
+            && let Some(z) = few_variables::minimise(self, target)
         {
             return Some(vec![z]);
         }
@@ -122,28 +122,30 @@ impl Subproblem {
 
     /// `(z, rho, lambda)` of the optimality conditions for each `f`.
     fn solve_conditions(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-        let (n, r, e) = (self.variables, self.residuals.len(), self.equalities.len());
-        let signs = [vec![1i8; n], vec![-1; r + e]].concat();
-        let mut matrix = Symmetric::new(signs);
-        for (j, d) in self.proximal.iter().enumerate() {
-            matrix.add(j, j, *d);
-        }
-        for i in 0..r {
-            self.residuals
-                .row(i)
-                .for_each(|(j, a)| matrix.add(j, n + i, a));
-            matrix.add(n + i, n + i, -1.0);
-        }
-        for i in 0..e {
-            let row = self.equalities.row(i);
-            row.for_each(|(j, a)| matrix.add(j, n + r + i, a));
-        }
-        let zeros = vec![0.0; n];
+        let matrix = self.kkt_matrix(&self.equalities);
+        let zeros = vec![0.0; self.variables];
         let side = |f: &Vec<f64>| [&zeros, f.as_slice(), self.equalities.right()].concat();
         let sides: Vec<Vec<f64>> = targets.iter().map(side).collect();
         let solutions = matrix.solve(&sides)?.into_iter();
         let exact = |(solution, residual)| (residual <= Self::PLAIN_RESIDUAL).then_some(solution);
         solutions.map(exact).collect()
+    }
+
+    /// `[D F' A'; F -I 0; A 0 0]` with the rows `A`.
+    pub(super) fn kkt_matrix(&self, rows: &Rows) -> Symmetric {
+        let (n, r) = (self.variables, self.residuals.len());
+        let mut matrix = Symmetric::new([vec![1i8; n], vec![-1; r + rows.len()]].concat());
+        for (j, d) in self.proximal.iter().enumerate() {
+            matrix.add(j, j, *d);
+        }
+        for i in 0..r {
+            (self.residuals.row(i)).for_each(|(j, a)| matrix.add(j, n + i, a));
+            matrix.add(n + i, n + i, -1.0);
+        }
+        for i in 0..rows.len() {
+            (rows.row(i)).for_each(|(j, a)| matrix.add(j, n + r + i, a));
+        }
+        matrix
     }
 
     /// A plain minimum that satisfies the inequalities to `tolerance`, with those held as equalities that

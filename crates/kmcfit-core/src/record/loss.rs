@@ -1,4 +1,4 @@
-//! What a residual costs, in units of its standard deviation.
+//! Losses of residuals in units of their standard deviation.
 
 /// The cost `rho(u)` of a residual `u = r / sigma`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,4 +1,4 @@
-//! How far the predictions are from the readings, and what that costs.
+//! Residuals and misfit of a channel.
 
 use super::{Channel, LONG_RECORD_STEPS, Loss, Weighting};
 use crate::simd::sum::squared_distance;

@@ -1,4 +1,4 @@
-//! What a sensor makes of the motion that it sees.
+//! Sensors: gain, offset and drift between a response and its samples.
 
 use crate::functions::Value;
 

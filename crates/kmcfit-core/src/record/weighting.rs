@@ -1,4 +1,4 @@
-//! How residuals are weighed.
+//! Weights of residuals.
 
 /// How the residuals of a channel are weighed.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Where a motion begins that was held before, or not yet struck.
+//! The onset of a response after a hold or a blow.
 
 use super::Spectrum;
 use crate::diagnostics::{far_off, median_size, rms};

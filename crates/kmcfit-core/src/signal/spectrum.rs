@@ -1,4 +1,4 @@
-//! Which frequencies a series is made of.
+//! Spectra of equally spaced series.
 
 use std::f64::consts::TAU;
 

@@ -55,9 +55,6 @@ impl<T> DerefMut for Aligned<T> {
 pub(crate) trait Arithmetic: Copy {
     /// The numbers, in registers.
     type Registers: Copy;
-    /// Arithmetic on the first four of them alone, where that takes half the time.
-    type Half: Arithmetic;
-    fn half(self) -> Self::Half;
     fn splat(self, x: f64) -> Self::Registers;
     fn load(self, row: &Row) -> Self::Registers;
     fn store(self, x: Self::Registers) -> Row;

@@ -7,15 +7,22 @@ use std::array::from_fn;
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
 
+/// Operators lane by lane.
+macro_rules! operators {
+    ($($name:ident |$a:ident, $b:ident| $result:expr),*) => {$(
+        #[inline(always)]
+        fn $name(self, a: Row, b: Row) -> Row {
+            from_fn(|i| {
+                let ($a, $b) = (a[i], b[i]);
+                $result
+            })
+        }
+    )*};
+}
+
 impl Arithmetic for Portable {
     type Registers = Row;
-    type Half = Self;
     const IS_FUSED: bool = false;
-
-    #[inline(always)]
-    fn half(self) -> Self {
-        self
-    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> Row {
@@ -32,28 +39,16 @@ impl Arithmetic for Portable {
         x
     }
 
-    #[inline(always)]
-    fn add(self, a: Row, b: Row) -> Row {
-        from_fn(|i| a[i] + b[i])
-    }
-
-    #[inline(always)]
-    fn sub(self, a: Row, b: Row) -> Row {
-        from_fn(|i| a[i] - b[i])
-    }
-
-    #[inline(always)]
-    fn mul(self, a: Row, b: Row) -> Row {
-        from_fn(|i| a[i] * b[i])
-    }
-
-    #[inline(always)]
-    fn div(self, a: Row, b: Row) -> Row {
-        from_fn(|i| a[i] / b[i])
-    }
-
-    #[inline(always)]
-    fn larger(self, a: Row, b: Row) -> Row {
-        from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
-    }
+    operators!(
+        add | a,
+        b | a + b,
+        sub | a,
+        b | a - b,
+        mul | a,
+        b | a * b,
+        div | a,
+        b | a / b,
+        larger | a,
+        b | if a > b { a } else { b }
+    );
 }

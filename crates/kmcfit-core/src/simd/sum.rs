@@ -37,6 +37,11 @@ impl Kernel for Dot<'_> {
     }
 }
 
+/// The root mean square; zero of no values.
+pub(crate) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
 /// `sum_i (factor (a_i - b_i))^2`, each lane by itself and then the lanes.
 pub(crate) fn squared_distance(a: &[f64], b: &[f64], factor: f64) -> f64 {
     super::run(SquaredDistance(a, b, factor))

@@ -14,10 +14,6 @@ pub(crate) struct Avx512(V4);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(V3);
 
-/// Half a row in one register of AVX2.
-#[derive(Clone, Copy)]
-pub(crate) struct Half(V3);
-
 /// A kernel about to be run with the instructions of `A`.
 struct Call<A, K>(A, K);
 
@@ -56,15 +52,26 @@ impl Avx2 {
     }
 }
 
+/// Operators of two registers by one instruction each: of AVX-512 at once, of AVX2 one half after the other.
+macro_rules! operators {
+    (at_once $registers:ty; $($name:ident $instruction:ident),*) => {$(
+        #[inline(always)]
+        fn $name(self, a: $registers, b: $registers) -> $registers {
+            self.0.avx512f.$instruction(a, b)
+        }
+    )*};
+    (in_halves $registers:ty; $($name:ident $instruction:ident),*) => {$(
+        #[inline(always)]
+        fn $name(self, a: $registers, b: $registers) -> $registers {
+            let f = self.0.avx;
+            [f.$instruction(a[0], b[0]), f.$instruction(a[1], b[1])]
+        }
+    )*};
+}
+
 impl Arithmetic for Avx512 {
     type Registers = __m512d;
-    type Half = Half;
     const IS_FUSED: bool = true;
-
-    #[inline(always)]
-    fn half(self) -> Half {
-        Half(*self.0)
-    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> __m512d {
@@ -81,30 +88,8 @@ impl Arithmetic for Avx512 {
         cast(x)
     }
 
-    #[inline(always)]
-    fn add(self, a: __m512d, b: __m512d) -> __m512d {
-        self.0.avx512f._mm512_add_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn sub(self, a: __m512d, b: __m512d) -> __m512d {
-        self.0.avx512f._mm512_sub_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn mul(self, a: __m512d, b: __m512d) -> __m512d {
-        self.0.avx512f._mm512_mul_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn div(self, a: __m512d, b: __m512d) -> __m512d {
-        self.0.avx512f._mm512_div_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn larger(self, a: __m512d, b: __m512d) -> __m512d {
-        self.0.avx512f._mm512_max_pd(a, b)
-    }
+    operators!(at_once __m512d; add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd,
+        div _mm512_div_pd, larger _mm512_max_pd);
 
     #[inline(always)]
     fn reciprocal(self, d: __m512d) -> [__m512d; 2] {
@@ -182,13 +167,7 @@ impl Avx2 {
 
 impl Arithmetic for Avx2 {
     type Registers = [__m256d; 2];
-    type Half = Half;
     const IS_FUSED: bool = true;
-
-    #[inline(always)]
-    fn half(self) -> Half {
-        Half(self.0)
-    }
 
     #[inline(always)]
     fn splat(self, x: f64) -> [__m256d; 2] {
@@ -205,41 +184,20 @@ impl Arithmetic for Avx2 {
         cast(x)
     }
 
-    #[inline(always)]
-    fn add(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        let f = self.0.avx;
-        [f._mm256_add_pd(a[0], b[0]), f._mm256_add_pd(a[1], b[1])]
-    }
-
-    #[inline(always)]
-    fn sub(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        let f = self.0.avx;
-        [f._mm256_sub_pd(a[0], b[0]), f._mm256_sub_pd(a[1], b[1])]
-    }
-
-    #[inline(always)]
-    fn mul(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        let f = self.0.avx;
-        [f._mm256_mul_pd(a[0], b[0]), f._mm256_mul_pd(a[1], b[1])]
-    }
-
-    #[inline(always)]
-    fn div(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        let f = self.0.avx;
-        [f._mm256_div_pd(a[0], b[0]), f._mm256_div_pd(a[1], b[1])]
-    }
-
-    #[inline(always)]
-    fn larger(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        let f = self.0.avx;
-        [f._mm256_max_pd(a[0], b[0]), f._mm256_max_pd(a[1], b[1])]
-    }
+    operators!(in_halves [__m256d; 2]; add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd,
+        div _mm256_div_pd, larger _mm256_max_pd);
 
     #[inline(always)]
     fn reciprocal(self, d: [__m256d; 2]) -> [[__m256d; 2]; 2] {
-        let half = self.half();
-        let ([r0, l0], [r1, l1]) = (half.reciprocal(d[0]), half.reciprocal(d[1]));
-        [[r0, r1], [l0, l1]]
+        let (f, fused) = (self.0.avx, self.0.fma);
+        let one = f._mm256_set1_pd(1.0);
+        let reciprocal = [f._mm256_div_pd(one, d[0]), f._mm256_div_pd(one, d[1])];
+        let rest = |q: usize| fused._mm256_fnmadd_pd(d[q], reciprocal[q], one);
+        let lost = [
+            f._mm256_mul_pd(rest(0), reciprocal[0]),
+            f._mm256_mul_pd(rest(1), reciprocal[1]),
+        ];
+        [reciprocal, lost]
     }
 
     /// Four squares of four: each is transposed, and the two off the diagonal change places.
@@ -259,74 +217,5 @@ impl Arithmetic for Avx2 {
             [c[2], d[2]],
             [c[3], d[3]],
         ]
-    }
-}
-
-impl Arithmetic for Half {
-    type Registers = __m256d;
-    type Half = Self;
-    const IS_FUSED: bool = true;
-
-    #[inline(always)]
-    fn half(self) -> Self {
-        self
-    }
-
-    #[inline(always)]
-    fn splat(self, x: f64) -> __m256d {
-        self.0.avx._mm256_set1_pd(x)
-    }
-
-    #[inline(always)]
-    fn load(self, row: &Row) -> __m256d {
-        let [first, _]: [__m256d; 2] = cast(*row);
-        first
-    }
-
-    #[inline(always)]
-    fn store(self, x: __m256d) -> Row {
-        cast([x, self.splat(0.0)])
-    }
-
-    #[inline(always)]
-    fn add(self, a: __m256d, b: __m256d) -> __m256d {
-        self.0.avx._mm256_add_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn sub(self, a: __m256d, b: __m256d) -> __m256d {
-        self.0.avx._mm256_sub_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn mul(self, a: __m256d, b: __m256d) -> __m256d {
-        self.0.avx._mm256_mul_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn div(self, a: __m256d, b: __m256d) -> __m256d {
-        self.0.avx._mm256_div_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn larger(self, a: __m256d, b: __m256d) -> __m256d {
-        self.0.avx._mm256_max_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn reciprocal(self, d: __m256d) -> [__m256d; 2] {
-        let (f, fused) = (self.0.avx, self.0.fma);
-        let one = f._mm256_set1_pd(1.0);
-        let reciprocal = f._mm256_div_pd(one, d);
-        let lost = f._mm256_mul_pd(fused._mm256_fnmadd_pd(d, reciprocal, one), reciprocal);
-        [reciprocal, lost]
-    }
-
-    #[inline(always)]
-    fn quotients(self, [a, b]: [__m256d; 2], d: __m256d) -> [__m256d; 2] {
-        let [reciprocal, lost] = self.reciprocal(d);
-        let fused = self.0.fma;
-        let quotient = |a| fused._mm256_fmadd_pd(a, reciprocal, self.mul(a, lost));
-        [quotient(a), quotient(b)]
     }
 }

@@ -1,6 +1,6 @@
 //! The choice among the reference functions and their specialisations.
 
-use super::breakdown::{SimulationError, require_finite, require_positive_mass};
+use super::error::{SimulationError, require_finite, require_positive_mass};
 use super::fast::blocks::LinearDevice;
 use super::fast::{continuous_adjoint, prefactored, simd_adjoint};
 use super::reference::equation::EquationOfMotion;

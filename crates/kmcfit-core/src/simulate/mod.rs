@@ -3,16 +3,16 @@
 //! [`reference`] has the equations, one plain function each; [`fast`] has specialisations, each equal to a reference
 //! function to a stated tolerance; [`Engine`] chooses among them.
 
-mod breakdown;
 mod engine;
+mod error;
 pub(crate) mod fast;
 mod gradient;
 pub mod reference;
 mod trajectory;
 
-pub use breakdown::{Cause, SimulationError};
 pub use engine::{Engine, Purpose, continuous_adjoint};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
+pub use error::{Cause, SimulationError};
 pub use gradient::CoefficientGradient;
 pub use reference::{Observation, StepJacobian};
 pub use trajectory::Trajectory;

@@ -1,8 +1,8 @@
-//! Which constraints are active at a point, and how hard the data push against them.
+//! The active set of constraints at a point, with multipliers.
 
 use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::Subproblem;
 use crate::solvers::iterate::Iterate;
 
 /// A row is active if it is this near to its bound, relative to its scale: nearer than a quadratic
@@ -175,8 +175,7 @@ fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
     }
     let places = sub.constrain(&problem.constraints, &point.parameters);
     let solution = sub.solve();
-    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
-    solved.then(|| {
+    solution.status.is_point().then(|| {
         let mut rows = solution.by_group(&places);
         rows.iter_mut().flatten().for_each(|m| *m *= scale);
         let mut each = solution.cone_multipliers.iter().map(|m| m * scale);

@@ -1,4 +1,4 @@
-//! What a fit keeps so that it can go on after it was killed, with the same bits.
+//! Checkpoints, from which a killed fit continues to the same bits.
 //!
 //! A fit is a fixed sequence of units: searches, and long computations between them. Whoever goes on
 //! walks the same sequence again. A unit that had ended is not computed again but recalled, the search

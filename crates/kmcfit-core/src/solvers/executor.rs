@@ -15,7 +15,7 @@ use crate::host::Instant;
 use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::{Cause, SimulationError};
+use crate::simulate::SimulationError;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -87,7 +87,8 @@ pub(super) fn search_prepared(
         at_start: prepared.evaluation,
         clock: Instant::now(),
         timings: Timings::default(),
-        progress: Err(NOT_STARTED),
+        progress: None,
+        trouble: None,
         outcome: None,
         kept,
         before: Before::default(),
@@ -103,7 +104,7 @@ pub(super) fn search_prepared(
     result.solver.finish(counts)
 }
 
-/// One search from `start` alone, without the ladder of [`fit`](super::fit()): for fits whose start is
+/// One search from `start` alone, without the other starting points of [`fit`](super::fit()): for fits whose start is
 /// near an optimum, or whose start is the question.
 ///
 /// # Errors
@@ -113,14 +114,18 @@ pub fn fit_from(
     start: &[f64],
     settings: &FitSettings,
 ) -> Result<Fit, SimulationError> {
-    let fit = search(
-        problem,
-        start,
-        settings,
-        None,
-        &mut Observer::new(&mut |_| {}),
-    )?;
+    let fit = search_unobserved(problem, start, settings)?;
     Ok(measured(problem, fit, settings))
+}
+
+/// [`search`] by itself, without an observer.
+pub(super) fn search_unobserved(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+) -> Result<Fit, SimulationError> {
+    let nothing = &mut |_: &IterationRecord| {};
+    search(problem, start, settings, None, &mut Observer::new(nothing))
 }
 
 /// One method at work, seen by argmin as a solver.
@@ -132,7 +137,10 @@ struct Run<'a, 'w> {
     at_start: Option<Evaluation>,
     clock: Instant,
     timings: Timings,
-    progress: Result<Progress, SimulationError>,
+    /// `None` before argmin calls `init`, and where the start has no response.
+    progress: Option<Progress>,
+    /// Why the start has no response.
+    trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
     /// What was kept of this search when it ran before.
     kept: Option<(Vec<IterationRecord>, SolverState)>,
@@ -152,14 +160,6 @@ struct Progress {
     point: Iterate,
     recorder: Recorder,
 }
-
-/// What `progress` holds until argmin calls `init`.
-const NOT_STARTED: SimulationError = SimulationError {
-    cause: Cause::Overflow,
-    node: 0,
-    time: f64::NAN,
-    value: f64::NAN,
-};
 
 /// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
@@ -240,7 +240,7 @@ impl Run<'_, '_> {
             Some(outcome) => interrupted(outcome),
             None => {
                 let progress = self.progress.as_ref();
-                progress.is_ok_and(|p| self.watch.is_due(p.point.parameters.len()))
+                progress.is_some_and(|p| self.watch.is_due(p.point.parameters.len()))
             }
         };
         if now {
@@ -252,7 +252,7 @@ impl Run<'_, '_> {
     }
 
     fn stand(&mut self, counts: Counts, outcome: Option<Outcome>) {
-        let Ok(Progress { point, recorder }) = &self.progress else {
+        let Some(Progress { point, recorder }) = &self.progress else {
             return;
         };
         let standing = || SolverState {
@@ -282,7 +282,7 @@ impl Run<'_, '_> {
     }
 
     fn advance(&mut self, work: &mut CountedEvaluator) {
-        let Ok(progress) = &mut self.progress else {
+        let Some(progress) = &mut self.progress else {
             return;
         };
         let before = &progress.point;
@@ -321,7 +321,7 @@ impl Run<'_, '_> {
 
     /// The outcome of a search that is over before its first iteration.
     fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
-        let cost = self.progress.as_ref().ok()?.point.evaluation.cost;
+        let cost = self.progress.as_ref()?.point.evaluation.cost;
         let converged = |reason| Some(Outcome::new(Status::Converged, reason));
         if problem.is_some_and(|p| p.parameters() == 0) {
             return converged(Reason::NoParameters);
@@ -353,13 +353,15 @@ impl Run<'_, '_> {
 
     fn finish(mut self, counts: Counts) -> Result<Fit, SimulationError> {
         match &self.outcome {
-            _ if self.progress.is_err() => self.watch.nothing(),
+            _ if self.progress.is_none() => self.watch.nothing(),
             // It goes on from where it was kept to stand.
             Some(outcome) if outcome.status == Status::Interrupted => {}
             outcome => self.stand(counts, outcome.clone()),
         }
         let elapsed = self.elapsed();
-        let Progress { point, recorder } = self.progress?;
+        let Some(Progress { point, recorder }) = self.progress else {
+            return Err(self.trouble.expect("a search starts, or there is a reason"));
+        };
         Ok(Fit {
             best: point,
             initial_cost: recorder.initial_cost,
@@ -378,10 +380,10 @@ impl Run<'_, '_> {
 
     fn view(&self, state: SearchState) -> SearchState {
         match &self.progress {
-            Ok(Progress { point, .. }) => state
+            Some(Progress { point, .. }) => state
                 .param(point.parameters.clone())
                 .cost(point.evaluation.cost),
-            Err(_) => state,
+            None => state,
         }
     }
 }
@@ -401,10 +403,13 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         match self.restored(&work) {
             Some(progress) => {
                 self.at_start = None;
-                self.progress = Ok(progress);
+                self.progress = Some(progress);
             }
             None => {
-                self.progress = self.start(&mut work, parameters);
+                match self.start(&mut work, parameters) {
+                    Ok(progress) => self.progress = Some(progress),
+                    Err(trouble) => self.trouble = Some(trouble),
+                }
                 self.timings += work.timings;
                 self.outcome = self.nothing_to_do(problem.problem);
             }
@@ -425,14 +430,13 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
     }
 
     fn terminate(&mut self, _state: &SearchState) -> TerminationStatus {
-        match (&self.outcome, &self.progress) {
-            (Some(outcome), _) => TerminationStatus::Terminated(TerminationReason::SolverExit(
-                outcome.reason.to_string(),
-            )),
-            (None, Err(breakdown)) => {
-                TerminationStatus::Terminated(TerminationReason::SolverExit(breakdown.to_string()))
-            }
-            (None, Ok(_)) => TerminationStatus::NotTerminated,
+        let outcome = self
+            .outcome
+            .as_ref()
+            .map(|outcome| outcome.reason.to_string());
+        match outcome.or_else(|| Some(self.trouble?.to_string())) {
+            Some(why) => TerminationStatus::Terminated(TerminationReason::SolverExit(why)),
+            None => TerminationStatus::NotTerminated,
         }
     }
 }

@@ -43,6 +43,16 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// This fit with the work of another one besides.
+    pub(super) fn with_work_of(self, counts: Counts, timings: Timings, elapsed: Duration) -> Self {
+        Self {
+            counts: self.counts + counts,
+            timings: self.timings + timings,
+            elapsed: self.elapsed + elapsed,
+            ..self
+        }
+    }
+
     /// `J / J0`.
     pub fn cost_ratio(&self) -> f64 {
         ratio(self.best.evaluation.cost, self.initial_cost)

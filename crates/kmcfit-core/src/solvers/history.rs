@@ -1,4 +1,4 @@
-//! What happened, iteration by iteration.
+//! The history of a fit: one record for each iteration.
 
 use super::iterate::Iterate;
 use crate::problem::Problem;

@@ -1,10 +1,9 @@
-//! What is said of a problem without a device that satisfies both the constraints and the motion.
+//! The end of a fit without a feasible response.
 //!
 //! The constraint set is convex, and whether it is empty is decided by a projection. Which of its
 //! points have a motion is not: only that the mass must be positive is a constraint of its own.
 
-use super::checkpoint::Observer;
-use super::executor::search;
+use super::executor::search_unobserved;
 use super::fit::Fit;
 use super::reason::Reason;
 use super::settings::FitSettings;
@@ -33,14 +32,7 @@ pub fn without_motion(
     }
     let mut settings = settings.clone();
     settings.stopping.iterations = 0;
-    let fit = search(
-        problem,
-        given,
-        &settings,
-        None,
-        &mut Observer::new(&mut |_| {}),
-    )
-    .map_err(|_| breakdown)?;
+    let fit = search_unobserved(problem, given, &settings).map_err(|_| breakdown)?;
     Ok(Fit {
         outcome: Outcome::new(Status::Infeasible, Reason::NoFeasibleResponse(breakdown)),
         ..fit

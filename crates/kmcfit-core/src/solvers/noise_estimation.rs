@@ -9,6 +9,7 @@ use super::start_strategy::search_from_starts;
 use super::termination::Status;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, Weighting};
+use crate::simd::sum::rms;
 use crate::simulate::SimulationError;
 
 /// Most rounds of fit and estimate.
@@ -80,10 +81,8 @@ pub fn fit_with_noise_watched(
 /// The fit `found`, gone on with by another round, `next`: the last place, with the work of both. Rounds
 /// that were `ended` from outside are not at their end, wherever the last one came to.
 fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
+    let next = next.with_work_of(found.counts, found.timings, found.elapsed);
     Fit {
-        counts: found.counts + next.counts,
-        timings: found.timings + next.timings,
-        elapsed: found.elapsed + next.elapsed,
         attempts: found.attempts,
         history: match next.history.is_empty() {
             true => found.history,
@@ -103,7 +102,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
     let readings = problem.reading_count() as f64;
     let share = (problem.parameters() as f64 / readings).min(0.5);
     let mut largest = 0.0f64;
-    let experiments = problem.experiments.iter_mut();
+    let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
         for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
             let Weighting::Estimated { sigma: before } = *channel.weighting() else {
@@ -111,7 +110,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
             };
             let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
             // Readings that are fitted exactly still need a scale.
-            let sigma = sigma.max(f64::EPSILON * size(channel.observed()));
+            let sigma = sigma.max(f64::EPSILON * rms(channel.observed()));
             if sigma > 0.0 {
                 largest = largest.max((sigma / before).ln().abs());
                 *channel = channel
@@ -123,14 +122,10 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
     largest
 }
 
-fn size(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
     let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
     match channel.loss() {
-        Loss::Squares => size(&residuals),
+        Loss::Squares => rms(&residuals),
         Loss::Huber { .. } | Loss::StudentT { .. } => {
             residuals.iter_mut().for_each(|r| *r = r.abs());
             residuals.sort_by(f64::total_cmp);

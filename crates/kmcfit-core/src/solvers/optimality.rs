@@ -16,7 +16,7 @@ use crate::qp::{Solution, Subproblem};
 
 /// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
 /// measurements.
-const EXACT: f64 = 1e-20;
+const NEGLIGIBLE: f64 = 1e-20;
 /// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
 const MOTION_ROUNDING: f64 = 1000.0;
 /// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
@@ -80,12 +80,12 @@ impl Optimality {
     /// are below 1e-10 of the measurements then has a share below [`Optimality::LEAST`], for no step lowers J by
     /// more than J.
     pub fn reference(problem: &Problem, cost: f64) -> f64 {
-        cost.max(EXACT * problem.zero_response_misfit() / Self::LEAST)
+        cost.max(NEGLIGIBLE * problem.zero_response_misfit() / Self::LEAST)
     }
 
     /// Whether J is so small that no step can lower it by a share that counts.
     pub fn is_exact(problem: &Problem, cost: f64) -> bool {
-        cost <= EXACT * problem.zero_response_misfit()
+        cost <= NEGLIGIBLE * problem.zero_response_misfit()
     }
 
     /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.

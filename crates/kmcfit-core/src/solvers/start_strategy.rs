@@ -44,24 +44,12 @@ pub fn fit(
     settings: &FitSettings,
     observe: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Fit, SimulationError> {
-    fit_watched(problem, start, settings, &mut Observer::new(observe))
-}
-
-/// [`fit`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what was kept.
-///
-/// # Errors
-/// As [`fit`].
-pub fn fit_watched(
-    problem: &Problem,
-    start: &[f64],
-    settings: &FitSettings,
-    watch: &mut Observer,
-) -> Result<Fit, SimulationError> {
-    let fit = search_from_starts(problem, start, settings, watch)?;
+    let fit = search_from_starts(problem, start, settings, &mut Observer::new(observe))?;
     Ok(measured(problem, fit, settings))
 }
 
-/// [`fit_watched`] without a measurement of its end.
+/// [`fit`] without a measurement of its end; where `watch` has a [`CheckpointStore`](super::CheckpointStore), it goes on
+/// from what was kept.
 pub(super) fn search_from_starts(
     problem: &Problem,
     start: &[f64],
@@ -78,11 +66,9 @@ pub(super) fn search_from_starts(
             break;
         }
     }
-    let fit = attempts.finish()?;
-    Ok(Fit {
-        elapsed: lead + fit.elapsed,
-        ..fit
-    })
+    let mut fit = attempts.finish()?;
+    fit.elapsed += lead;
+    Ok(fit)
 }
 
 /// Attempts from one starting point after the other.
@@ -282,12 +268,8 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 self.watch,
             )?;
         }
-        Ok(Fit {
-            attempts: self.attempts,
-            counts: self.counts + fit.counts,
-            timings: self.timings + fit.timings,
-            ..fit
-        })
+        fit.attempts = self.attempts;
+        Ok(fit.with_work_of(self.counts, self.timings, Duration::ZERO))
     }
 }
 
@@ -308,20 +290,18 @@ fn continued(
     }
     let start = &fit.best.parameters;
     watch.begin_attempt(StartStrategy::Continued);
-    let more = search(problem, start, &settings, reference, watch)?;
+    let mut more = search(problem, start, &settings, reference, watch)?;
     attempts.push(Attempt::of(StartStrategy::Continued, &more));
     let mut history = fit.history;
-    history.extend(more.history.into_iter().map(|row| IterationRecord {
+    let rows = std::mem::take(&mut more.history);
+    history.extend(rows.into_iter().map(|row| IterationRecord {
         iteration: row.iteration + taken,
         ..row
     }));
     Ok(Fit {
         history,
         snapshots: fit.snapshots,
-        counts: fit.counts + more.counts,
-        timings: fit.timings + more.timings,
-        elapsed: fit.elapsed + more.elapsed,
-        ..more
+        ..more.with_work_of(fit.counts, fit.timings, fit.elapsed)
     })
 }
 
@@ -330,28 +310,18 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     let Some(best) = best else {
         return fit;
     };
-    let counts = best.counts + fit.counts;
-    let timings = best.timings + fit.timings;
-    let elapsed = best.elapsed + fit.elapsed;
-    let winner = if fit.best.evaluation.cost < best.best.evaluation.cost {
-        fit
-    } else {
-        best
+    let (winner, other) = match fit.best.evaluation.cost < best.best.evaluation.cost {
+        true => (fit, best),
+        false => (best, fit),
     };
-    Fit {
-        counts,
-        timings,
-        elapsed,
-        ..winner
-    }
+    winner.with_work_of(other.counts, other.timings, other.elapsed)
 }
 
 /// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
     let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
-    let predictions = evaluation.predictions.iter().flatten();
-    let mut channels = problem.channels().zip(predictions);
+    let mut channels = problem.predicted(evaluation);
     noise.is_some_and(|noise| evaluation.misfit <= noise)
         || channels.all(|(channel, predicted)| {
             let silence = channel.cost(&vec![0.0; channel.len()]);

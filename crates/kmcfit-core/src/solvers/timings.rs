@@ -1,4 +1,4 @@
-//! Where the time of a fit goes.
+//! Wall-clock time of a fit by kind of work.
 
 use crate::host::Instant;
 use serde::{Deserialize, Serialize};

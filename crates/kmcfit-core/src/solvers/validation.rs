@@ -1,7 +1,6 @@
 //! Experiments that took no part in the fit.
 
-use super::checkpoint::Observer;
-use super::executor::search;
+use super::executor::search_unobserved;
 use super::settings::{FitSettings, Solver};
 use super::state_estimation::states_from_readings;
 use crate::functions::{CoefficientFunction, Parameterization, ScalarParameter};
@@ -37,7 +36,8 @@ pub fn predict_held_out(
         ..experiment.clone()
     };
     alone.name.clone_from(&experiment.name);
-    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone]);
+    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone])
+        .expect("a record that fits the grid and its own scalars");
     let mut start = alone.start();
     let first = states_from_readings(&alone).into_iter().next().flatten();
     if let Some(state) = first {
@@ -52,12 +52,6 @@ pub fn predict_held_out(
         solver: Solver::GaussNewton,
         ..settings.clone()
     };
-    let found = search(
-        &alone,
-        &start,
-        &settings,
-        None,
-        &mut Observer::new(&mut |_| {}),
-    )?;
+    let found = search_unobserved(&alone, &start, &settings)?;
     Ok((alone, found.best.evaluation))
 }

@@ -99,7 +99,7 @@ impl Problem {
     pub fn with_penalty_factor(&self, which: &[usize], factor: f64) -> Self {
         let mut problem = self.clone();
         for &i in which {
-            problem.penalties[i].weight *= factor;
+            problem.parts_mut().penalties[i].weight *= factor;
         }
         problem
     }
@@ -169,9 +169,7 @@ pub fn choose_weight_watched(
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(which, points[chosen].weight);
     let mut found = walk.again(&weighted, &points[chosen].parameters)?;
-    found.counts += walk.counts;
-    found.timings += walk.timings;
-    found.elapsed += walk.elapsed;
+    found = found.with_work_of(walk.counts, walk.timings, walk.elapsed);
     if let Ok(evaluation) = weighted.evaluate(start) {
         found.initial_cost = evaluation.cost;
     }

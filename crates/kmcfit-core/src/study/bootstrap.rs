@@ -87,8 +87,7 @@ fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) ->
     let freedom = (readings - problem.parameters() as f64).max(1.0);
     let wider = (readings / freedom).sqrt();
     let mut all = Vec::with_capacity(problem.reading_count());
-    let predictions = evaluation.predictions.iter().flatten();
-    for (channel, predicted) in problem.channels().zip(predictions) {
+    for (channel, predicted) in problem.predicted(evaluation) {
         let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
         let residuals = channel.residuals(predicted).enumerate();
         let units: Vec<f64> = residuals.map(|(i, r)| -r / sigma(i)).collect();

@@ -19,6 +19,7 @@
 //! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
 //! a stepper of order two reproduces the motion to the square of its step.
 
+use super::refit::positive_rms;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
@@ -118,8 +119,8 @@ pub fn equivalent(
     let needed: Vec<f64> = (0..n)
         .map(|i| motion.force[i] - mass[i] * motion.acceleration[i])
         .collect();
-    let inertia = rms(&needed);
-    let over = |f: &[f64]| inertia / rms(f);
+    let inertia = positive_rms(&needed);
+    let over = |f: &[f64]| inertia / positive_rms(f);
     let [large_c, large_k] = [over(&motion.velocity), over(&motion.displacement)];
 
     // Unknowns: c/C at the nodes, then k/K.
@@ -156,7 +157,7 @@ pub fn equivalent(
     }
     let solution = sub.solve();
     match solution.status {
-        ConicStatus::Solved | ConicStatus::Almost => {
+        status if status.is_point() => {
             let scaled = |part: &[f64], size: f64| part.iter().map(|x| x * size).collect();
             Ok(NodalCoefficients {
                 mass: mass.to_vec(),
@@ -187,13 +188,6 @@ pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
         })
     };
     (0..y.len() - 1).filter_map(crossing).collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|v| v * v).sum();
-    (squares / values.len() as f64)
-        .sqrt()
-        .max(f64::MIN_POSITIVE.sqrt())
 }
 
 /// How far the equation is from holding along the motion for `device`, N at the nodes.

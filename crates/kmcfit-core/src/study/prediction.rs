@@ -1,4 +1,4 @@
-//! What an optimum says of an unseen run, and how surely.
+//! Prediction of an unseen run, with its uncertainty.
 //!
 //! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
 //! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
@@ -138,6 +138,6 @@ fn with_run(problem: &Problem, run: &Run) -> Problem {
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
     experiment.device = run.device;
-    seen.experiments = vec![experiment.with_channel(channel)];
+    seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

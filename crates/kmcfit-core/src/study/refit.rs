@@ -2,7 +2,8 @@
 
 use crate::objective::GradientKind;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, project};
+use crate::qp::project;
+use crate::simd::sum::rms;
 use crate::solvers::{FitSettings, Initial, Solver, Stopping};
 
 /// A refit ends when an iteration lowers J by at most this share: far below a change of chi-square
@@ -47,6 +48,11 @@ pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
     sizes
 }
 
+/// The root mean square of values, and no less than what squares keep above zero.
+pub fn positive_rms(values: &[f64]) -> f64 {
+    rms(values).max(f64::MIN_POSITIVE.sqrt())
+}
+
 /// The point of the constraints nearest to `theta`, where changes are measured by `sizes`; `theta`
 /// itself where there are none, `None` where they contradict each other.
 pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f64>> {
@@ -63,6 +69,5 @@ pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f6
     }
     let metric: Vec<f64> = sizes.iter().map(|s| 1.0 / (s * s)).collect();
     let projection = project(&problem.constraints, theta, &metric);
-    matches!(projection.status, ConicStatus::Solved | ConicStatus::Almost)
-        .then_some(projection.theta)
+    projection.status.is_point().then_some(projection.theta)
 }

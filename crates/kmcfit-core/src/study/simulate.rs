@@ -17,9 +17,8 @@ pub fn stream(seed: u64, index: usize) -> ChaCha8Rng {
 /// stated one, or where none is stated the root of the unweighted residuals' mean square, all
 /// channels without sigma together, made unbiased by `n / (n - p)`.
 pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
-    let predictions = evaluation.predictions.iter().flatten();
     let (mut squares, mut count) = (0.0, 0usize);
-    for (channel, predicted) in problem.channels().zip(predictions) {
+    for (channel, predicted) in problem.predicted(evaluation) {
         if !channel.weighting().is_sigma() {
             squares += channel.residuals(predicted).map(|r| r * r).sum::<f64>();
             count += channel.len();
@@ -42,7 +41,7 @@ pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
 pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
     let mut simulated = problem.clone();
     let mut first = 0;
-    let experiments = simulated.experiments.iter_mut();
+    let experiments = simulated.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&evaluation.predictions) {
         for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
             let part = &noise[first..first + predicted.len()];

@@ -55,30 +55,25 @@ pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
 /// # Panics
 /// If there are fewer than three values.
 pub fn curvature(f: &[f64], dt: f64) -> Vec<f64> {
+    let last = f.len() - 1;
     let mut d = vec![0.0; f.len()];
-    curvature_into(f, dt, 0, &mut d);
-    d
-}
-
-/// [`curvature`] at the nodes from `first` on, as many as `out` has.
-///
-/// # Panics
-/// If there are fewer than three values, or `out` reaches beyond them.
-pub fn curvature_into(f: &[f64], dt: f64, first: usize, out: &mut [f64]) {
-    let (last, end) = (f.len() - 1, first + out.len());
-    let inner = first.max(1)..end.min(last);
-    let around = &f[inner.start - 1..=inner.end];
     simd::run(Elementwise(|| {
-        let out = out[inner.start - first..inner.end - first].iter_mut();
-        for (d, w) in out.zip(around.windows(3)) {
+        for (d, w) in d[1..].iter_mut().zip(f.windows(3)) {
             *d = second(w[0], w[1], w[2], dt);
         }
     }));
-    if first == 0 {
-        out[0] = second(f[0], f[1], f[2], dt);
-    }
-    if end > last {
-        out[last - first] = second(f[last], f[last - 1], f[last - 2], dt);
+    d[0] = second(f[0], f[1], f[2], dt);
+    d[last] = second(f[last], f[last - 1], f[last - 2], dt);
+    d
+}
+
+/// [`curvature`] at node `i`.
+#[inline(always)]
+pub fn curvature_at(f: &[f64], dt: f64, i: usize) -> f64 {
+    let middle = i.clamp(1, f.len() - 2);
+    match i.cmp(&middle) {
+        std::cmp::Ordering::Greater => second(f[i], f[i - 1], f[i - 2], dt),
+        _ => second(f[middle - 1], f[middle], f[middle + 1], dt),
     }
 }
 
@@ -91,22 +86,4 @@ fn second(a: f64, b: f64, c: f64, dt: f64) -> f64 {
 #[inline(always)]
 pub fn midpoint(f: &[f64], i: usize) -> f64 {
     (f[i + 1] + f[i]) * 0.5
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_part_of_the_curvature_is_that_of_the_whole() {
-        let f: Vec<f64> = (0..9).map(|i| f64::from(i).powi(3).sin()).collect();
-        let whole = curvature(&f, 0.1);
-        for first in 0..f.len() {
-            for count in 1..=f.len() - first {
-                let mut part = vec![f64::NAN; count];
-                curvature_into(&f, 0.1, first, &mut part);
-                assert_eq!(part, whole[first..first + count]);
-            }
-        }
-    }
 }

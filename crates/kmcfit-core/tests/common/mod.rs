@@ -63,7 +63,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment])
+    Problem::new(oscillator, functions, vec![experiment]).unwrap()
 }
 
 /// Provides the clock of the process, without which timings are zero.
@@ -134,7 +134,7 @@ pub fn problem_of(
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment])
+    Problem::new(oscillator, functions, vec![experiment]).unwrap()
 }
 
 /// Adds the smoothness of the paper's recovery, weight on the curvature of m and the slopes of c
@@ -151,20 +151,30 @@ pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
         let Some(basis) = basis else { continue };
         let rows = basis.roughness(&grid, orders[f]);
         problem
-            .penalties
-            .push(Penalty::new(f, orders[f], weight, rows));
+            .penalize(Penalty::new(f, orders[f], weight, rows))
+            .unwrap();
         if positive {
             let low = if f == 0 { 0.05 } else { 0.0 };
             let mut group = RowGroup::new(format!("function {f} >= {low}"));
             for j in ranges[f].clone() {
                 group.push([(j, 1.0)], [low, f64::INFINITY], [0.0, DURATION]);
             }
-            problem.constraints.groups.push(group);
+            *problem = problem
+                .clone()
+                .with(|parts| {
+                    parts.constraints.groups.push(group);
+                })
+                .unwrap();
         }
     }
     let mut group = RowGroup::new("k(0) = 1");
     group.push([(ranges[2].start, 1.0)], [1.0, 1.0], [0.0, 0.0]);
-    problem.constraints.groups.push(group);
+    *problem = problem
+        .clone()
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
 }
 
 /// Largest distance of each function from the truth over the nodes, mass first.

@@ -17,7 +17,7 @@ fn optimum(problem: &Problem) -> Vec<f64> {
 /// and leaves room for the model's curvature.
 #[test]
 fn the_refits_spread_as_the_covariance_says() {
-    let mut problem = regular(7);
+    let problem = regular(7);
     let best = optimum(&problem);
     let check = |problem: &Problem, noise: Noise| {
         let evaluation = problem.evaluate(&best).unwrap();
@@ -38,13 +38,17 @@ fn the_refits_spread_as_the_covariance_says() {
     };
     check(&problem, Noise::Parametric);
     // The residuals of 51 readings know their own spread to a tenth: the covariance from them.
-    for experiment in &mut problem.experiments {
-        let plain = |c: &Channel| {
-            c.clone()
-                .with_weighting(Weighting::Trapezoid(vec![1.0; c.len()]))
-        };
-        experiment.channels = experiment.channels.iter().map(plain).collect();
-    }
+    let problem = problem
+        .with(|parts| {
+            for experiment in &mut parts.experiments {
+                let plain = |c: &Channel| {
+                    c.clone()
+                        .with_weighting(Weighting::Trapezoid(vec![1.0; c.len()]))
+                };
+                experiment.channels = experiment.channels.iter().map(plain).collect();
+            }
+        })
+        .unwrap();
     check(&problem, Noise::Residual);
 }
 

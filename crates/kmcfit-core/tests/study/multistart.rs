@@ -49,7 +49,7 @@ fn how(threads: usize) -> Multistart {
         starts: 80,
         seed: 4,
         threads,
-        ladder: false,
+        attempts: false,
         settings: crate::common::synthetic::settings(),
     }
 }

@@ -90,6 +90,7 @@ pub fn problem(
         functions.with_scalars(scalars),
         vec![experiment],
     )
+    .unwrap()
 }
 
 pub struct Record {
@@ -162,7 +163,10 @@ pub fn regular(seed: u64) -> Problem {
 pub fn bound(problem: &mut Problem, name: &str, j: usize, bounds: [f64; 2]) {
     let mut group = RowGroup::new(name);
     group.push([(j, 1.0)], bounds, [0.0, 0.0]);
-    problem.constraints.groups.push(group);
+    *problem = problem
+        .clone()
+        .with(|parts| parts.constraints.groups.push(group))
+        .unwrap();
 }
 
 /// Stiffness linear between knots, damping constant, mass known.

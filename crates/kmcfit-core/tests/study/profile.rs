@@ -9,7 +9,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
-use kmcfit_core::internals::study::profile::{End, QUANTILE_95, Verdict};
+use kmcfit_core::internals::study::profile::{End, Interval, QUANTILE_95};
 use kmcfit_core::internals::study::pull_apart::{Level, tube};
 use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
 use kmcfit_core::internals::system::{Excitation, Method};
@@ -39,7 +39,7 @@ fn is_closed_form(problem: &Problem, q: &Linear) {
     let covariance = problem.covariance(&evaluation).unwrap();
     let half = (QUANTILE_95 * q.deviation(&covariance).powi(2)).sqrt();
     let found = profile(problem, &best, q, &ProfileSettings::default()).unwrap();
-    assert_eq!(found.verdict, Verdict::Identified);
+    assert_eq!(found.verdict, Interval::Identified);
     let [low, high] = found.interval.map(Option::unwrap);
     let expected = [q.of(&best) - half, q.of(&best) + half];
     println!(
@@ -123,7 +123,7 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
         let deviation = Linear::parameter(j).deviation(&problem.covariance(&evaluation).unwrap());
         let [low, high] = found.interval.map(Option::unwrap);
         println!("{}", found.sentence());
-        assert_eq!(found.verdict, Verdict::Identified);
+        assert_eq!(found.verdict, Interval::Identified);
         // 1.96 standard deviations but for the curvature of the model, a few per cent here.
         let width = (high - low) / (2.0 * 1.96 * deviation);
         assert!((width - 1.0).abs() < 0.1, "{width}");
@@ -141,7 +141,7 @@ fn the_mass_of_a_free_motion_is_flat() {
     bound(&mut problem, "mass from 0.5 to 3", 0, [0.5, 3.0]);
     let found = of(&problem, 0);
     println!("{}", found.sentence());
-    assert_eq!(found.verdict, Verdict::Flat);
+    assert_eq!(found.verdict, Interval::Flat);
     assert_eq!(found.ends, [End::Bound, End::Bound]);
     assert!(
         (found.values[0] - 0.5).abs() < 1e-6 && (found.values.last().unwrap() - 3.0).abs() < 1e-6
@@ -164,7 +164,7 @@ fn a_damping_near_its_bound_is_one_sided() {
     bound(&mut problem, "damping >= 0", 0, [0.0, f64::INFINITY]);
     let found = of(&problem, 0);
     println!("{}", found.sentence());
-    assert_eq!(found.verdict, Verdict::OneSided);
+    assert_eq!(found.verdict, Interval::OneSided);
     assert_eq!(found.ends, [End::Bound, End::Rise]);
     assert!(found.interval[0].is_none() && found.interval[1].is_some());
     assert!(found.sentence().contains("at most"));
@@ -182,7 +182,7 @@ fn a_rise_that_another_bound_makes_is_called_so() {
     bound(&mut problem, "stiffness <= 3", 2, [f64::NEG_INFINITY, 3.0]);
     let found = of(&problem, 0);
     println!("{}", found.sentence());
-    assert_eq!(found.verdict, Verdict::OneSided);
+    assert_eq!(found.verdict, Interval::OneSided);
     assert_eq!(found.ends[1], End::RiseBy(vec!["stiffness <= 3".into()]));
     assert!(found.sentence().contains("stiffness <= 3"));
     let mark = found.marks.iter().find(|m| m.value > 1.0).unwrap();
@@ -227,7 +227,7 @@ fn a_nodal_function_has_a_profile() {
     list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(oscillator, list, values, Some(sigma));
     let rows = Basis::Nodal.roughness(&problem.oscillator.grid, 2);
-    problem.penalties.push(Penalty::new(0, 2, 1e4, rows));
+    problem.penalize(Penalty::new(0, 2, 1e4, rows)).unwrap();
     let settings = crate::common::synthetic::settings();
     let best = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let q = Linear::value(&problem, 0, 12.5).unwrap();
@@ -248,14 +248,18 @@ fn a_nodal_function_has_a_profile() {
 /// parameter's diagonal of `(J'J)^-1`: the covariance is `V SSR/(n - p)`.
 #[test]
 fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
-    let mut problem = linear(4);
-    for experiment in &mut problem.experiments {
-        let plain = |c: &Channel| {
-            let weights = vec![1.0; c.len()];
-            c.clone().with_weighting(Weighting::Trapezoid(weights))
-        };
-        experiment.channels = experiment.channels.iter().map(plain).collect();
-    }
+    let problem = linear(4);
+    let problem = problem
+        .with(|parts| {
+            for experiment in &mut parts.experiments {
+                let plain = |c: &Channel| {
+                    let weights = vec![1.0; c.len()];
+                    c.clone().with_weighting(Weighting::Trapezoid(weights))
+                };
+                experiment.channels = experiment.channels.iter().map(plain).collect();
+            }
+        })
+        .unwrap();
     let best = optimum(&problem);
     let covariance = problem
         .covariance(&problem.evaluate(&best).unwrap())
@@ -285,7 +289,11 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
             [0.0, 10.0],
         );
     }
-    problem.constraints.groups.push(group);
+    problem = problem
+        .with(|parts| {
+            parts.constraints.groups.push(group);
+        })
+        .unwrap();
     let best = optimum(&problem);
     let misfit = problem.evaluate(&best).unwrap().misfit;
     let q = Linear::mean(&problem, 2);

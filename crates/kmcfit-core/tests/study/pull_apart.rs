@@ -81,14 +81,16 @@ fn the_extremes_are_the_ends_of_the_profile() {
 /// A robust loss, with readings that are far off: still the same question.
 #[test]
 fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
-    let mut problem = regular(3);
-    let experiment = &mut problem.experiments[0];
-    let channel = experiment.channels[0].clone();
+    let problem = regular(3);
+    let channel = problem.experiments[0].channels[0].clone();
     let far = |i: usize| if i % 10 == 3 { 1.0 } else { 0.0 };
     let noise: Vec<f64> = (0..channel.len()).map(far).collect();
     let observed = channel.observed().to_vec();
     let channel = channel.with_simulated(&observed, &noise);
-    experiment.channels[0] = channel.with_loss(Loss::Huber { threshold: 1.345 });
+    let channel = channel.with_loss(Loss::Huber { threshold: 1.345 });
+    let problem = problem
+        .with(|parts| parts.experiments[0].channels[0] = channel)
+        .unwrap();
     let (best, misfit) = optimum(&problem);
     let level = Level::of(misfit + QUANTILE_95);
     let q = Linear::parameter(1);
@@ -114,7 +116,11 @@ fn positive() -> Problem {
         for j in problem.functions.ranges()[f].clone() {
             group.push([(j, 1.0)], [0.05, f64::INFINITY], [0.0, 25.0]);
         }
-        problem.constraints.groups.push(group);
+        problem = problem
+            .with(|parts| {
+                parts.constraints.groups.push(group);
+            })
+            .unwrap();
     }
     problem
 }
@@ -183,13 +189,15 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
 /// k/m, which free motion shows, has a bounded tube where k and m have none.
 #[test]
 fn ratios_have_tubes_of_their_own() {
-    let mut problem = regular(3);
+    let problem = regular(3);
     let oscillator = problem.oscillator.clone();
     let n = oscillator.grid.nodes();
     let list = crate::problems::constants(n, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
-    problem.functions =
-        kmcfit_core::internals::functions::Parameterization::new(list, n, oscillator.grid.step())
-            .unwrap();
+    let functions =
+        kmcfit_core::internals::functions::Parameterization::new(list, n, oscillator.grid.step());
+    let problem = problem
+        .with(|parts| parts.functions = functions.unwrap())
+        .unwrap();
     let (best, misfit) = optimum(&problem);
     let level = Level::of(misfit + QUANTILE_95);
     let targets = ratios_at(&problem, 2, 0, &[3.0]);

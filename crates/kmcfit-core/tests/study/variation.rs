@@ -48,18 +48,26 @@ fn a_stiffness_that_varies_is_found() {
     let grid = problem.oscillator.grid;
     let knots = (0..11).map(|i| i as f64).collect();
     let rows = Basis::PiecewiseLinear { knots }.roughness(&grid, 1);
-    problem.penalties.push(Penalty::new(2, 1, 10.0, rows));
+    problem.penalize(Penalty::new(2, 1, 10.0, rows)).unwrap();
     let found = asked(&problem);
     println!("{}", found.sentence());
     assert!(found.varies(), "{found:?}");
-    for experiment in &mut problem.experiments {
-        let plain = |c: &Channel| {
-            let weights = vec![1.0; c.len()];
-            c.clone().with_weighting(Weighting::Trapezoid(weights))
-        };
-        experiment.channels = experiment.channels.iter().map(plain).collect();
-    }
-    problem.penalties[0].weight *= 0.05 * 0.05;
+    problem = problem
+        .with(|parts| {
+            for experiment in &mut parts.experiments {
+                let plain = |c: &Channel| {
+                    let weights = vec![1.0; c.len()];
+                    c.clone().with_weighting(Weighting::Trapezoid(weights))
+                };
+                experiment.channels = experiment.channels.iter().map(plain).collect();
+            }
+        })
+        .unwrap();
+    problem = problem
+        .with(|parts| {
+            parts.penalties[0].weight *= 0.05 * 0.05;
+        })
+        .unwrap();
     let found = asked(&problem);
     println!("{}", found.sentence());
     assert!(found.varies(), "{found:?}");
@@ -71,7 +79,7 @@ fn with_smoothness_the_rate_is_nominal_too() {
         let mut problem = knots(&|_| 2.0, 11, 0.05, 500 + seed);
         let knots = (0..11).map(|i| i as f64).collect();
         let rows = Basis::PiecewiseLinear { knots }.roughness(&problem.oscillator.grid, 1);
-        problem.penalties.push(Penalty::new(2, 1, 10.0, rows));
+        problem.penalize(Penalty::new(2, 1, 10.0, rows)).unwrap();
         asked(&problem).p_value
     };
     let p: Vec<f64> = (0..30).map(smoothed).collect();

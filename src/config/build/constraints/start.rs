@@ -31,7 +31,7 @@ pub(in crate::config::build) fn move_start(
                 let moved = format!("the start was moved into the constraints (`{constraint}`)");
                 warnings.push(moved);
             }
-            problem.functions = problem.functions.clone().with_start(&parameters);
+            problem.start_from(&parameters);
             Ok(())
         }
         StartProjection::Contradiction(names) => {

@@ -30,7 +30,7 @@ pub fn multistart(
         starts: plan.starts,
         seed: plan.seed,
         threads,
-        ladder: false,
+        attempts: false,
         settings: model.settings.clone(),
     };
     let waterfall = multistart::multistart(problem, &how);

@@ -48,17 +48,17 @@ pub fn is_of(problem: &Problem, fit: &FitPiece) -> bool {
 
 /// The problem with the sigmas that the fit estimated and the weights that it chose.
 pub fn as_fitted(problem: &Problem, fit: &FitPiece) -> Problem {
-    let mut problem = problem.clone();
-    for (penalty, weight) in problem.penalties.iter_mut().zip(&fit.weights) {
-        penalty.weight = *weight;
-    }
-    let channels = problem.experiments.iter_mut().flat_map(|e| &mut e.channels);
-    for (channel, sigma) in channels.zip(&fit.sigmas) {
-        if let Some(sigma) = *sigma {
-            *channel = channel
-                .clone()
-                .with_weighting(Weighting::Estimated { sigma });
+    let fitted = problem.clone().with(|parts| {
+        for (penalty, weight) in parts.penalties.iter_mut().zip(&fit.weights) {
+            penalty.weight = *weight;
         }
-    }
-    problem
+        let channels = parts.experiments.iter_mut().flat_map(|e| &mut e.channels);
+        for (channel, sigma) in channels.zip(&fit.sigmas) {
+            if let Some(sigma) = *sigma {
+                let weighting = Weighting::Estimated { sigma };
+                *channel = channel.clone().with_weighting(weighting);
+            }
+        }
+    });
+    fitted.expect("weights and sigmas change no length")
 }

@@ -5,7 +5,7 @@ use crate::report::study::pieces::*;
 use kmcfit_core::internals::diagnostics::chi_square_one;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::study::Linear;
-use kmcfit_core::internals::study::profile::{ProfileSettings, Verdict as ProfileVerdict, profile};
+use kmcfit_core::internals::study::profile::{Interval, ProfileSettings, profile};
 
 /// The number that a target asks about.
 pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
@@ -34,9 +34,9 @@ pub fn profile_of(
     Ok(ProfilePiece {
         sentence: found.sentence(),
         verdict: match found.verdict {
-            ProfileVerdict::Identified => "identified",
-            ProfileVerdict::OneSided => "one-sided",
-            ProfileVerdict::Flat => "flat",
+            Interval::Identified => "identified",
+            Interval::OneSided => "one-sided",
+            Interval::Flat => "flat",
         }
         .into(),
         marks: (found.marks.iter())

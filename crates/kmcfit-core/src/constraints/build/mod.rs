@@ -245,7 +245,7 @@ impl Statement {
             (Statement::DampingRatio { max }, &[m, c, k]) => {
                 found.cones = vec![damping_ratio::build(&all, [m, c, k], *max)];
             }
-            _ => {}
+            _ => unreachable!("one index for each function of a statement"),
         }
         found.groups.retain(|group| !group.rows.is_empty());
         found.cones.retain(|group| !group.cones.is_empty());

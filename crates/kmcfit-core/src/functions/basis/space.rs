@@ -1,4 +1,4 @@
-//! What every basis can do on a record.
+//! The interface of a basis on a record.
 
 use super::legendre;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};

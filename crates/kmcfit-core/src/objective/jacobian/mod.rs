@@ -276,7 +276,7 @@ mod tests {
             terms: vec![Term::Damping, Term::Stiffness],
         };
         let records = vec![record(0, NODES), record(1, nodes)];
-        Problem::new(oscillator, functions.expect("functions"), records)
+        Problem::new(oscillator, functions.expect("functions"), records).unwrap()
     }
 
     /// Ends of tiles, of lanes and of records; pieces that come back with nothing but rubbish in them.

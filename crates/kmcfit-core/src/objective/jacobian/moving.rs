@@ -1,6 +1,6 @@
-//! Which functions change along which parameter, tile by tile.
+//! The layout of forward sensitivities: the parameters of each function in groups and lanes.
 
-use crate::functions::{Design, Parameterization, RowRuns};
+use crate::functions::{Design, Parameterization};
 use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
@@ -18,7 +18,6 @@ pub(super) struct Moving<'a> {
 
 struct Part<'a> {
     design: &'a Design,
-    runs: Option<&'a RowRuns>,
     /// The slots of its groups.
     slots: Vec<usize>,
     /// Slot and lane of each of its parameters.
@@ -56,7 +55,6 @@ impl<'a> Moving<'a> {
             let own = (0..slots.len()).filter(|s| slots[*s].function == function);
             Part {
                 design,
-                runs: functions.runs(f),
                 slots: own.collect(),
                 lanes: functions.ranges()[f].clone().map(lane).collect(),
                 constant: functions.is_constant(f),
@@ -110,9 +108,6 @@ impl Part<'_> {
     }
 
     fn fill(&self, tangents: &mut Tangents, first: usize) {
-        if let Some(runs) = self.runs {
-            return self.fill_runs(runs, tangents, first);
-        }
         let mut set = |node: usize, parameter: usize, value: f64| {
             let (slot, lane) = self.lanes[parameter];
             tangents.changes_mut(slot)[node][lane] = value;
@@ -132,19 +127,6 @@ impl Part<'_> {
                     for (j, b) in columns[range.clone()].iter().zip(&entries[range]) {
                         set(node, *j, *b);
                     }
-                }
-            }
-        }
-    }
-
-    fn fill_runs(&self, runs: &RowRuns, tangents: &mut Tangents, first: usize) {
-        for piece in runs.within(first..first + TILE_NODES) {
-            let nodes = piece.rows.start - first..piece.rows.end - first;
-            for (j, entries) in std::iter::once(piece.first).chain(piece.second) {
-                let (slot, lane) = self.lanes[j];
-                let rows = &mut tangents.changes_mut(slot)[nodes.clone()];
-                for (row, entry) in rows.iter_mut().zip(entries) {
-                    row[lane] = *entry;
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! The dense rows in which variables are eliminated, block after block.
 
-use super::dense::{Dense, add_multiple};
-use super::factor::Factor;
+use super::frontal_rows::{FrontalRows, add_multiple};
+use super::triangular_rows::TriangularRows;
 use std::mem::swap;
 use std::ops::Range;
 
@@ -20,8 +20,8 @@ pub struct Front {
     columns: Vec<u32>,
     own: usize,
     /// Equalities, and residuals.
-    ties: Dense,
-    rows: Dense,
+    ties: FrontalRows,
+    rows: FrontalRows,
     /// The first row that is left to the next front.
     left: usize,
     before: Before,
@@ -41,8 +41,8 @@ pub struct Front {
 struct Before {
     columns: Vec<u32>,
     own: usize,
-    ties: Dense,
-    rows: Dense,
+    ties: FrontalRows,
+    rows: FrontalRows,
     left: usize,
 }
 
@@ -53,8 +53,8 @@ impl Front {
             sides,
             columns: Vec::new(),
             own: 0,
-            ties: Dense::default(),
-            rows: Dense::default(),
+            ties: FrontalRows::default(),
+            rows: FrontalRows::default(),
             left: 0,
             before: Before::default(),
             met: vec![0; variables],
@@ -150,7 +150,7 @@ impl Front {
 
     /// Eliminates the block's own variables into `factor`; `None` if the rows do not determine them or
     /// the equalities contradict each other.
-    pub fn eliminate(&mut self, factor: &mut Factor) -> Option<()> {
+    pub fn eliminate(&mut self, factor: &mut TriangularRows) -> Option<()> {
         self.taken.clear();
         self.taken.resize(self.own, false);
         while let Some((tie, column)) = self.firmest_tie()? {
@@ -197,7 +197,7 @@ impl Front {
     }
 
     /// Eliminates the variable of `column` by an equality.
-    fn substitute(&mut self, tie: usize, column: usize, factor: &mut Factor) {
+    fn substitute(&mut self, tie: usize, column: usize, factor: &mut TriangularRows) {
         let n = self.ties.len();
         self.ties.swap(tie, n - 1);
         let (rest, pivot) = self.ties.split_last();

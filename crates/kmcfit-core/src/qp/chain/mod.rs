@@ -7,14 +7,14 @@
 //! others. So neither `F^T F` nor a shift costs digits, however unlike the rows are in size, and time and
 //! memory grow with the length of the chain alone.
 
-mod dense;
-mod factor;
 mod front;
+mod frontal_rows;
+mod triangular_rows;
 
 use super::Subproblem;
 use crate::constraints::Rows;
-use factor::Factor;
 use front::Front;
+use triangular_rows::TriangularRows;
 
 /// Most variables in a front; wider ones are left to the sparse factorisation, which knows no order.
 const WIDEST: usize = 48;
@@ -23,7 +23,7 @@ const WIDEST: usize = 48;
 /// variables is unknown or makes fronts too wide, or if the minimum is not unique.
 pub fn minimise(sub: &Subproblem, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let chain = Chain::of(sub)?;
-    let mut factor = Factor::new(sub.variables, targets.len());
+    let mut factor = TriangularRows::new(sub.variables, targets.len());
     let mut front = Front::new(sub.variables, targets.len());
     for block in 0..chain.blocks() {
         chain.assemble(block, &mut front, targets);
@@ -33,7 +33,7 @@ pub fn minimise(sub: &Subproblem, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>>
     solutions.collect()
 }
 
-/// Who is eliminated when. Variables are numbered by their places in that order.
+/// The elimination order: variables are numbered by their places in it.
 struct Chain<'a> {
     sub: &'a Subproblem,
     /// Place of each variable.

@@ -21,6 +21,26 @@ pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> 
     [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
 }
 
+/// One by the mass at the places of [`places`]; by a single division where the mass is constant.
+#[inline(always)]
+pub(crate) fn per_mass<A: Arithmetic>(arithmetic: A, mass: &[f64], i: usize) -> [Eight<A>; 3] {
+    let steps = &mass[i..mass.len().min(i + LANES + 1)];
+    if is_constant(steps) {
+        return [Eight::splat(arithmetic, 1.0 / steps[0]); 3];
+    }
+    let mut places = places(arithmetic, mass, i);
+    for place in &mut places {
+        *place = Eight::splat(arithmetic, 1.0) / *place;
+    }
+    places
+}
+
+/// Whether all values are the same.
+#[inline(always)]
+pub(crate) fn is_constant(values: &[f64]) -> bool {
+    values.iter().fold(true, |same, x| same & (*x == values[0]))
+}
+
 /// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`, and beyond the end the last
 /// step, for lanes that nobody asks.
 #[inline(always)]

@@ -45,6 +45,20 @@ const OFFSET: usize = 3;
 const QUADRATIC_DAMPING: usize = 4;
 const COULOMB_FRICTION: usize = 5;
 
+/// The kinds of terms of a linear system, and of one with a cubic spring besides.
+const LINEAR: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING]);
+const CUBIC: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING, CUBIC_STIFFNESS]);
+
+const fn kinds(list: &[usize]) -> [bool; MOST_TERMS] {
+    let mut there = [false; MOST_TERMS];
+    let mut i = 0;
+    while i < list.len() {
+        there[list[i]] = true;
+        i += 1;
+    }
+    there
+}
+
 fn place(term: Term) -> usize {
     match term {
         Term::Stiffness => STIFFNESS,
@@ -106,19 +120,9 @@ impl Kernel for Forward<'_> {
         let there = self.kinds.map(|kind| kind.is_some());
         match (self.method, there) {
             // Such lists are known when this is compiled.
-            (Method::Midpoint, [true, true, false, false, false, false]) => {
-                self.sweep(
-                    arithmetic,
-                    &MIDPOINT,
-                    [true, true, false, false, false, false],
-                );
-            }
-            (Method::Rk4, [true, true, false, false, false, false]) => {
-                self.sweep(arithmetic, &RK4, [true, true, false, false, false, false]);
-            }
-            (Method::Rk4, [true, true, true, false, false, false]) => {
-                self.sweep(arithmetic, &RK4, [true, true, true, false, false, false]);
-            }
+            (Method::Midpoint, LINEAR) => self.sweep(arithmetic, &MIDPOINT, LINEAR),
+            (Method::Rk4, LINEAR) => self.sweep(arithmetic, &RK4, LINEAR),
+            (Method::Rk4, CUBIC) => self.sweep(arithmetic, &RK4, CUBIC),
             (Method::Midpoint, there) => self.sweep(arithmetic, &MIDPOINT, there),
             (Method::Rk4, there) => self.sweep(arithmetic, &RK4, there),
         }
@@ -133,18 +137,21 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
-        let steady = Steady::of(&self.equation, &self.kinds);
+        let device = self.equation.device;
+        let is_constant = |j: usize| padded_loads::is_constant(&device.coefficients[j]);
+        let has_constant_mass = padded_loads::is_constant(&device.mass);
+        let mut steady = [false; MOST_TERMS];
+        for (steady, kind) in steady.iter_mut().zip(&self.kinds) {
+            *steady = has_constant_mass && kind.is_some_and(is_constant);
+        }
         let mut stages = [NOTHING; STAGES];
-        let mut per_mass = PerMass::at(arithmetic, &self.equation, 0);
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
         let motion = &mut *self.trajectory;
         let steps = motion.nodes() - 1;
         (motion.displacement[0], motion.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            if from > 0 && !steady.mass {
-                per_mass = PerMass::at(arithmetic, &self.equation, from);
-            }
+            let per_mass = padded_loads::per_mass(arithmetic, &device.mass, from);
             prepare_drive(
                 arithmetic,
                 tableau,
@@ -153,11 +160,12 @@ impl Forward<'_> {
                 from,
                 &mut stages,
             );
-            for k in 0..MOST_TERMS {
-                if from > 0 && steady.kinds[k] {
-                    continue;
-                }
-                if let Some(j) = self.kinds[k] {
+            for (k, (kind, steady)) in self.kinds.iter().zip(steady).enumerate() {
+                if let Some(j) = *kind {
+                    // Rates of constants are those of the first eight steps.
+                    if from > 0 && steady {
+                        continue;
+                    }
                     let values = &self.equation.device.coefficients[j];
                     prepare(
                         arithmetic,
@@ -194,46 +202,6 @@ impl Forward<'_> {
     }
 }
 
-/// What stays as it is made for the first eight steps: what depends on constants alone.
-struct Steady {
-    mass: bool,
-    /// The rates of each kind.
-    kinds: [bool; MOST_TERMS],
-}
-
-impl Steady {
-    #[inline(always)]
-    fn of(equation: &EquationOfMotion, kinds: &[Option<usize>; MOST_TERMS]) -> Self {
-        let mass = is_constant(&equation.device.mass);
-        let is_steady = |j: usize| mass && is_constant(&equation.device.coefficients[j]);
-        Self {
-            mass,
-            kinds: kinds.map(|kind| kind.is_some_and(is_steady)),
-        }
-    }
-}
-
-/// Whether all values are the same.
-#[inline(always)]
-pub(super) fn is_constant(values: &[f64]) -> bool {
-    let first = values[0];
-    // A part at a time, without a branch for each value.
-    let mut parts = values.chunks(32 * LANES);
-    parts.all(|part| part.iter().fold(true, |same, x| same & (*x == first)))
-}
-
-/// One by the mass at the left ends, middles and right ends of eight steps.
-#[derive(Clone, Copy)]
-struct PerMass<A: Arithmetic>([Eight<A>; 3]);
-
-impl<A: Arithmetic> PerMass<A> {
-    #[inline(always)]
-    fn at(arithmetic: A, equation: &EquationOfMotion, i: usize) -> Self {
-        let one = Eight::splat(arithmetic, 1.0);
-        Self(padded_loads::places(arithmetic, &equation.device.mass, i).map(|mass| one / mass))
-    }
-}
-
 /// The rates of a kind of term from its function, over the steps from `i` on.
 #[inline(always)]
 #[allow(
@@ -245,14 +213,14 @@ fn prepare<A: Arithmetic, const S: usize>(
     tableau: &Tableau<S>,
     dt: f64,
     values: &[f64],
-    per_mass: &PerMass<A>,
+    per_mass: &[Eight<A>; 3],
     i: usize,
     kind: usize,
     stages: &mut [StageRates; STAGES],
 ) {
     let mut p = padded_loads::places(arithmetic, values, i);
-    for (p, per_mass) in p.iter_mut().zip(per_mass.0) {
-        *p = *p * per_mass;
+    for (p, per_mass) in p.iter_mut().zip(per_mass) {
+        *p = *p * *per_mass;
     }
     for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let [next, end] = factors(tableau, dt, s);
@@ -268,7 +236,7 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     arithmetic: A,
     tableau: &Tableau<S>,
     equation: &EquationOfMotion,
-    per_mass: &PerMass<A>,
+    per_mass: &[Eight<A>; 3],
     i: usize,
     stages: &mut [StageRates; STAGES],
 ) {
@@ -284,7 +252,7 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     );
     for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
-        let push = force[q] * per_mass.0[q];
+        let push = force[q] * per_mass[q];
         let drive = push - base[q];
         let [next, end] = factors(tableau, equation.dt, s);
         stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();

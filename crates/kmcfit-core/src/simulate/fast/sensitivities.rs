@@ -202,9 +202,6 @@ impl Kernel for Advance<'_> {
                 None => wanted.ends[slot.function] = true,
             }
         }
-        let mass = &self.equation.device.mass;
-        // The last eight steps may reach beyond the tile, for lanes that nobody asks.
-        let constant_mass = step_linearisation::constant_mass(&mass[first..=first + count]);
         let mut from = 0;
         while from < count {
             step_linearisation::linearise(
@@ -213,7 +210,6 @@ impl Kernel for Advance<'_> {
                 &self.equation,
                 self.motion,
                 first + from,
-                constant_mass,
                 &wanted,
                 &mut tangents.maps,
             );

@@ -63,7 +63,6 @@ impl Kernel for Back<'_> {
             CoefficientGradient::Summed(_) => &mut wanted.sum,
         };
         asked[..=equation.terms.len()].fill(true);
-        let constant_mass = step_linearisation::constant_mass(&equation.device.mass[..=last]);
         let mut maps = StepLinearisation::NOTHING;
         let mut x = [source.displacement[last], source.velocity[last]];
         let mut to = last;
@@ -75,7 +74,6 @@ impl Kernel for Back<'_> {
                 equation,
                 self.trajectory,
                 from,
-                constant_mass,
                 &wanted,
                 &mut maps,
             );

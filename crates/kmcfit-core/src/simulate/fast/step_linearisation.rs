@@ -2,7 +2,6 @@
 
 use super::elements::with_known;
 use super::padded_loads;
-use super::prefactored::is_constant;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -42,11 +41,6 @@ pub(super) struct Wanted {
     pub sum: [bool; FUNCTIONS],
 }
 
-/// The mass over some nodes, if it is constant there: steps then share a division.
-pub(super) fn constant_mass(mass: &[f64]) -> Option<f64> {
-    is_constant(mass).then(|| mass.first().copied()).flatten()
-}
-
 /// A function at the three [`Position`]s of eight steps.
 #[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
@@ -62,32 +56,13 @@ impl<A: Arithmetic> Places<A> {
         Self(padded_loads::stepwise(arithmetic, part, i))
     }
 
-    /// One by the mass.
-    #[inline(always)]
-    fn of_inverse_mass(
-        arithmetic: A,
-        equation: &EquationOfMotion,
-        i: usize,
-        constant: Option<f64>,
-    ) -> Self {
-        if let Some(mass) = constant {
-            return Self([Eight::splat(arithmetic, 1.0 / mass); 3]);
-        }
-        let mut places = Self::of(arithmetic, &equation.device.mass, i);
-        for place in &mut places.0 {
-            *place = Eight::splat(arithmetic, 1.0) / *place;
-        }
-        places
-    }
-
     #[inline(always)]
     fn at(&self, position: Position) -> Eight<A> {
         self.0[position as usize]
     }
 }
 
-/// Linearises the steps `i` to `i + 7` of a response, over which the mass may be known to be constant, for the functions
-/// that are `wanted`: [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
+/// Linearises the steps `i` to `i + 7` of a response for the functions that are `wanted`: [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -99,7 +74,6 @@ pub(super) fn linearise<A: Arithmetic>(
     equation: &EquationOfMotion,
     motion: &Trajectory,
     i: usize,
-    constant_mass: Option<f64>,
     wanted: &Wanted,
     maps: &mut StepLinearisation,
 ) {
@@ -107,13 +81,13 @@ pub(super) fn linearise<A: Arithmetic>(
     with_known!(terms, terms, TERMS => match method {
         Method::Midpoint => {
             let stages = StageDerivatives::<A, 2, TERMS>::new(
-                arithmetic, &MIDPOINT, terms, equation, motion, i, constant_mass,
+                arithmetic, &MIDPOINT, terms, equation, motion, i,
             );
             stages.transpose(arithmetic, &MIDPOINT, terms.len(), equation.dt, wanted, maps);
         }
         Method::Rk4 => {
             let stages = StageDerivatives::<A, 4, TERMS>::new(
-                arithmetic, &RK4, terms, equation, motion, i, constant_mass,
+                arithmetic, &RK4, terms, equation, motion, i,
             );
             stages.transpose(arithmetic, &RK4, terms.len(), equation.dt, wanted, maps);
         }
@@ -141,10 +115,9 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         equation: &EquationOfMotion,
         motion: &Trajectory,
         i: usize,
-        constant_mass: Option<f64>,
     ) -> Self {
         let zero = Eight::splat(arithmetic, 0.0);
-        let per_mass = Places::of_inverse_mass(arithmetic, equation, i, constant_mass);
+        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.device.mass, i));
         let input = equation.excitation;
         let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
         let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);

@@ -2,7 +2,7 @@
 
 use super::equation::{EquationOfMotion, advance};
 use crate::simulate::Trajectory;
-use crate::simulate::breakdown::{SimulationError, require_finite, require_positive_mass};
+use crate::simulate::error::{SimulationError, require_finite, require_positive_mass};
 use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, Tableau};
 
 /// The response of `device` from `initial` under `excitation` (`None` is free motion), over the whole grid:

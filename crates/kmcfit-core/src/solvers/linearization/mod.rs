@@ -9,21 +9,19 @@ mod structured;
 mod tests;
 
 pub(super) use halves::{halfway, in_halves};
-pub(crate) use penalties::add_priors;
-pub(super) use penalties::{add_penalties, add_variations};
+pub(super) use penalties::add_variations;
+pub(crate) use penalties::{add_penalties, add_priors};
 pub(super) use reduced::Reduced;
 pub(crate) use reduced::weighted_jacobian;
 
 use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient};
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
 use crate::record::Loss;
 use penalties::add_soft;
 use reduced::of_whole_jacobian;
 
-/// Up to so many parameters the Jacobian is formed by one tangent solve each.
-pub const FEW_PARAMETERS: usize = 64;
 /// State of the linearised predictions at an iterate.
 #[derive(Clone, Default)]
 pub(crate) enum Linearization {
@@ -190,13 +188,11 @@ fn add_the_rest(
 /// The cost of the readings less the weighted squares that stand for it: none for least squares.
 pub(super) fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let mut surplus = 0.0;
-    for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
-        for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-            if channel.loss() != Loss::Squares {
-                let residuals = channel.residuals(predicted).enumerate();
-                let squares: f64 = residuals.map(|(i, r)| channel.weight(i, r) * r * r).sum();
-                surplus += channel.cost(predicted) - squares;
-            }
+    for (channel, predicted) in problem.predicted(evaluation) {
+        if channel.loss() != Loss::Squares {
+            let residuals = channel.residuals(predicted).enumerate();
+            let squares: f64 = residuals.map(|(i, r)| channel.weight(i, r) * r * r).sum();
+            surplus += channel.cost(predicted) - squares;
         }
     }
     surplus

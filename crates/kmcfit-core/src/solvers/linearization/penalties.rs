@@ -16,11 +16,7 @@ pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subpro
 }
 
 /// `sqrt(weight) (L (theta + delta) - target)` as residual rows.
-pub(in crate::solvers) fn add_penalties(
-    problem: &Problem,
-    parameters: &[f64],
-    sub: &mut Subproblem,
-) {
+pub(crate) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     for penalty in &problem.penalties {
         let range = problem.functions.ranges()[penalty.function].clone();
         let root = penalty.weight.sqrt();

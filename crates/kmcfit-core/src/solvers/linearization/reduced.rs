@@ -8,7 +8,7 @@ use crate::qp::Subproblem;
 use crate::simd::LANES;
 use crate::simd::tall_qr::Triangle;
 use crate::solvers::timings::{Timings, timed};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::time::Duration;
 
 /// Up to so many columns the reduction of a piece of rows takes as long as a look at the clock.
@@ -132,18 +132,12 @@ pub(super) fn of_whole_jacobian(
     })
 }
 
-/// `sqrt(w) dz/dtheta` (readings x parameters) and `sqrt(w) r`, for the predictions `z` of all
-/// channels.
-pub fn weighted_jacobian(
-    problem: &Problem,
-    evaluation: &Evaluation,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
+/// `sqrt(w) dz/dtheta` (readings x parameters) for the predictions `z` of all channels.
+pub fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
+    let Residuals { roots, .. } = Residuals::at(problem, evaluation);
     let mut jacobian = problem.predictions_jacobian(evaluation);
     for mut column in jacobian.column_iter_mut() {
-        for (a, root) in column.iter_mut().zip(&roots) {
-            *a *= root;
-        }
+        (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
     }
-    (jacobian, DVector::from_vec(weighted))
+    jacobian
 }

@@ -17,10 +17,8 @@ impl Residuals {
     /// At an evaluated point.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let mut all = Self::with_capacity(problem.reading_count());
-        for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
-            for (channel, predicted) in experiment.channels.iter().zip(predictions) {
-                all.push(channel, predicted, 0..channel.len());
-            }
+        for (channel, predicted) in problem.predicted(evaluation) {
+            all.push(channel, predicted, 0..channel.len());
         }
         all
     }

@@ -76,7 +76,7 @@ fn long_problem(knots: Option<u32>) -> Problem {
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let functions = functions.with_scalars(vec![speed]);
-    Problem::new(oscillator, functions, vec![record])
+    Problem::new(oscillator, functions, vec![record]).unwrap()
 }
 
 /// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
@@ -113,7 +113,7 @@ fn after_short_steps_the_jacobian_stays() {
     let mut problem = long_problem(None);
     let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
     let motion = problem.evaluate(&truth).expect("a motion");
-    let channels = problem.experiments[0].channels.iter_mut();
+    let channels = problem.parts_mut().experiments[0].channels.iter_mut();
     for (channel, predicted) in channels.zip(&motion.predictions[0]) {
         let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
         *channel = channel.clone().with_simulated(predicted, &noise);
@@ -202,7 +202,7 @@ fn a_long_record_by_the_continuous_gradient() {
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
     let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
-    problem.experiments[0].channels = vec![channel];
+    problem.parts_mut().experiments[0].channels = vec![channel];
     assert!(problem.supports_continuous() && halfway(&problem).is_some());
     let mut settings = FitSettings {
         gradient: GradientKind::Continuous,

@@ -11,12 +11,11 @@
 //! against lost curvature, no step limit, and asks for cost and gradient separately.
 
 use super::line_search::{Line, weak_wolfe};
-use super::{Step, StepRule};
+use super::{Step, StepRule, difference};
 use crate::functions::{CoefficientKind, Parameterization};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simd::sum::dot;
-use crate::simd::sum::largest;
+use crate::simd::sum::{dot, largest};
 use crate::simd::{self, Elementwise};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
@@ -107,7 +106,7 @@ impl Lbfgs {
             x,
             direction: &direction,
             spare: Some(work.problem().workspace()),
-            candidate: None,
+            trial: None,
             accepted: None,
             work,
         };
@@ -371,13 +370,13 @@ struct Trials<'a, 'w, 'q, 'p> {
     x: Vec<f64>,
     direction: &'a [f64],
     spare: Option<Evaluation>,
-    candidate: Option<Candidate>,
+    trial: Option<Trial>,
     /// The lowest trial that lowered the cost enough.
     accepted: Option<Accepted>,
 }
 
 /// A trial with its cost alone.
-struct Candidate {
+struct Trial {
     length: f64,
     x: Vec<f64>,
     parameters: Vec<f64>,
@@ -397,7 +396,7 @@ impl Line for Trials<'_, '_, '_, '_> {
         let mut x = self.x.clone();
         add_scaled(&mut x, length, self.direction);
         let parameters = self.at.back(&x);
-        let mut evaluation = match (self.spare.take(), self.candidate.take()) {
+        let mut evaluation = match (self.spare.take(), self.trial.take()) {
             (Some(spare), _) => spare,
             (None, Some(used)) => used.evaluation,
             (None, None) => self.work.problem().workspace(),
@@ -405,7 +404,7 @@ impl Line for Trials<'_, '_, '_, '_> {
         match self.work.evaluate_into(&parameters, &mut evaluation) {
             Ok(()) => {
                 let cost = evaluation.cost;
-                self.candidate = Some(Candidate {
+                self.trial = Some(Trial {
                     length,
                     x,
                     parameters,
@@ -421,29 +420,23 @@ impl Line for Trials<'_, '_, '_, '_> {
     }
 
     fn slope(&mut self) -> f64 {
-        let Some(candidate) = self.candidate.take() else {
+        let Some(trial) = self.trial.take() else {
             return f64::NAN;
         };
-        let point = self
-            .work
-            .complete(candidate.parameters, candidate.evaluation);
+        let point = self.work.complete(trial.parameters, trial.evaluation);
         let gradient = self.at.gradient(&point);
         let slope = gradient.inner(self.direction);
         let lowest = self.accepted.as_ref().map(|a| a.point.evaluation.cost);
         if lowest.is_none_or(|lowest| point.evaluation.cost < lowest) {
             self.accepted = Some(Accepted {
-                length: candidate.length,
-                x: candidate.x,
+                length: trial.length,
+                x: trial.x,
                 point,
                 gradient,
             });
         }
         slope
     }
-}
-
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 fn add_scaled(a: &mut [f64], factor: f64, b: &[f64]) {

@@ -20,6 +20,10 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::ConicStatus;
 
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
 /// Where one iteration led.
 #[allow(
     clippy::large_enum_variant,

@@ -6,7 +6,7 @@
 //! always the last. Metric and projection are those of functions, `sum_f 1/T integral (delta p_f /
 //! size_f)^2 dt`, with the sizes at the start of the search.
 
-use super::{Step, StepRule, no_step};
+use super::{Step, StepRule, difference, no_step};
 use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project_within};
@@ -158,10 +158,6 @@ impl ProjectedGradient {
             high.min(10.0 * self.length)
         };
     }
-}
-
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -9,7 +9,7 @@
 use crate::constraints::TOLERANCE;
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::Subproblem;
 use crate::record::Channel;
 use crate::simulate::Trajectory;
 use crate::solvers::linearization::linearise_about;
@@ -57,8 +57,7 @@ pub(in crate::solvers) fn collocation_start(
         let mut sub = linearise_about(problem, &theta, &evaluation);
         add_pull(problem, &evaluation, &mut sub);
         let Some(z) = solve(&sub) else { break };
-        let mut moved: Vec<f64> = theta.iter().zip(&z).map(|(t, d)| t + d).collect();
-        problem.constraints.clip(&mut moved);
+        let moved = problem.constraints.moved(&theta, &z);
         let change = problem.relative_change(&evaluation, &theta, &moved);
         if !change.is_finite() {
             break;
@@ -129,12 +128,7 @@ fn begin(initial: State, motion: &mut Trajectory) {
 
 /// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
 fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
-    let functions = &problem.functions;
-    functions.device_into(theta, 0, &mut evaluation.device);
-    for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
-        functions.device_into(theta, i + 1, own);
-    }
-    evaluation.scalars.copy_from_slice(problem.scalars(theta));
+    problem.set_parameters(theta, evaluation);
     evaluation.trajectories.clone_from_slice(states);
     let each = problem
         .experiments
@@ -172,8 +166,7 @@ fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
         return Some(z);
     }
     let solution = sub.solve();
-    let solved = matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost);
-    solved.then_some(solution.z)
+    solution.status.is_point().then_some(solution.z)
 }
 
 /// Adds the changes of the states, which follow the parameters in `z`.

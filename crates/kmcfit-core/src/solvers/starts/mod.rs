@@ -3,14 +3,11 @@
 mod collocation;
 mod data;
 mod growing_horizon;
-mod infeasible_subset;
-mod projection;
 mod truncated;
 
 pub(super) use collocation::collocation_start;
 pub(super) use data::data_start;
 pub(super) use growing_horizon::growing_horizon_start;
-pub use projection::StartProjection;
 pub(super) use truncated::{truncated_start, truncated_steps};
 
 use super::history::Reference;

@@ -15,7 +15,7 @@ use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::timings::Timings;
-use crate::system::{Excitation, Grid, StageSamples};
+use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
 use std::time::Duration;
 
@@ -56,8 +56,12 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
     let devices = functions.assemblies().to_vec();
+    let oscillator = System {
+        grid,
+        ..problem.oscillator.clone()
+    };
     let mut part = Problem::new(
-        problem.oscillator.clone(),
+        oscillator,
         Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
             .with_scalars(functions.scalars().to_vec()),
         problem
@@ -65,10 +69,10 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
             .iter()
             .map(|e| first_steps_of(e, steps))
             .collect(),
-    );
-    part.oscillator.grid = grid;
-    part.constraints = problem.constraints.clone();
-    part.soft.clone_from(&problem.soft);
+    )
+    .ok()?;
+    part.parts_mut().constraints = problem.constraints.clone();
+    part.parts_mut().soft.clone_from(&problem.soft);
     Some(part)
 }
 

@@ -12,8 +12,8 @@
 //! so that all three have passed the same filter: then `m a + c v + k y = f` still holds wherever the
 //! coefficients hardly change in the time `1/w_c`, with the force `f` seen through the filter too.
 
-use super::rms;
 use crate::qp::Subproblem;
+use crate::simd::sum::rms;
 use std::f64::consts::PI;
 
 /// Corner of the filter as a share of the dominant frequency.

@@ -82,7 +82,3 @@ pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
     let values = channel.observed().iter().enumerate().map(plain);
     (values.collect(), gain)
 }
-
-pub(super) fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|y| y * y).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}

@@ -7,11 +7,12 @@
 //! a phase.
 
 use super::stencil::weights;
-use super::{Kinematics, noise_level, rms, unsensed};
+use super::{Kinematics, noise_level, unsensed};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::signal::{Interpolation, Signal, Spectrum};
+use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::system::{State, TimePoint};
 use std::f64::consts::TAU;

@@ -1,8 +1,9 @@
 //! From displacements at equally spaced nodes: smoothed, then differences of order 4.
 
-use super::{Kinematics, noise_level, rms};
+use super::{Kinematics, noise_level};
 use crate::qp::Subproblem;
 use crate::record::{Channel, Weighting};
+use crate::simd::sum::rms;
 use crate::system::State;
 
 /// Rounds of the search for the smoothing weight: each halves its decimal exponent's interval.

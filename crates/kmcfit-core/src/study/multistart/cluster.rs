@@ -1,4 +1,4 @@
-//! Which optima are one.
+//! Clusters of optima.
 
 use super::Waterfall;
 use crate::objective::Evaluation;

@@ -65,9 +65,8 @@ pub struct Multistart {
     pub seed: u64,
     /// Most threads; the results do not depend on it.
     pub threads: usize,
-    /// Whether a fit may climb the ladder of starts; without it every fit says where its own start
-    /// leads.
-    pub ladder: bool,
+    /// Whether each fit may try further starting points after its own.
+    pub attempts: bool,
     /// The fits.
     pub settings: FitSettings,
 }
@@ -190,7 +189,7 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
             "the start cannot be brought into the constraints".into(),
         );
     };
-    let result = match how.ladder {
+    let result = match how.attempts {
         true => fit(problem, &start, &how.settings, &mut |_| {}),
         false => fit_from(problem, &start, &how.settings),
     };

@@ -1,4 +1,4 @@
-//! Whether two optima share a valley.
+//! Paths between two optima.
 
 use crate::problem::Problem;
 use crate::system::NodalCoefficients;

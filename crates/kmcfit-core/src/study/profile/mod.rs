@@ -52,9 +52,9 @@ impl Default for ProfileSettings {
     }
 }
 
-/// What the readings say of the number.
+/// The kind of an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Interval {
     /// Both ends of its interval are found.
     Identified,
     /// One end is found.
@@ -111,7 +111,7 @@ pub struct Profile {
     /// Why it ends, below and above.
     pub ends: [End; 2],
     /// In one word.
-    pub verdict: Verdict,
+    pub verdict: Interval,
     /// Where other constraints become active.
     pub marks: Vec<Mark>,
     /// Parameters of a better optimum, if one was met.

@@ -1,9 +1,9 @@
 //! The walk along a profile.
 
-use super::{End, FAR, Mark, Profile, ProfileSettings, Verdict};
+use super::{End, FAR, Interval, Mark, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::Subproblem;
 use crate::simulate::SimulationError;
 use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
@@ -49,7 +49,7 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
     let right = value - of.constant;
     let time = of.time.unwrap_or(problem.oscillator.grid.start());
     group.push(of.entries.iter().copied(), [right, right], [time, time]);
-    held.constraints.groups.push(group);
+    held.parts_mut().constraints.groups.push(group);
     held
 }
 
@@ -174,12 +174,10 @@ impl<'a> Walk<'a> {
             *d = 1e-12 / (size * size);
         }
         let solution = sub.solve();
-        if !matches!(solution.status, ConicStatus::Solved | ConicStatus::Almost) {
+        if !solution.status.is_point() {
             return (far, what);
         }
-        let mut moved: Vec<f64> = theta.iter().zip(&solution.z).map(|(t, d)| t + d).collect();
-        self.problem.constraints.clip(&mut moved);
-        let reached = self.of.of(&moved);
+        let reached = (self.of).of(&self.problem.constraints.moved(theta, &solution.z));
         if (far - reached).abs() <= 1e-3 * unit {
             return (far, what);
         }
@@ -324,7 +322,7 @@ impl<'a> Walk<'a> {
             return End::Rise;
         }
         let mut without = self.problem.clone();
-        let constraints = &mut without.constraints;
+        let constraints = &mut without.parts_mut().constraints;
         constraints.groups.retain(|g| !new.contains(&g.name));
         constraints.cones.retain(|g| !new.contains(&g.name));
         match self.fit(&without, end.value, &end.point.parameters) {
@@ -343,9 +341,9 @@ impl<'a> Walk<'a> {
         samples.sort_by(|a, b| a.value.total_cmp(&b.value));
         let [(low, below), (high, above)] = sides;
         let verdict = match [low, high] {
-            [Some(_), Some(_)] => Verdict::Identified,
-            [None, None] => Verdict::Flat,
-            _ => Verdict::OneSided,
+            [Some(_), Some(_)] => Interval::Identified,
+            [None, None] => Interval::Flat,
+            _ => Interval::OneSided,
         };
         Profile {
             name: self.of.name.clone(),

@@ -9,7 +9,7 @@ use crate::qp::{ConicStatus, Kkt, Subproblem};
 use crate::record::{Channel, Loss};
 use crate::solvers::{add_priors, linear_readings};
 use crate::study::functional::Target;
-use crate::study::refit::sizes;
+use crate::study::refit::{positive_rms, sizes};
 
 /// First size of the trust region, relative to the functions' natural sizes.
 const FIRST_RADIUS: f64 = 0.25;
@@ -170,7 +170,7 @@ impl Search<'_> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {
             for motion in &evaluation.trajectories {
-                let pair = [rms(&motion.displacement), rms(&motion.velocity)];
+                let pair = [&motion.displacement, &motion.velocity].map(|x| positive_rms(x));
                 units.extend((1..motion.nodes()).flat_map(|_| pair));
             }
         }
@@ -208,16 +208,10 @@ impl Search<'_> {
         let (delta, is_largest) = self.solved(&sub, &here.evaluation, sizes)?;
         let gain: f64 = row.iter().map(|(j, a)| a * delta[*j]).sum();
         Some(Proposal {
-            trial: self.moved(theta, &delta),
+            trial: self.problem.constraints.moved(theta, &delta),
             gain: gain * most,
             is_largest,
         })
-    }
-
-    fn moved(&self, theta: &[f64], delta: &[f64]) -> Vec<f64> {
-        let mut moved: Vec<f64> = theta.iter().zip(delta).map(|(t, d)| t + d).collect();
-        self.problem.constraints.clip(&mut moved);
-        moved
     }
 
     /// The changes of the parameters that solve a linearised problem, and whether they are its minimum. Every trial is
@@ -261,7 +255,7 @@ impl Search<'_> {
             // The proximal term alone is zero at no step, which scales nothing: a constant does.
             sub.constant = 1.0;
             let (delta, _) = self.solved(&sub, &evaluation, sizes)?;
-            theta = self.moved(&theta, &delta);
+            theta = self.problem.constraints.moved(&theta, &delta);
         }
         self.point(&theta)
     }
@@ -278,13 +272,6 @@ fn ball(rows: &Rows, radius: f64) -> Cone {
         );
     }
     Cone { rows: cone }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|v| v * v).sum();
-    (squares / values.len() as f64)
-        .sqrt()
-        .max(f64::MIN_POSITIVE.sqrt())
 }
 
 /// How large the number is, by the sizes of the parameters in it.

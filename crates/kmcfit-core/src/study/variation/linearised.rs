@@ -3,7 +3,8 @@
 use super::reduced::Reduced;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::weighted_jacobian;
+use crate::qp::Subproblem;
+use crate::solvers::{add_penalties, add_priors, weighted_jacobian};
 use crate::study::simulate::{normal, sigmas, stream};
 use nalgebra::{DMatrix, DVector};
 
@@ -22,35 +23,16 @@ pub struct Linearised {
 
 impl Linearised {
     pub fn new(problem: &Problem, reduced: &Reduced, theta: &[f64], here: &Evaluation) -> Self {
-        let (jacobian, _) = weighted_jacobian(problem, here);
+        let jacobian = weighted_jacobian(problem, here);
         let n = theta.len();
-        let ranges = problem.functions.ranges();
-        let mut rest: Vec<(DVector<f64>, f64)> = Vec::new();
-        for penalty in &problem.penalties {
-            let range = ranges[penalty.function].clone();
-            let root = penalty.weight.sqrt();
-            let residuals = penalty.residuals(&theta[range.clone()]);
-            for (i, r) in residuals.iter().enumerate() {
-                let mut row = DVector::zeros(n);
-                penalty
-                    .rows
-                    .row(i)
-                    .for_each(|(j, a)| row[range.start + j] += root * a);
-                rest.push((row, -root * r));
-            }
-        }
-        let scalars = problem.functions.scalar_range();
-        for (j, scalar) in scalars.zip(problem.functions.scalars()) {
-            if let Some(prior) = scalar.prior {
-                let mut row = DVector::zeros(n);
-                row[j] = 1.0 / prior.sigma;
-                rest.push((row, (prior.mean - theta[j]) / prior.sigma));
-            }
-        }
+        let mut rest = Subproblem::new(n);
+        add_penalties(problem, theta, &mut rest);
+        add_priors(problem, theta, &mut rest);
+        let rest = rest.residuals;
         let readings = jacobian.nrows();
         let mut varying = jacobian.resize_vertically(readings + rest.len(), 0.0);
-        for (i, (row, _)) in rest.iter().enumerate() {
-            varying.set_row(readings + i, &row.transpose());
+        for i in 0..rest.len() {
+            (rest.row(i)).for_each(|(j, a)| varying[(readings + i, j)] += a);
         }
         let mut embedding = DMatrix::zeros(n, reduced.problem.parameters());
         for j in 0..n {
@@ -68,7 +50,7 @@ impl Linearised {
                 .zip(&sigmas)
                 .map(|(root, sigma)| root * sigma)
                 .collect(),
-            asked: rest.iter().map(|(_, b)| *b).collect(),
+            asked: rest.right().to_vec(),
         }
     }
 

@@ -36,11 +36,10 @@ impl Reduced {
         let functions = Parameterization::with_devices(list, devices, nodes, grid.step())
             .expect("a constant instead of a function stays independent")
             .with_scalars(problem.functions.scalars().to_vec());
+        let mut own = problem.clone();
+        own.parts_mut().functions = functions;
         let mut reduced = Self {
-            problem: Problem {
-                functions,
-                ..problem.clone()
-            },
+            problem: own,
             function,
             place,
             one,
@@ -89,10 +88,11 @@ impl Reduced {
         let variations = whole.variations.iter();
         let variations = variations.filter(|v| v.function != self.function).cloned();
         let variations = variations.collect();
-        self.problem.constraints = constraints;
-        self.problem.soft = soft;
-        self.problem.penalties = penalties;
-        self.problem.variations = variations;
+        let parts = self.problem.parts_mut();
+        parts.constraints = constraints;
+        parts.soft = soft;
+        parts.penalties = penalties;
+        parts.variations = variations;
     }
 
     /// `A M` for `theta = M theta'`.

@@ -15,8 +15,6 @@ use super::workspace::{Chart, Ends, Workspace, with_workspace};
 use crate::simd::{self, Arithmetic, Kernel, LANES};
 use crate::system::State;
 use crate::threads;
-use std::sync::{Mutex, PoisonError};
-use std::thread::ScopedJoinHandle;
 
 /// From so many tiles on, a second thread pays: to start it takes as long as some three tiles do, twice.
 const WORTH_A_THREAD: usize = 24;
@@ -290,8 +288,7 @@ fn behind(tiles: &[Tile]) -> usize {
     tiles.last().map_or(0, |tile| tile.node(LANES, 0))
 }
 
-/// Does the same to both parts, `at_once` in two threads, if the system has another to give; otherwise
-/// the second is empty.
+/// Does the same to both parts, `at_once` in two threads; otherwise the second is empty.
 fn both<P: Send, T: Send>(
     (former, latter): (P, P),
     at_once: bool,
@@ -300,18 +297,7 @@ fn both<P: Send, T: Send>(
     if !at_once {
         return act(former);
     }
-    // Here it waits for the other thread, or for this one where there is no other.
-    let latter = Mutex::new(Some(latter));
-    let take = || latter.lock().unwrap_or_else(PoisonError::into_inner).take();
-    std::thread::scope(|scope| {
-        let other = || take().map(&act);
-        let other = threads::spawn_scoped(scope, other);
-        let mut all = act(former);
-        match other.map(ScopedJoinHandle::join) {
-            Ok(Ok(more)) => all.extend(more.into_iter().flatten()),
-            Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => all.extend(take().into_iter().flat_map(&act)),
-        }
-        all
-    })
+    let (mut all, more) = threads::both(|| act(former), || act(latter));
+    all.extend(more);
+    all
 }

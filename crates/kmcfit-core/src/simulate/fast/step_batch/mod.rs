@@ -80,11 +80,6 @@ impl LaneLayout {
         self.rows.len()
     }
 
-    /// Whether of the first row four lanes are enough.
-    fn begins_with_half(&self) -> bool {
-        self.rows.len() > 1 && self.in_first <= LANES / 2
-    }
-
     /// Row and lane of a trial.
     pub fn place(&self, which: usize) -> (usize, usize) {
         let which = which - self.without_mass;
@@ -131,20 +126,16 @@ impl StepBatch {
     /// If they are too many.
     pub fn run(&mut self, ray: SearchRay, layout: &LaneLayout, rows: Range<usize>) {
         assert!(rows.len() <= ROWS, "{} rows at once", rows.len());
-        let has_half = rows.start == 0 && rows.len() > 1 && layout.begins_with_half();
         let lengths = &layout.rows[rows.clone()];
         self.states
             .resize(lengths.len(), [[[0.0; LANES]; 2]; LANES]);
         self.costs.resize(lengths.len(), [0.0; LANES]);
-        match (has_half, lengths.len()) {
-            (_, 0) => {}
-            (false, 1) => self.of_rows::<1, false>(ray, lengths),
-            (false, 2) => self.of_rows::<2, false>(ray, lengths),
-            (false, 3) => self.of_rows::<3, false>(ray, lengths),
-            (false, _) => self.of_rows::<4, false>(ray, lengths),
-            (true, 2) => self.of_rows::<1, true>(ray, lengths),
-            (true, 3) => self.of_rows::<2, true>(ray, lengths),
-            (true, _) => self.of_rows::<3, true>(ray, lengths),
+        match lengths.len() {
+            0 => {}
+            1 => self.of_rows::<1>(ray, lengths),
+            2 => self.of_rows::<2>(ray, lengths),
+            3 => self.of_rows::<3>(ray, lengths),
+            _ => self.of_rows::<4>(ray, lengths),
         }
         self.rows = rows;
     }
@@ -161,34 +152,17 @@ impl StepBatch {
         Some([of(0), of(1)])
     }
 
-    fn of_rows<const R: usize, const HALF: bool>(&mut self, ray: SearchRay, lengths: &[Row]) {
-        // Without half a row nobody looks at what stands in its place.
-        let (mut no_states, mut no_costs) = ([[[0.0; LANES]; 2]; LANES], [0.0; LANES]);
-        let states = halved(&mut self.states, HALF, &mut no_states);
-        let costs = halved(&mut self.costs, HALF, &mut no_costs);
-        let whole = lengths[usize::from(HALF)..].first_chunk();
-        if let (Some(whole), Some(states), Some(costs)) = (whole, states, costs) {
-            simd::run(rows::Rows::<R, HALF> {
+    fn of_rows<const R: usize>(&mut self, ray: SearchRay, lengths: &[Row]) {
+        let (states, costs) = (self.states.first_chunk_mut(), self.costs.first_chunk_mut());
+        if let (Some(lengths), Some(states), Some(costs)) = (lengths.first_chunk(), states, costs) {
+            simd::run(rows::Rows::<R> {
                 ray,
-                lengths: (&lengths[0], whole),
+                lengths,
                 states,
                 costs,
             });
         }
     }
-}
-
-/// What belongs to half a row, or its place where there is none, and what to `R` rows.
-fn halved<'a, T, const R: usize>(
-    all: &'a mut [T],
-    has_half: bool,
-    none: &'a mut T,
-) -> Option<(&'a mut T, &'a mut [T; R])> {
-    let (half, rows) = match has_half {
-        true => all.split_first_mut()?,
-        false => (none, all),
-    };
-    Some((half, rows.first_chunk_mut()?))
 }
 
 /// Nodes in each of the eight parts of a motion, the last of which may be shorter, or empty.

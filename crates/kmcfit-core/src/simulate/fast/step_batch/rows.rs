@@ -3,13 +3,13 @@
 use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
 
-/// A row of devices, of which four lanes count, and `R` whole ones.
-pub(super) struct Rows<'a, const R: usize, const HALF: bool> {
+/// `R` rows of systems.
+pub(super) struct Rows<'a, const R: usize> {
     pub ray: SearchRay<'a>,
-    pub lengths: (&'a Row, &'a [Row; R]),
-    pub states: (&'a mut States, &'a mut [States; R]),
-    /// Sums of squares, not finite where the motion is not.
-    pub costs: (&'a mut Row, &'a mut [Row; R]),
+    pub lengths: &'a [Row; R],
+    pub states: &'a mut [States; R],
+    /// Sums of squares, not finite where the response is not.
+    pub costs: &'a mut [Row; R],
 }
 
 /// Mass, damping and stiffness of a row of devices.
@@ -71,19 +71,19 @@ impl<A: Arithmetic> Steps<A> {
         }
     }
 
-    /// One step of the midpoint rule, whose accelerations at its left node and in its middle are `DIVIDED` or not: with one of
-    /// each, divider and multipliers are busy side by side.
+    /// One step of the midpoint rule, whose acceleration at its left node is `DIVIDED` or not; that in its middle always is:
+    /// with one of each, divider and multipliers are busy side by side.
     #[inline(always)]
-    pub fn step<const LEFT_DIVIDED: bool, const MIDDLE_DIVIDED: bool>(
+    pub fn step<const DIVIDED: bool>(
         self,
         [left, right]: [Values<A>; 2],
         [y, v]: [Eight<A>; 2],
     ) -> [Eight<A>; 2] {
         let Self { dt, half_dt } = self;
-        let d = left.deceleration::<LEFT_DIVIDED>(y, v);
+        let d = left.deceleration::<DIVIDED>(y, v);
         let (y_half, v_half) = (y + half_dt * v, v - half_dt * d);
         let middle = left.twice_middle(right);
-        let d_half = middle.deceleration::<MIDDLE_DIVIDED>(y_half, v_half);
+        let d_half = middle.deceleration::<true>(y_half, v_half);
         [y + dt * v_half, v - dt * d_half]
     }
 }
@@ -116,12 +116,12 @@ impl<A: Arithmetic> Devices<A> {
     }
 
     #[inline(always)]
-    fn step<const MIDDLE_DIVIDED: bool>(&mut self, ray: &SearchRay, steps: Steps<A>, i: usize) {
+    fn step(&mut self, ray: &SearchRay, steps: Steps<A>, i: usize) {
         let residual = self.state[0] - Eight::splat(self.arithmetic, ray.readings[i]);
         self.sum += residual * residual;
         let length = Eight::load(self.arithmetic, &self.length);
         let right = Values::at(ray, self.arithmetic, length, i + 1);
-        self.state = steps.step::<false, MIDDLE_DIVIDED>([self.left, right], self.state);
+        self.state = steps.step::<false>([self.left, right], self.state);
         self.left = right;
     }
 
@@ -141,59 +141,39 @@ impl<A: Arithmetic> Devices<A> {
     }
 }
 
-impl<const R: usize, const HALF: bool> Kernel for Rows<'_, R, HALF> {
+impl<const R: usize> Kernel for Rows<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let Rows {
             ray,
-            lengths: (length, lengths),
-            states: (state, states),
-            costs: (cost, costs),
+            lengths,
+            states,
+            costs,
         } = self;
         let steps = Steps::of(arithmetic, ray.step);
-        let half_steps = Steps::of(arithmetic.half(), ray.step);
         let nodes = ray.readings.len();
         let last = nodes - 1;
         let part = part(nodes);
 
-        let mut half = Devices::begin(&ray, arithmetic.half(), length);
         let mut rows = [Devices::begin(&ray, arithmetic, &lengths[0]); R];
         for r in 1..R {
             rows[r] = Devices::begin(&ray, arithmetic, &lengths[r]);
         }
         let (mut next, mut which) = (0, 0);
-        for i in 0..last {
+        for i in 0..=last {
             if i == next {
-                if HALF {
-                    state[which] = half.rows();
-                }
                 for r in 0..R {
                     states[r][which] = rows[r].rows();
                 }
                 (next, which) = (next + part, which + 1);
             }
-            rows[0].step::<true>(&ray, steps, i);
-            // Among the others: at either end it takes as long as a whole row.
-            if HALF {
-                half.step::<false>(&ray, half_steps, i);
+            if i < last {
+                for row in &mut rows {
+                    row.step(&ray, steps, i);
+                }
             }
-            for row in &mut rows[1..] {
-                row.step::<true>(&ray, steps, i);
-            }
-        }
-        // The last node, where a part begins with it.
-        if last == next {
-            if HALF {
-                state[which] = half.rows();
-            }
-            for r in 0..R {
-                states[r][which] = rows[r].rows();
-            }
-        }
-        if HALF {
-            *cost = half.cost(ray.readings[last]);
         }
         for r in 0..R {
             costs[r] = rows[r].cost(ray.readings[last]);

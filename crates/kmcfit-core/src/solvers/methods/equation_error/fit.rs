@@ -1,7 +1,7 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
 use super::measured::{Measured, Measurements};
-use super::{Minimum, Purpose, add_rows, device, minimise};
+use super::{Accuracy, Minimum, add_rows, device, minimise};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
@@ -242,7 +242,7 @@ impl<'a> Cost<'a> {
         let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
         let sizes = self.measurements.sizes(problem, start);
         let excess = |theta: &[f64]| self.excess(theta);
-        let optimum = Purpose::Optimum;
+        let optimum = Accuracy::Optimum;
         minimise(problem, sub, start, &sizes, optimum, &excess, timings)
     }
 
@@ -288,13 +288,7 @@ impl<'a> Cost<'a> {
     fn point(&self, theta: Vec<f64>) -> Iterate {
         let problem = self.problem;
         let mut evaluation = problem.workspace();
-        problem
-            .functions
-            .device_into(&theta, 0, &mut evaluation.device);
-        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
-            problem.functions.device_into(&theta, i + 1, own);
-        }
-        evaluation.scalars.copy_from_slice(problem.scalars(&theta));
+        problem.set_parameters(&theta, &mut evaluation);
         evaluation.misfit = self
             .experiments()
             .map(|(experiment, measured)| {

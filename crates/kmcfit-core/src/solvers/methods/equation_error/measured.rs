@@ -1,13 +1,14 @@
-//! What the readings themselves say of a motion: its state and what drives it, without a simulation.
+//! States and inputs of records as measured, without a simulation.
 
 use crate::functions::Parameterization;
 use crate::objective::SimulatedRecord;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment, Loss};
 use crate::signal::zero_phase;
+use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
-use crate::solvers::state_estimation::{Band, Kinematics, rms, unsensed};
+use crate::solvers::state_estimation::{Band, Kinematics, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the

@@ -29,20 +29,20 @@ const PULL: f64 = 1e-9;
 
 /// What a minimum is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Purpose {
+enum Accuracy {
     /// To start a fit.
     Start,
     /// For its own sake.
     Optimum,
 }
 
-impl Purpose {
+impl Accuracy {
     /// A plain minimum moved into the constraints is used if it keeps this share of its decrease: a
     /// fit that follows needs no optimum, and an optimum has the accuracy to which programs are solved.
     fn kept(self) -> f64 {
         match self {
-            Purpose::Start => 0.999,
-            Purpose::Optimum => 1.0 - 1e-9,
+            Accuracy::Start => 0.999,
+            Accuracy::Optimum => 1.0 - 1e-9,
         }
     }
 }
@@ -88,7 +88,7 @@ pub(in crate::solvers) fn from_motions(
         sub,
         start,
         &sizes,
-        Purpose::Start,
+        Accuracy::Start,
         &|_| Vec::new(),
         &mut Timings::default(),
     )?;
@@ -129,7 +129,7 @@ fn minimise(
     mut sub: Subproblem,
     start: &[f64],
     sizes: &[f64],
-    purpose: Purpose,
+    accuracy: Accuracy,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
     timings: &mut Timings,
 ) -> Result<Minimum, ConicStatus> {
@@ -142,11 +142,7 @@ fn minimise(
         *proximal = m * weight;
     }
     let pull: Vec<f64> = metric.iter().map(|m| m * weight).collect();
-    let moved = |z: &[f64]| -> Vec<f64> {
-        let mut theta: Vec<f64> = start.iter().zip(z).map(|(s, d)| s + d).collect();
-        problem.constraints.clip(&mut theta);
-        theta
-    };
+    let moved = |z: &[f64]| problem.constraints.moved(start, z);
     let plain = timed(&mut timings.linear_algebra, || sub.solve_plain());
     if let Some(z) = plain {
         let parameters = moved(&z);
@@ -156,7 +152,7 @@ fn minimise(
         // Moved into the constraints it is used if they hold there and it is nearly as good as the
         // plain one, which no point in them can beat.
         let enough =
-            sub.value(&step) - least <= (1.0 - purpose.kept()) * (at_start - least).max(0.0);
+            sub.value(&step) - least <= (1.0 - accuracy.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
             return Ok(Minimum {
                 parameters,
@@ -168,7 +164,7 @@ fn minimise(
         }
     }
     let mut units = vec![1.0; sub.variables];
-    if purpose == Purpose::Optimum {
+    if accuracy == Accuracy::Optimum {
         for (range, size) in problem.functions.ranges().iter().zip(sizes) {
             units[range.clone()].fill(if *size > 0.0 { *size } else { 1.0 });
         }
@@ -177,9 +173,9 @@ fn minimise(
     let z = solution.z.iter_mut().zip(&units);
     z.for_each(|(z, unit)| *z *= unit);
     match solution.status {
-        ConicStatus::Solved | ConicStatus::Almost => Ok(Minimum {
+        status if status.is_point() => Ok(Minimum {
             parameters: moved(&solution.z),
-            program: Some(solution.status),
+            program: Some(status),
             kkt: solution.kkt,
             from: start.to_vec(),
             pull,

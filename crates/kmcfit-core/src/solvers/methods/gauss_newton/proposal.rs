@@ -72,11 +72,7 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
     let least = least_decrease(work.problem(), cost);
     // False for NaN.
     let is_sound = |predicted: &f64| *predicted >= -least;
-    let moved = |z: &[f64]| -> Vec<f64> {
-        let mut moved: Vec<f64> = point.parameters.iter().zip(z).map(|(p, d)| p + d).collect();
-        constraints.clip(&mut moved);
-        moved
-    };
+    let moved = |z: &[f64]| constraints.moved(&point.parameters, z);
     let exact = |parameters: Vec<f64>, predicted: f64| {
         Answer::Step(Proposal {
             parameters,
@@ -164,19 +160,17 @@ fn model_cost(
 fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
     let changes = problem.predictions_tangent(evaluation, delta);
     let mut misfit = robust_surplus(problem, evaluation);
-    let predictions = evaluation.predictions.iter().zip(&changes);
-    for (experiment, (predictions, changes)) in problem.experiments.iter().zip(predictions) {
-        let pairs = predictions.iter().zip(changes);
-        for (channel, (predicted, change)) in experiment.channels.iter().zip(pairs) {
-            if channel.loss() == Loss::Squares {
-                let moved: Vec<f64> = predicted.iter().zip(change).map(|(z, d)| z + d).collect();
-                misfit += channel.cost(&moved);
-            } else {
-                let residuals = channel.residuals(predicted).zip(change).enumerate();
-                misfit += residuals
-                    .map(|(i, (r, d))| channel.weight(i, r) * (r + d) * (r + d))
-                    .sum::<f64>();
-            }
+    for ((channel, predicted), change) in
+        problem.predicted(evaluation).zip(changes.iter().flatten())
+    {
+        if channel.loss() == Loss::Squares {
+            let moved: Vec<f64> = predicted.iter().zip(change).map(|(z, d)| z + d).collect();
+            misfit += channel.cost(&moved);
+        } else {
+            let residuals = channel.residuals(predicted).zip(change).enumerate();
+            misfit += residuals
+                .map(|(i, (r, d))| channel.weight(i, r) * (r + d) * (r + d))
+                .sum::<f64>();
         }
     }
     misfit

@@ -36,7 +36,7 @@ fn problem() -> Problem {
         velocity: 0.0,
     };
     let experiment = Experiment::free("decay", initial, NODES).with_channel(channel);
-    Problem::new(oscillator, functions, vec![experiment])
+    Problem::new(oscillator, functions, vec![experiment]).unwrap()
 }
 
 /// A search of some steps.

@@ -1,16 +1,16 @@
-//! Small dense rows on top of each other.
+//! The dense rows of a front.
 
 use crate::simd::{self, Arithmetic, Kernel};
 
-/// Rows of equal length.
+/// Rows of equal length, one after the other in memory.
 #[derive(Default)]
-pub struct Dense {
+pub struct FrontalRows {
     length: usize,
     count: usize,
     values: Vec<f64>,
 }
 
-impl Dense {
+impl FrontalRows {
     /// No rows, of `length` numbers each.
     pub fn clear(&mut self, length: usize) {
         self.length = length;
@@ -75,7 +75,7 @@ impl Dense {
 }
 
 struct Reflect<'a> {
-    rows: &'a mut Dense,
+    rows: &'a mut FrontalRows,
     active: &'a [usize],
     column: usize,
     sums: &'a mut Vec<f64>,

@@ -1,4 +1,4 @@
-//! Least squares in few variables, all at once.
+//! Least squares in few variables by one triangular factor.
 
 use super::Subproblem;
 use crate::simd::tall_qr::{PIECE, Piece, Triangle};

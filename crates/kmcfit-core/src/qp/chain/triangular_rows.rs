@@ -1,7 +1,7 @@
-//! What the elimination leaves: one row for each variable, in the order in which they went.
+//! The triangular factor: one row for each variable, in the order of elimination.
 
 /// Rows that give a variable from those that are eliminated later.
-pub struct Factor {
+pub struct TriangularRows {
     variables: usize,
     sides: usize,
     places: Vec<u32>,
@@ -12,7 +12,7 @@ pub struct Factor {
     right: Vec<f64>,
 }
 
-impl Factor {
+impl TriangularRows {
     /// No rows yet, for so many variables and right-hand sides.
     pub fn new(variables: usize, sides: usize) -> Self {
         Self {

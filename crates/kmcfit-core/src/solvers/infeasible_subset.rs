@@ -1,4 +1,4 @@
-//! Which constraints contradict each other.
+//! Infeasible subsets of the constraints.
 
 use crate::constraints::{Constraints, TOLERANCE};
 use crate::qp::{ConicStatus, project};

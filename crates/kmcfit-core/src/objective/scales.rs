@@ -1,14 +1,15 @@
-//! How large a change of a function is large.
+//! Natural scales of the functions: the size at which a change of one matters.
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment, LONG_RECORD_STEPS};
 use crate::signal::Spectrum;
-use crate::simd::sum::{dot, largest};
+use crate::simd::LANES;
+use crate::simd::sum::largest;
 use crate::simulate::Trajectory;
-use crate::system::quadrature::curvature_into;
-use crate::system::{MOST_TERMS, Term};
+use crate::system::Term;
+use crate::system::quadrature::curvature_at;
 use std::f64::consts::TAU;
 
 impl Problem {
@@ -84,64 +85,34 @@ impl Problem {
     }
 }
 
-/// The sums over the nodes of `y''^2` and of `phi^2` of each term; of a long motion in lanes.
+/// The sums over the nodes of `y''^2` and of `phi^2` of each term.
 fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
-    let Trajectory {
-        displacement: y,
-        velocity: v,
-    } = motion;
-    let mut acceleration = [0.0; PART];
-    let mut sums = vec![0.0; terms.len() + 1];
-    let mut phi = [[0.0; PART]; MOST_TERMS];
-    for from in (0..motion.nodes()).step_by(PART) {
-        let range = from..(from + PART).min(motion.nodes());
-        curvature_into(y, step, from, &mut acceleration[..range.len()]);
-        let (y, v) = (&y[range.clone()], &v[range.clone()]);
-        for (term, phi) in terms.iter().zip(&mut phi) {
-            if !matches!(term, Term::Damping | Term::Stiffness) {
-                let pairs = y.iter().zip(v);
-                let values = phi.iter_mut().zip(pairs);
-                values.for_each(|(phi, (y, v))| *phi = term.phi(*y, *v));
-            }
-        }
-        let seen = terms.iter().zip(&phi).map(|(term, phi)| match term {
-            Term::Damping => v,
-            Term::Stiffness => y,
-            _ => &phi[..range.len()],
-        });
-        let columns: Vec<&[f64]> = std::iter::once(&acceleration[..range.len()])
-            .chain(seen)
-            .collect();
-        if motion.nodes() > LONG_RECORD_STEPS {
-            for (column, sum) in columns.iter().zip(&mut sums) {
-                *sum += dot(column, column);
-            }
-            continue;
-        }
-        for (columns, sums) in columns.chunks(4).zip(sums.chunks_mut(4)) {
-            add_squares(columns, sums);
-        }
-    }
-    sums
+    let (y, v) = (&motion.displacement, &motion.velocity);
+    let inertia = sum_of_squares(y.len(), |i| curvature_at(y, step, i));
+    let of = |term: &Term| match term {
+        Term::Damping => sum_of_squares(v.len(), |i| v[i]),
+        Term::Stiffness => sum_of_squares(y.len(), |i| y[i]),
+        _ => sum_of_squares(y.len(), |i| term.phi(y[i], v[i])),
+    };
+    std::iter::once(inertia)
+        .chain(terms.iter().map(of))
+        .collect()
 }
 
-/// Nodes whose terms are looked at together.
-const PART: usize = 256;
-
-/// Adds the squares of each column in their order: up to four sums side by side, as each waits for
-/// itself.
-fn add_squares(columns: &[&[f64]], sums: &mut [f64]) {
-    let column = |c: usize| columns[c.min(columns.len() - 1)];
-    let (zero, one, two, three) = (column(0), column(1), column(2), column(3));
-    let mut four = [0.0; 4];
-    four[..sums.len()].copy_from_slice(sums);
-    for (((a, b), c), d) in zero.iter().zip(one).zip(two).zip(three) {
-        four[0] += a * a;
-        four[1] += b * b;
-        four[2] += c * c;
-        four[3] += d * d;
+/// Sum of the squares of `count` values, of many in eight sums side by side. Descents along the gradient alone depend on
+/// every bit: few are added in order.
+fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
+    let lane = if count > LONG_RECORD_STEPS {
+        LANES - 1
+    } else {
+        0
+    };
+    let mut sums = [0.0; LANES];
+    for i in 0..count {
+        let x = value(i);
+        sums[i & lane] += x * x;
     }
-    sums.copy_from_slice(&four[..sums.len()]);
+    sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
 
 /// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
@@ -218,7 +189,7 @@ mod tests {
             .build()
             .unwrap();
         if !other_is_read {
-            problem.experiments[1].channels.clear();
+            problem.parts_mut().experiments[1].channels.clear();
         }
         problem
     }

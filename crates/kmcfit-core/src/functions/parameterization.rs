@@ -1,6 +1,6 @@
 //! All functions and scalars that are fitted, their parameters in one vector.
 
-use super::{CoefficientFunction, Design, Gram, RowRuns, ScalarParameter};
+use super::{CoefficientFunction, Design, Gram, ScalarParameter};
 use crate::simd::sum::largest_difference;
 use crate::system::NodalCoefficients;
 use crate::system::quadrature::{trapezoid, trapezoid_weights};
@@ -27,8 +27,6 @@ pub struct Parameterization {
     constant: Vec<bool>,
     /// The fixed part and the only entry of the design of each function that has the same value at every node.
     flat: Vec<Option<[f64; 2]>>,
-    /// Of each function whose design has them.
-    runs: Vec<Option<RowRuns>>,
 }
 
 impl Parameterization {
@@ -83,7 +81,6 @@ impl Parameterization {
         Some(Self {
             constant: list.iter().map(|f| f.design.is_constant()).collect(),
             flat: list.iter().map(CoefficientFunction::flat).collect(),
-            runs: list.iter().map(|f| RowRuns::of(&f.design)).collect(),
             first_nodes,
             list,
             ranges,
@@ -167,11 +164,6 @@ impl Parameterization {
         self.constant[index]
     }
 
-    /// The rows of the design of function `index` that see the same parameters, if there are long runs of them.
-    pub(crate) fn runs(&self, index: usize) -> Option<&RowRuns> {
-        self.runs[index].as_ref()
-    }
-
     /// The largest size at any node of what function `index` changes by from its parameters `from` to `after`.
     pub(crate) fn largest_change(&self, index: usize, from: &[f64], after: &[f64]) -> f64 {
         let design = &self.list[index].design;
@@ -179,10 +171,9 @@ impl Parameterization {
             return largest_difference(after, from);
         }
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
-        match (self.flat[index], delta.as_slice(), &self.runs[index]) {
-            (Some([_, entry]), [delta], _) => (entry * delta).abs(),
-            (_, delta, Some(runs)) => runs.largest(delta, self.nodes),
-            (_, delta, None) => design.largest(delta, self.nodes),
+        match (self.flat[index], delta.as_slice()) {
+            (Some([_, entry]), [delta]) => (entry * delta).abs(),
+            (_, delta) => design.largest(delta, self.nodes),
         }
     }
 
@@ -205,6 +196,12 @@ impl Parameterization {
     /// If `theta` has another number of parameters.
     #[must_use]
     pub fn with_start(mut self, theta: &[f64]) -> Self {
+        self.set_start(theta);
+        self
+    }
+
+    /// Moves the start of the search.
+    pub(crate) fn set_start(&mut self, theta: &[f64]) {
         assert_eq!(theta.len(), self.parameters(), "one start per parameter");
         for (function, range) in self.list.iter_mut().zip(&self.ranges) {
             function.start.copy_from_slice(&theta[range.clone()]);
@@ -213,7 +210,6 @@ impl Parameterization {
         for (scalar, start) in self.scalars.iter_mut().zip(&theta[scalars]) {
             scalar.start = *start;
         }
-        self
     }
 
     /// A device of the right shape, all zero.
@@ -234,20 +230,8 @@ impl Parameterization {
             let theta = &theta[self.ranges[f].clone()];
             match (self.flat[f], theta) {
                 (Some([offset, entry]), [theta]) => values.fill(offset + entry * theta),
-                _ => self.values_into(f, theta, values),
+                _ => self.list[f].values_into(theta, values),
             }
-        }
-    }
-
-    /// Values of function `index` at the nodes.
-    fn values_into(&self, index: usize, theta: &[f64], values: &mut [f64]) {
-        let function = &self.list[index];
-        match &self.runs[index] {
-            Some(runs) => {
-                values.copy_from_slice(&function.offset);
-                runs.multiply_add(theta, values);
-            }
-            None => function.values_into(theta, values),
         }
     }
 
@@ -255,7 +239,7 @@ impl Parameterization {
     pub fn values(&self, theta: &[f64]) -> Vec<Vec<f64>> {
         let each = self.ranges.iter().enumerate().map(|(index, range)| {
             let mut values = vec![0.0; self.nodes];
-            self.values_into(index, &theta[range.clone()], &mut values);
+            self.list[index].values_into(&theta[range.clone()], &mut values);
             values
         });
         each.collect()
@@ -276,10 +260,7 @@ impl Parameterization {
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
         for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
             let out = &mut out[self.ranges[f].clone()];
-            match &self.runs[f] {
-                Some(runs) => runs.transpose_multiply_add(values, out),
-                None => self.list[f].design.transpose_multiply_add(values, out),
-            }
+            self.list[f].design.transpose_multiply_add(values, out);
         }
     }
 

@@ -9,7 +9,7 @@ use super::Subproblem;
 /// F'(F z - f) + D z + T' a + E' e + G' g - sum_k A_k' c_k = 0
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct PrimalDual {
     /// The variables.
     pub z: Vec<f64>,
     /// `g`, positive at an upper bound, negative at a lower one.
@@ -22,7 +22,7 @@ pub struct Candidate {
     pub cones: Vec<Vec<f64>>,
 }
 
-impl Candidate {
+impl PrimalDual {
     /// Zero, with multipliers of zero.
     pub fn zero(sub: &Subproblem) -> Self {
         Self {
@@ -100,7 +100,7 @@ mod tests {
         sub.bound([(0, 1.0)], 0.0, 1.0);
         sub.absolute.push([(0, 1.0)], 0.0);
         sub.absolute_weights.push(4.0);
-        let mut candidate = Candidate::zero(&sub);
+        let mut candidate = PrimalDual::zero(&sub);
         candidate.inequalities = vec![3.0, -3.0, 3.0];
         candidate.absolute = vec![-5.0];
         candidate.project_multipliers(&sub);

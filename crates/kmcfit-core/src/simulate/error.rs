@@ -3,7 +3,7 @@
 use super::Trajectory;
 use crate::simd::sum::are_positive;
 use crate::system::{Grid, NodalCoefficients};
-use std::fmt;
+use thiserror::Error;
 
 /// Why a motion could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +17,8 @@ pub enum Cause {
 }
 
 /// An evaluation that ended early: an outcome of a trial, not a misuse. Line searches step back.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("{}", self.sentence())]
 pub struct SimulationError {
     /// What happened.
     pub cause: Cause,
@@ -30,22 +31,19 @@ pub struct SimulationError {
     pub value: f64,
 }
 
-impl fmt::Display for SimulationError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl SimulationError {
+    fn sentence(&self) -> String {
         let (time, value) = (self.time, self.value);
         match self.cause {
-            Cause::Mass => write!(f, "the mass is {value} kg at t = {time:.6} s, not positive"),
-            Cause::Overflow => write!(f, "the motion overflows at t = {time:.6} s"),
-            Cause::CostOverflow => write!(
-                f,
+            Cause::Mass => format!("the mass is {value} kg at t = {time:.6} s, not positive"),
+            Cause::Overflow => format!("the motion overflows at t = {time:.6} s"),
+            Cause::CostOverflow => format!(
                 "the cost overflows: the motion and a reading are {value:.3e} apart at t = \
                  {time:.6} s"
             ),
         }
     }
 }
-
-impl std::error::Error for SimulationError {}
 
 /// Refuses a mass that is not positive at some node.
 pub(super) fn require_positive_mass(
