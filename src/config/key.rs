@@ -30,27 +30,6 @@ pub enum Kind {
     AnyOf(&'static [Kind]),
 }
 
-/// A type that is read from the value of a key.
-pub trait Value {
-    /// What may stand behind the key.
-    const KIND: Kind;
-    /// Whether the key must be there.
-    const REQUIRED: bool = true;
-}
-
-impl<T: Value> Value for Option<T> {
-    const KIND: Kind = T::KIND;
-    const REQUIRED: bool = false;
-}
-
-impl<T: Value> Value for Vec<T> {
-    const KIND: Kind = Kind::List(&T::KIND);
-}
-
-impl Value for bool {
-    const KIND: Kind = Kind::Bool;
-}
-
 /// Keys that stand together in one map.
 #[derive(Debug)]
 pub struct Group {
@@ -107,8 +86,7 @@ macro_rules! keys {
         )+}
     ) => {
         $(#[doc = $text])+
-        #[derive(Debug, Clone, $($derive,)? PartialEq, serde::Deserialize)]
-        #[serde(deny_unknown_fields, expecting = $expecting)]
+        #[derive(Debug, Clone, $($derive,)? PartialEq)]
         pub struct $name {$(
             $(#[doc = $about])+
             pub $key: $value,
@@ -122,20 +100,41 @@ macro_rules! keys {
                     text: concat!($($text),+).trim_ascii_start(),
                     keys: &[$($crate::config::key::Key {
                         name: stringify!($key),
-                        kind: <$value as $crate::config::key::Value>::KIND,
+                        kind: <$value as $crate::config::value::Value>::KIND,
                         text: concat!($($about),+).trim_ascii_start(),
                         example: $example,
                         unit: $crate::config::key::given(&[$($unit)?]),
                         default: $crate::config::key::given(&[$($default)?]),
-                        required: <$value as $crate::config::key::Value>::REQUIRED,
+                        required: <$value as $crate::config::value::Value>::REQUIRED,
                     }),+],
                 };
                 &GROUP
             };
         }
 
-        impl $crate::config::key::Value for $name {
+        impl $crate::config::value::Value for $name {
             const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Map($name::GROUP);
+
+            fn scalar(
+                scalar: $crate::config::value::Scalar<'_>,
+            ) -> Result<Self, $crate::config::value::Mistake> {
+                Err(scalar.wrong_kind($expecting))
+            }
+
+            fn map<'de, A: serde::de::MapAccess<'de>>(
+                mut map: A,
+                report: &$crate::config::value::Report,
+            ) -> Result<Self, A::Error> {
+                $(let mut $key: Option<$value> = None;)+
+                while let Some(key) = report.key(&mut map, Self::GROUP.keys)? {
+                    $(if key == stringify!($key) {
+                        report.field(&mut map, stringify!($key), &mut $key)?;
+                    })+
+                }
+                Ok(Self {$(
+                    $key: report.required($key, stringify!($key))?,
+                )+})
+            }
         }
     };
 }

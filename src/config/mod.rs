@@ -6,7 +6,6 @@
 //! finds the line of a key again.
 
 mod build;
-mod complaint;
 mod expansion;
 mod failure;
 mod guard;
@@ -21,6 +20,7 @@ pub mod spec;
 mod starter;
 mod story;
 mod syntax;
+mod value;
 
 pub use build::{
     Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, Purpose, StudyPlan,

@@ -10,14 +10,11 @@ pub use experiment::*;
 pub use study::*;
 
 use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
 
+use super::scalar::choice;
 pub use super::scalar::{ColumnSpec, WeightRule};
-use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList, OneOrMany};
-use super::scalar::{Scalar, Start, Text, Weight};
-use super::scalar::{choice, deserialize_scalar, scalar_visits};
+use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList};
+use super::scalar::{Start, Text, Weight};
 
 keys! {
     /// A model: records of one device, what is sought, and how.
@@ -148,7 +145,7 @@ keys! {
         /// Largest value allowed.
         max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
         /// Penalty on squared derivatives, added to J; or a list of such.
-        smooth: Option<OneOrMany<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
+        smooth: Option<OneOrList<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
         /// Penalty on the total variation: a jump costs no more than a slow change.
         variation: Option<VariationSpec>, example "{weight: 0.01}", default "none";
         /// Of Coulomb friction: speed over which the sign of the velocity is smoothed, well below the speeds of the

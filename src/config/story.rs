@@ -44,9 +44,7 @@ impl Story {
         if locate(&text, &[Segment::Key("story".into())]).depth == 0 {
             return Ok(None);
         }
-        let spec: StorySpec = checked
-            .read()
-            .map_err(|error| failure::input_error(path, &text, &error))?;
+        let spec: StorySpec = failure::read(path, &checked)?;
         if spec.story.is_empty() {
             return Err(InputError::file(path, "the story has no model")
                 .key("story")

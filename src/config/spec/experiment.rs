@@ -1,16 +1,11 @@
 //! Keys of an experiment: its file, channels, sensors, what drives it, and its beginning.
 
 use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
 
 use super::{OwnFunctionsSpec, RangeSpec};
-use crate::config::scalar::{
-    ColumnId, Count, Estimate, Number, NumberOrEstimate, Scalar, ScalarOr,
-};
+use crate::config::scalar::choice;
+use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
 use crate::config::scalar::{Sigma, Text};
-use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
 
 keys! {
     /// One record.

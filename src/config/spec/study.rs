@@ -1,13 +1,10 @@
 //! Keys of a study.
 
 use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
 
 use super::{ForceSpec, FunctionName, StateSpec};
-use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Scalar, Text};
-use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
+use crate::config::scalar::choice;
+use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
     /// What `kmcfit study` looks into besides what it always does.
