@@ -27,7 +27,7 @@ pub mod document;
 mod drawn;
 pub mod figure;
 pub mod figures;
-mod findings;
+pub(crate) mod findings;
 mod finished;
 mod knowledge;
 mod known;

@@ -250,6 +250,41 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
             .error_at(&key, "the force is missing")
             .expected("`columns: {force: …}`, or `shape` here"));
     };
+    shape_keys(file, &key, shape, spec)?;
+    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+    let (amplitude, at) = (number(spec.amplitude), number(spec.at));
+    let duration = number(spec.duration);
+    Ok(match shape {
+        ForceShape::Constant => Shape::Constant { amplitude },
+        ForceShape::Sine => Shape::Sine {
+            amplitude,
+            frequency: number(spec.frequency),
+            phase: number(spec.phase),
+        },
+        ForceShape::Sweep => Shape::Sweep {
+            amplitude,
+            from: number(spec.from),
+            to: number(spec.to),
+            start: at,
+            duration,
+            law: SweepLaw::Linear,
+        },
+        ForceShape::Step => Shape::Step { amplitude, at },
+        ForceShape::HalfSine => Shape::HalfSine {
+            amplitude,
+            at,
+            duration,
+        },
+    })
+}
+
+/// Refuses keys that a shape does not have, the absence of those that it needs, and values that make none.
+fn shape_keys(
+    file: &ModelFile,
+    key: &str,
+    shape: ForceShape,
+    spec: &ForceSpec,
+) -> Result<(), InputError> {
     let keys = [
         ("amplitude", spec.amplitude),
         ("frequency", spec.frequency),
@@ -266,74 +301,37 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
         ForceShape::Step => (&["amplitude"], &["at"]),
         ForceShape::HalfSine => (&["amplitude", "duration"], &["at"]),
     };
+    let expected = || listed_keys(needed, possible);
     for (name, value) in keys {
-        let known = needed.contains(&name) || possible.contains(&name);
-        match value {
-            Some(_) if !known => {
-                let of = listed_keys(needed, possible);
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{name}"),
-                        format!("a {shape} has no `{name}`"),
-                    )
-                    .found(format!("`{name}`"))
-                    .expected(of));
-            }
-            None if needed.contains(&name) => {
-                return Err(file
-                    .error_at(&key, format!("a {shape} needs its `{name}`"))
-                    .expected(listed_keys(needed, possible)));
-            }
-            _ => {}
+        let is_needed = needed.contains(&name);
+        if value.is_some() && !is_needed && !possible.contains(&name) {
+            let at = format!("{key}.{name}");
+            let problem = format!("a {shape} has no `{name}`");
+            return Err((file.error_at(&at, problem))
+                .found(format!("`{name}`"))
+                .expected(expected()));
+        }
+        if value.is_none() && is_needed {
+            let problem = format!("a {shape} needs its `{name}`");
+            return Err(file.error_at(key, problem).expected(expected()));
         }
     }
     if spec.interpolation.is_some() {
-        return Err(file
-            .error_at(
-                &format!("{key}.interpolation"),
-                "a shape is not interpolated",
-            )
+        let at = format!("{key}.interpolation");
+        return Err((file.error_at(&at, "a shape is not interpolated"))
             .found(format!("`interpolation` beside `{shape}`"))
             .expected("one of the two"));
     }
     for (name, value) in [("frequency", spec.frequency), ("duration", spec.duration)] {
         if let Some(value) = value.filter(|v| v.0 <= 0.0) {
+            let at = format!("{key}.{name}");
             return Err(file
-                .error_at(
-                    &format!("{key}.{name}"),
-                    format!("the {name} must be positive"),
-                )
+                .error_at(&at, format!("the {name} must be positive"))
                 .found(value.0)
                 .expected("a number greater than 0"));
         }
     }
-    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
-    let amplitude = number(spec.amplitude);
-    Ok(match shape {
-        ForceShape::Constant => Shape::Constant { amplitude },
-        ForceShape::Sine => Shape::Sine {
-            amplitude,
-            frequency: number(spec.frequency),
-            phase: number(spec.phase),
-        },
-        ForceShape::Sweep => Shape::Sweep {
-            amplitude,
-            from: number(spec.from),
-            to: number(spec.to),
-            start: number(spec.at),
-            duration: number(spec.duration),
-            law: SweepLaw::Linear,
-        },
-        ForceShape::Step => Shape::Step {
-            amplitude,
-            at: number(spec.at),
-        },
-        ForceShape::HalfSine => Shape::HalfSine {
-            amplitude,
-            at: number(spec.at),
-            duration: number(spec.duration),
-        },
-    })
+    Ok(())
 }
 
 fn listed_keys(needed: &[&str], possible: &[&str]) -> String {
