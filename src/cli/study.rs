@@ -296,7 +296,7 @@ impl Work<'_> {
         let (problem, theta, evaluation) = self.fit()?;
         let optimum = (&problem, theta.as_slice(), &evaluation);
         self.at_the_optimum(optimum)?;
-        self.from_elsewhere(optimum)?;
+        self.further_fits(optimum)?;
         self.extremes(optimum)
     }
 
@@ -329,7 +329,7 @@ impl Work<'_> {
     }
 
     /// Further fits: from other starting points, of constant functions, of other noise.
-    fn from_elsewhere(&mut self, (problem, theta, _): Optimum) -> Result<(), Trouble> {
+    fn further_fits(&mut self, (problem, theta, _): Optimum) -> Result<(), Trouble> {
         let (model, threads) = (self.model, self.threads);
         let plan = &model.study;
         if plan.starts > 0 {

@@ -6,12 +6,14 @@
 //! finds the line of a key again.
 
 mod build;
+mod choice;
 mod expansion;
 mod failure;
 mod guard;
 pub mod key;
 pub mod keys;
 pub mod locate;
+mod map;
 mod model_file;
 mod overrides;
 pub mod scalar;

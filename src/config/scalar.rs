@@ -2,10 +2,12 @@
 //!
 //! Each type reads itself, so that a mistake is reported at its line with words of its own.
 
-use super::key::{Kind, keys};
+use super::choice::{choice, choose};
+use super::key::Kind;
+use super::map::keys;
 use super::value::{Mistake, Reader, Report, Scalar, Value};
-use crate::input::{one_of, quote};
-use crate::near::did_you_mean;
+use crate::input::one_of;
+use crate::near::{did_you_mean, number_in};
 use serde::de::{Deserializer, MapAccess, SeqAccess};
 use std::fmt;
 use std::ops::Deref;
@@ -13,64 +15,6 @@ use std::path::Path;
 
 /// The word that asks for an estimate.
 const ESTIMATE: &str = "estimate";
-
-/// An enum whose variants are names in the YAML.
-macro_rules! choice {
-    (
-        $(#[$doc:meta])*
-        pub enum $name:ident { $( $(#[doc = $variant_doc:literal])+ $variant:ident = $word:literal, )+ }
-    ) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum $name { $( $(#[doc = $variant_doc])+ $variant, )+ }
-
-        impl $name {
-            /// Every choice with its name in the YAML.
-            pub const ALL: &'static [(&'static str, Self)] = &[$(($word, Self::$variant),)+];
-
-            /// Every name in the YAML with its meaning.
-            pub const NAMES: &'static [(&'static str, &'static str)] =
-                &[$(($word, concat!($($variant_doc),+).trim_ascii_start()),)+];
-
-            /// The name in the YAML.
-            pub fn name(self) -> &'static str {
-                match self { $( Self::$variant => $word, )+ }
-            }
-        }
-
-        impl std::fmt::Display for $name {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str(self.name())
-            }
-        }
-
-        impl $crate::config::value::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(Self::NAMES);
-            fn scalar(
-                scalar: $crate::config::value::Scalar<'_>,
-            ) -> Result<Self, $crate::config::value::Mistake> {
-                $crate::config::scalar::choose(scalar, Self::ALL)
-            }
-        }
-    };
-}
-pub(super) use choice;
-
-/// Reads one of a list of names.
-pub(super) fn choose<T: Copy>(scalar: Scalar<'_>, choices: &[(&str, T)]) -> Result<T, Mistake> {
-    let names = || choices.iter().map(|(name, _)| *name);
-    let expected = one_of(names());
-    let Scalar::Text(word) = scalar else {
-        return Err(scalar.refused("not one of the choices", expected));
-    };
-    let choice = choices.iter().find(|(name, _)| *name == word);
-    choice.map(|(_, choice)| *choice).ok_or(Mistake::Value {
-        problem: "unknown choice",
-        found: quote(word),
-        expected,
-        hint: did_you_mean(word, names()),
-    })
-}
 
 /// The version of the file format: 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -499,35 +443,4 @@ impl<T: Value> Value for OneOrList<T> {
 /// A number where something else would do as well.
 fn number_or(scalar: Scalar<'_>, expected: &str) -> Result<Number, Mistake> {
     Number::scalar(scalar).map_err(|mistake| mistake.expecting(|_| expected.to_owned()))
-}
-
-/// What to write instead of a text that was probably meant as a number.
-fn number_in(text: &str) -> Option<String> {
-    let text = text.trim();
-    let finite = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
-    if text.chars().count() > 64 || !text.contains(|c: char| c.is_ascii_digit()) {
-        return None;
-    }
-    if let Ok(value) = text.parse::<f64>() {
-        return Some(if value.is_finite() {
-            format!("write {value}, without quotes or leading zeros")
-        } else {
-            "the number is too large".to_owned()
-        });
-    }
-    if let Some(value) = finite(&text.replace(['_', ' ', '\''], "")) {
-        return Some(format!("write {value}"));
-    }
-    if text.matches(',').count() == 1
-        && let Some(value) = finite(&text.replace(',', "."))
-    {
-        return Some(format!("write {value}, with a decimal point"));
-    }
-    let (value, rest) = text
-        .char_indices()
-        .rev()
-        .find_map(|(end, _)| Some((finite(&text[..end])?, &text[end..])))?;
-    rest.trim_start()
-        .starts_with(|c: char| c.is_alphabetic() || "°%".contains(c))
-        .then(|| format!("write {value} alone, without a unit"))
 }

@@ -9,9 +9,9 @@ mod study;
 pub use experiment::*;
 pub use study::*;
 
-use crate::config::key::keys;
+use crate::config::map::keys;
 
-use super::scalar::choice;
+use super::choice::choice;
 pub use super::scalar::{ColumnSpec, WeightRule};
 use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList};
 use super::scalar::{Start, Text, Weight};
@@ -69,7 +69,7 @@ keys! {
 
 choice! {
     /// How the motion is stepped through time.
-    pub enum StepMethod {
+    pub type StepMethod = kmcfit_core::internals::system::Method {
         /// The midpoint rule of the paper.
         Midpoint = "midpoint",
         /// The classical Runge-Kutta method of order four.
@@ -194,7 +194,7 @@ keys! {
 
 choice! {
     /// Name of a coefficient function.
-    pub enum FunctionName {
+    pub type FunctionName = kmcfit_core::internals::functions::CoefficientKind {
         /// Mass m(t).
         Mass = "mass",
         /// Damping c(t).
@@ -250,7 +250,7 @@ keys! {
 
 choice! {
     /// Shape that a function must have.
-    pub enum ShapeName {
+    pub type ShapeName = kmcfit_core::internals::constraints::Shape {
         /// It never rises.
         NonIncreasing = "non-increasing",
         /// It never falls.
@@ -308,7 +308,7 @@ choice! {
 
 choice! {
     /// Where a fit starts.
-    pub enum InitialName {
+    pub type InitialName = kmcfit_core::internals::solvers::Initial {
         /// From the start values of the functions.
         Functions = "functions",
         /// From the smoothed readings, put into the equation of motion.
@@ -318,7 +318,7 @@ choice! {
 
 choice! {
     /// How the gradient is computed.
-    pub enum Gradient {
+    pub type Gradient = kmcfit_core::internals::objective::GradientKind {
         /// The exact gradient of the discretised cost.
         Discrete = "discrete",
         /// The adjoint differential equation, discretised afterwards.

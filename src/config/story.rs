@@ -5,7 +5,7 @@ use super::guard::{Checked, LONGEST_MODEL};
 use super::locate::{Segment, locate};
 use super::model_file::check_path;
 use super::scalar::{Format, Text};
-use crate::config::key::keys;
+use crate::config::map::keys;
 use crate::error::InputError;
 use crate::input::read_text;
 use std::path::{Path, PathBuf};

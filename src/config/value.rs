@@ -285,6 +285,41 @@ impl<'de, T: Value> DeserializeSeed<'de> for Reader<'_, T> {
     }
 }
 
+/// The visits of scalars, for a visitor that reads them all by its `scalar`.
+macro_rules! scalar_visits {
+    ($result:ty) => {
+        fn visit_unit<E: Error>(self) -> Result<$result, E> {
+            self.scalar(Scalar::Nothing)
+        }
+        fn visit_none<E: Error>(self) -> Result<$result, E> {
+            self.scalar(Scalar::Nothing)
+        }
+        fn visit_bool<E: Error>(self, value: bool) -> Result<$result, E> {
+            self.scalar(Scalar::Bool(value))
+        }
+        fn visit_u64<E: Error>(self, value: u64) -> Result<$result, E> {
+            self.scalar(Scalar::Integer(value.into()))
+        }
+        fn visit_i64<E: Error>(self, value: i64) -> Result<$result, E> {
+            self.scalar(Scalar::Integer(value.into()))
+        }
+        fn visit_i128<E: Error>(self, value: i128) -> Result<$result, E> {
+            self.scalar(Scalar::Integer(value))
+        }
+        fn visit_u128<E: Error>(self, value: u128) -> Result<$result, E> {
+            let integer = i128::try_from(value).map(Scalar::Integer);
+            self.scalar(integer.unwrap_or(Scalar::Float(value as f64)))
+        }
+        fn visit_f64<E: Error>(self, value: f64) -> Result<$result, E> {
+            self.scalar(Scalar::Float(value))
+        }
+        fn visit_str<E: Error>(self, value: &str) -> Result<$result, E> {
+            self.scalar(Scalar::Text(value))
+        }
+    };
+}
+pub(super) use scalar_visits;
+
 impl<'de, T: Value> Visitor<'de> for Reader<'_, T> {
     type Value = T;
 
@@ -292,34 +327,8 @@ impl<'de, T: Value> Visitor<'de> for Reader<'_, T> {
         f.write_str("text")
     }
 
-    fn visit_unit<E: Error>(self) -> Result<T, E> {
-        self.scalar(Scalar::Nothing)
-    }
-    fn visit_none<E: Error>(self) -> Result<T, E> {
-        self.scalar(Scalar::Nothing)
-    }
-    fn visit_bool<E: Error>(self, value: bool) -> Result<T, E> {
-        self.scalar(Scalar::Bool(value))
-    }
-    fn visit_u64<E: Error>(self, value: u64) -> Result<T, E> {
-        self.scalar(Scalar::Integer(value.into()))
-    }
-    fn visit_i64<E: Error>(self, value: i64) -> Result<T, E> {
-        self.scalar(Scalar::Integer(value.into()))
-    }
-    fn visit_i128<E: Error>(self, value: i128) -> Result<T, E> {
-        self.scalar(Scalar::Integer(value))
-    }
-    fn visit_u128<E: Error>(self, value: u128) -> Result<T, E> {
-        let integer = i128::try_from(value).map(Scalar::Integer);
-        self.scalar(integer.unwrap_or(Scalar::Float(value as f64)))
-    }
-    fn visit_f64<E: Error>(self, value: f64) -> Result<T, E> {
-        self.scalar(Scalar::Float(value))
-    }
-    fn visit_str<E: Error>(self, value: &str) -> Result<T, E> {
-        self.scalar(Scalar::Text(value))
-    }
+    scalar_visits!(T);
+
     fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<T, A::Error> {
         self.scalar(Scalar::Tag)
     }

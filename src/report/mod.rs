@@ -39,6 +39,7 @@ mod page;
 mod panel;
 mod predict;
 mod run;
+mod run_findings;
 mod seen;
 mod shape;
 pub mod study;

@@ -1,9 +1,9 @@
 //! Keys of an experiment: its file, channels, sensors, what drives it, and its beginning.
 
-use crate::config::key::keys;
+use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
-use crate::config::scalar::choice;
+use crate::config::choice::choice;
 use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
 use crate::config::scalar::{Sigma, Text};
 
@@ -275,7 +275,7 @@ keys! {
 
 choice! {
     /// How values between samples are found.
-    pub enum InterpolationName {
+    pub type InterpolationName = kmcfit_core::internals::signal::Interpolation {
         /// The last sample holds.
         Hold = "hold",
         /// Linear between samples.

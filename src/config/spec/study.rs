@@ -1,9 +1,9 @@
 //! Keys of a study.
 
-use crate::config::key::keys;
+use crate::config::map::keys;
 
 use super::{ForceSpec, FunctionName, StateSpec};
-use crate::config::scalar::choice;
+use crate::config::choice::choice;
 use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
@@ -99,7 +99,7 @@ keys! {
 
 choice! {
     /// Kind of a channel.
-    pub enum ChannelName {
+    pub type ChannelName = kmcfit_core::internals::record::ChannelKind {
         /// Displacement.
         Displacement = "displacement",
         /// Velocity.

@@ -3,7 +3,7 @@
 use super::source::{self, Wanted};
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
-use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
+use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
 use crate::units::Kind;
 use kmcfit_core::internals::record::{BaseMotion, Experiment, Input, Waveform};
@@ -73,7 +73,7 @@ pub fn read(
                 unit: units.and_then(|u| u.force.as_ref()),
                 beside: None,
             };
-            let meant = interpolation_of(interpolation, Interpolation::Linear);
+            let meant = interpolation.unwrap_or_default();
             Some(Waveform::Samples(signal(
                 file, spec, &wanted, meant, warnings,
             )?))
@@ -96,14 +96,12 @@ fn base(
     let acceleration = columns.and_then(|c| c.base_acceleration.as_ref());
     let displacement = columns.and_then(|c| c.base_displacement.as_ref());
     let interpolation = spec.base.as_ref().and_then(|b| b.interpolation);
-    let (column, is_acceleration) = match (acceleration, displacement) {
+    let (column, kind) = match (acceleration, displacement) {
+        (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
-            return match &spec.base {
-                Some(_) => Err(file
-                    .error_at(&format!("{key}.base"), "the motion of the base is missing")
-                    .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`")),
-                None => Ok(None),
-            };
+            return Err(file
+                .error_at(&format!("{key}.base"), "the motion of the base is missing")
+                .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`"));
         }
         (Some(_), Some(_)) => {
             return Err(file
@@ -114,57 +112,41 @@ fn base(
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
         }
-        (Some(column), None) => (column, true),
-        (None, Some(column)) => (column, false),
+        (Some(column), None) => (column, Kind::Acceleration),
+        (None, Some(column)) => (column, Kind::Displacement),
     };
-    if !is_acceleration && interpolation.is_some_and(|i| i != InterpolationName::Cubic) {
+    let wanted = |name, unit, kind| Wanted {
+        experiment: i,
+        name,
+        kind,
+        column,
+        unit,
+        beside: None,
+    };
+    if kind == Kind::Acceleration {
+        let unit = units.and_then(|u| u.base_acceleration.as_ref());
+        let wanted = wanted("base_acceleration", unit, kind);
+        let meant = interpolation.unwrap_or_default();
+        return signal(file, spec, &wanted, meant, warnings)
+            .map(|signal| Some(BaseMotion::Acceleration(signal)));
+    }
+    if let Some(given) = interpolation.filter(|i| *i != Interpolation::Cubic) {
+        let name = match given {
+            Interpolation::Hold => "`hold`",
+            _ => "`linear`",
+        };
         return Err(file
             .error_at(
                 &format!("{key}.base.interpolation"),
                 "a displacement of the base is differentiated twice, so it must be smooth",
             )
-            .found(format!(
-                "`{}`",
-                interpolation.map_or("", InterpolationName::name)
-            ))
+            .found(name)
             .expected("`cubic`"));
     }
-    let wanted = Wanted {
-        experiment: i,
-        name: match is_acceleration {
-            true => "base_acceleration",
-            false => "base_displacement",
-        },
-        kind: match is_acceleration {
-            true => Kind::Acceleration,
-            false => Kind::Displacement,
-        },
-        column,
-        unit: units.and_then(|u| match is_acceleration {
-            true => u.base_acceleration.as_ref(),
-            false => u.base_displacement.as_ref(),
-        }),
-        beside: None,
-    };
-    let usual = match is_acceleration {
-        true => Interpolation::Linear,
-        false => Interpolation::Cubic,
-    };
-    let meant = interpolation_of(interpolation, usual);
-    let signal = signal(file, spec, &wanted, meant, warnings)?;
-    Ok(Some(match is_acceleration {
-        true => BaseMotion::Acceleration(signal),
-        false => BaseMotion::Displacement(signal),
-    }))
-}
-
-fn interpolation_of(given: Option<InterpolationName>, usual: Interpolation) -> Interpolation {
-    match given {
-        None => usual,
-        Some(InterpolationName::Hold) => Interpolation::Hold,
-        Some(InterpolationName::Linear) => Interpolation::Linear,
-        Some(InterpolationName::Cubic) => Interpolation::Cubic,
-    }
+    let unit = units.and_then(|u| u.base_displacement.as_ref());
+    let wanted = wanted("base_displacement", unit, kind);
+    let signal = signal(file, spec, &wanted, Interpolation::Cubic, warnings)?;
+    Ok(Some(BaseMotion::Displacement(signal)))
 }
 
 /// A column as a signal; it must have no gaps, as what drives a motion acts at all times.
