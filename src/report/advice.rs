@@ -1,4 +1,4 @@
-//! What to try next. The summary in the terminal and the page say the same.
+//! Recommendations. The summary in the terminal and the page say the same.
 
 use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultDocument};
 use crate::digits::significant;
@@ -6,6 +6,7 @@ use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
 use kmcfit_core::internals::system::Method;
+use std::fmt;
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;
@@ -25,8 +26,100 @@ pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// What to try next, the most urgent first; at most three.
-pub fn next(document: &ResultDocument) -> Vec<String> {
+/// A recommendation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Advice {
+    /// A larger limit on iterations.
+    MoreIterations(u64),
+    /// A larger limit on time.
+    MoreTime,
+    /// To resume the fit.
+    Resume,
+    /// Gauss and Newton's method.
+    AnotherMethod,
+    /// Another starting point, softer constraints.
+    AnotherStart,
+    /// So many nodes.
+    FinerSteps(f64),
+    /// What the pattern of the residuals of a channel asks for.
+    Pattern {
+        /// Kind of the channel.
+        kind: String,
+        /// Whether its sigma is known.
+        has_sigma: bool,
+        /// The pattern.
+        pattern: PatternSummary,
+    },
+    /// A larger sigma.
+    LargerSigma {
+        /// Root-mean-square residual over sigma.
+        times: f64,
+        /// Fit of the worst channel, per cent.
+        fit: f64,
+    },
+    /// No other system: the residuals of a channel are noise.
+    NoneBetter {
+        /// Kind of the channel.
+        kind: String,
+        /// Its fit, per cent.
+        fit: f64,
+        /// Whether the residuals pass for white noise.
+        is_white: bool,
+    },
+    /// Another model of a record that is not matched.
+    Mismatch {
+        /// Kind of the channel and name of the record, where there are several channels.
+        channel: Option<(String, String)>,
+        /// Fit, per cent.
+        fit: f64,
+        /// Whether the start from the readings was not tried.
+        from_readings: bool,
+        /// The first suspect.
+        suspect: Suspect,
+        /// Force terms that the model does not have.
+        absent: Vec<&'static str>,
+    },
+    /// More freedom for residuals with a pattern that has no name.
+    MoreFreedom {
+        /// Force terms that the model does not have.
+        absent: Vec<&'static str>,
+    },
+    /// A constant in place of a function.
+    Constant {
+        /// Name of the function.
+        function: String,
+        /// Probability that noise alone lets it vary as much.
+        p_value: f64,
+    },
+    /// A study of a model whose parameters are not all identifiable.
+    StudyOfHidden {
+        /// Number of parameters, and the bound on those that are identifiable.
+        parameters: [usize; 2],
+        /// Whether fewer parameters or a penalty are left to try.
+        can_be_simpler: bool,
+    },
+    /// A study.
+    Study,
+}
+
+/// The first suspect where a record is hardly matched.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Suspect {
+    /// The force, or the motion of the base, and the initial state, unless that is estimated.
+    Drive {
+        /// Whether the base drives it.
+        is_base: bool,
+        /// Whether the initial state is given.
+        start_is_given: bool,
+    },
+    /// An unknown force.
+    UnknownForce,
+    /// The functions alone.
+    Functions,
+}
+
+/// Recommendations, the most urgent first; at most three.
+pub fn next(document: &ResultDocument) -> Vec<Advice> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
@@ -36,39 +129,34 @@ pub fn next(document: &ResultDocument) -> Vec<String> {
     }
     steps.extend(about_constants(document));
     let known = &document.identifiability;
-    let is_simulated = document.model.method != Solver::EquationError.name();
-    if is_simulated && document.model.parameters > 0 {
+    if is_simulated(document) && document.model.parameters > 0 {
         // Constraints may hold what the readings do not show.
         let is_open = known.seen < known.of && !known.open.is_empty();
         let is_smooth = document.cost.regularisation > 0.0;
-        let visible = format!(
-            "{} free values, {} of them visible at most",
-            known.of, known.seen
-        );
-        steps.push(match (is_open, is_smooth || changes_nothing(document)) {
-            (true, false) => format!(
-                "{visible}: fewer (knots), or add `smooth`; `kmcfit study` tells which are seen"
-            ),
-            (true, true) => format!("{visible}: `kmcfit study` tells which are seen"),
-            (false, _) => "`kmcfit study` tells how sure each function is, and with `study.candidates` which experiment would \
-                      show most"
-                .into(),
+        steps.push(match is_open {
+            true => Advice::StudyOfHidden {
+                parameters: [known.of, known.seen],
+                can_be_simpler: !is_smooth && !changes_nothing(document),
+            },
+            false => Advice::Study,
         });
     }
     steps.truncate(MOST);
     steps
 }
 
+fn is_simulated(document: &ResultDocument) -> bool {
+    document.model.method != Solver::EquationError.name()
+}
+
 /// A function that varies no more than noise lets a constant vary.
-fn about_constants(document: &ResultDocument) -> Option<String> {
+fn about_constants(document: &ResultDocument) -> Option<Advice> {
     let functions = document.functions.iter();
     let probable = functions.filter_map(|(name, f)| Some((name, f.constant_p_value?)));
-    let (name, p) = probable.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    (p >= SIGNIFICANCE).then(|| {
-        format!(
-            "a constant {name} would match as well (p = {}): basis: constant",
-            significant(p, 1)
-        )
+    let (name, p_value) = probable.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (p_value >= SIGNIFICANCE).then(|| Advice::Constant {
+        function: name.clone(),
+        p_value,
     })
 }
 
@@ -80,7 +168,7 @@ fn wanders(document: &ResultDocument) -> bool {
 }
 
 /// Steps that are too long, with as many nodes as would do by the order of the stepper.
-fn about_steps(document: &ResultDocument) -> Option<String> {
+fn about_steps(document: &ResultDocument) -> Option<Advice> {
     let half = document.half_step.as_ref()?;
     let is_exact = worst_fit(document).is_some_and(|worst| worst > EXACT);
     let beside_residuals = match is_exact {
@@ -102,58 +190,30 @@ fn about_steps(document: &ResultDocument) -> Option<String> {
         .clamp(2.0, 16.0)
         .ceil();
     let nodes = (document.model.nodes - 1) as f64 * finer + 1.0;
-    Some(format!("the steps are coarse: grid.nodes={nodes}"))
+    Some(Advice::FinerSteps(nodes))
 }
 
-/// Whether the initial state of a record is sought.
-fn start_is_sought(document: &ResultDocument, record: &str) -> bool {
-    let scalar = format!("initial displacement of {record}");
-    document.scalars.iter().any(|s| s.name == scalar)
-}
-
-/// What a record asks for that is hardly matched: its drive is doubted first.
-fn about_mismatch(document: &ResultDocument, record: &ExperimentSummary) -> String {
-    let drive = match record.driven_by.first().map(String::as_str) {
-        None => {
-            let worst =
-                (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
-            let unknown = match worst < HARDLY {
-                true => {
-                    ", or, if something unknown keeps it moving, compare accelerations instead of motions (fit.method=equation-error)"
-                }
-                false => "",
-            };
-            return more_freedom(document) + unknown;
-        }
-        Some("base") => "the motion of the base",
-        Some(_) => "the force",
+/// The first suspect where a record is hardly matched: its drive, if it has one.
+fn suspect(document: &ResultDocument, record: &ExperimentSummary) -> Suspect {
+    let Some(drive) = record.driven_by.first() else {
+        let worst = (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
+        return match worst < HARDLY {
+            true => Suspect::UnknownForce,
+            false => Suspect::Functions,
+        };
     };
-    let start = match start_is_sought(document, &record.name) {
-        true => "",
-        false => ", and the motion the right start (initial: estimate)",
-    };
-    format!(
-        "look whether {drive} has the right sign (`gain: -1` of a sensor turns it), unit and times{start}; or {}",
-        more_freedom(document)
-    )
-}
-
-/// Functions that change more, and terms that the model does not have.
-fn more_freedom(document: &ResultDocument) -> String {
-    let terms = [
-        ("cubic_stiffness", ""),
-        ("quadratic_damping", ""),
-        ("coulomb_friction", " with its width"),
-    ];
-    let absent = terms
-        .iter()
-        .filter(|(term, _)| !document.model.terms.iter().any(|t| t == term));
-    let absent: Vec<String> = absent.map(|(term, more)| format!("{term}{more}")).collect();
-    let functions = "let a function change more (basis: piecewise-linear, more knots)";
-    match absent.is_empty() {
-        true => functions.into(),
-        false => format!("{functions}, or add a term ({})", absent.join(", ")),
+    let start = format!("initial displacement of {}", record.name);
+    Suspect::Drive {
+        is_base: drive == "base",
+        start_is_given: !document.scalars.iter().any(|s| s.name == start),
     }
+}
+
+/// Terms that the model does not have.
+fn absent(document: &ResultDocument) -> Vec<&'static str> {
+    let terms = ["cubic_stiffness", "quadratic_damping", "coulomb_friction"];
+    let has = |term: &&str| document.model.terms.iter().any(|t| t == term);
+    terms.into_iter().filter(|term| !has(term)).collect()
 }
 
 /// Whether no function changes with time.
@@ -162,67 +222,77 @@ fn changes_nothing(document: &ResultDocument) -> bool {
 }
 
 /// What the residuals ask for.
-fn about_residuals(document: &ResultDocument) -> Option<String> {
+fn about_residuals(document: &ResultDocument) -> Option<Advice> {
     let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    let patterns = channels().filter_map(|c| Some((c, c.pattern.as_ref()?)));
-    if let Some((channel, pattern)) = patterns.into_iter().next() {
-        return Some(about_pattern(channel, pattern));
+    let mut patterns = channels().filter_map(|c| Some((c, c.pattern.clone()?)));
+    if let Some((channel, pattern)) = patterns.next() {
+        return Some(Advice::Pattern {
+            kind: channel.kind.clone(),
+            has_sigma: channel.sigma.is_some(),
+            pattern,
+        });
     }
-    let squares = document.statistics.reduced_chi_square;
-    let worst = worst_fit(document).unwrap_or(100.0);
-    if let Some(squares) = squares.filter(|squares| squares.sqrt() > BEYOND_SIGMA && worst > POOR) {
-        return Some(format!(
-            "the residuals are {:.1} times sigma, and the readings are matched to {}: sigma is too small (sigma: estimate)",
-            squares.sqrt(),
-            percent(worst, 2)
-        ));
+    let fit = worst_fit(document).unwrap_or(100.0);
+    let times = document.statistics.reduced_chi_square.map(f64::sqrt);
+    if let Some(times) = times.filter(|times| *times > BEYOND_SIGMA && fit > POOR) {
+        return Some(Advice::LargerSigma { times, fit });
     }
-    let is_coloured = |c: &&ChannelSummary| {
+    let is_coloured = |c: &ChannelSummary| {
         c.sigma.is_some()
             && c.fit_percent < EXACT
             && c.whiteness_p_value.is_some_and(|p| p < PATTERN)
     };
-    let tried = document
-        .rungs
-        .iter()
-        .any(|r| r.start != StartStrategy::StartValues.name());
-    let is_simulated = document.model.method != Solver::EquationError.name();
-    let elsewhere = match tried || !is_simulated {
-        true => "",
-        false => "start from the readings (fit.initial=data), or ",
-    };
-    let poor = |c: &&ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
-    let told = |c: &ChannelSummary| c.sigma.is_some() && c.whiteness_p_value.is_some();
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
-    match named.find(|(_, channel)| poor(channel)) {
-        Some((_, channel)) if told(channel) && !is_coloured(&channel) => {
-            let is_white = |p: f64| p >= SIGNIFICANCE;
-            let left = match channel.whiteness_p_value.is_some_and(is_white) {
-                true => "looks like noise",
-                false => "is nearly noise",
-            };
-            Some(format!(
-                "the {} is matched to {} only, but what is left {left}: no other device would do much better",
-                channel.kind,
-                percent(channel.fit_percent, 0)
-            ))
-        }
-        Some((record, channel)) => {
-            let matched = percent(channel.fit_percent, 0);
-            let what = match channels().count() {
-                1 => "the readings are".to_owned(),
-                _ => format!("the {} of {} is", channel.kind, record.name),
-            };
-            let more = about_mismatch(document, record);
-            Some(format!(
-                "{what} matched to {matched} only: {elsewhere}{more}"
-            ))
-        }
-        None => channels()
-            .any(|c| is_coloured(&c))
-            .then(|| format!("the residuals have a pattern: {}", more_freedom(document))),
+    let poor = |c: &ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
+    let Some((record, channel)) = named.find(|(_, channel)| poor(channel)) else {
+        let absent = absent(document);
+        return channels()
+            .any(is_coloured)
+            .then_some(Advice::MoreFreedom { absent });
+    };
+    let fit = channel.fit_percent;
+    let kind = channel.kind.clone();
+    if let (Some(_), Some(p), false) = (
+        channel.sigma,
+        channel.whiteness_p_value,
+        is_coloured(channel),
+    ) {
+        let is_white = p >= SIGNIFICANCE;
+        return Some(Advice::NoneBetter {
+            kind,
+            fit,
+            is_white,
+        });
     }
+    let start = StartStrategy::StartValues.name();
+    let tried = document.rungs.iter().any(|r| r.start != start);
+    Some(Advice::Mismatch {
+        channel: (channels().count() > 1).then(|| (kind, record.name.clone())),
+        fit,
+        from_readings: !tried && is_simulated(document),
+        suspect: suspect(document, record),
+        absent: absent(document),
+    })
+}
+
+fn about_ending(document: &ResultDocument) -> Option<Advice> {
+    let status = document.outcome.status.as_str();
+    let is = |s: Status| s.name() == status;
+    Some(match () {
+        () if is(Status::MaxIterations) => {
+            Advice::MoreIterations(10 * document.counts.iterations.max(1))
+        }
+        () if is(Status::TimeLimit) => Advice::MoreTime,
+        () if is(Status::Interrupted) => Advice::Resume,
+        () if is(Status::Stalled) && document.model.method != Solver::GaussNewton.name() => {
+            Advice::AnotherMethod
+        }
+        () if is(Status::Stalled) || is(Status::Infeasible) || is(Status::Failed) => {
+            Advice::AnotherStart
+        }
+        () => return None,
+    })
 }
 
 /// A share in per cent; one far below zero in powers of ten.
@@ -235,28 +305,161 @@ pub(super) fn percent(share: f64, digits: usize) -> String {
     }
 }
 
-fn about_pattern(channel: &ChannelSummary, pattern: &PatternSummary) -> String {
-    let kind = &channel.kind;
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Advice::MoreIterations(iterations) => {
+                write!(f, "the iterations ran out: fit.stop.iterations={iterations}")
+            }
+            Advice::MoreTime => f.write_str("the time ran out: a larger fit.stop.seconds"),
+            Advice::Resume => f.write_str("`kmcfit resume` goes on with this fit"),
+            Advice::AnotherMethod => {
+                let newton = Solver::GaussNewton.name();
+                write!(f, "the search is stuck: fit.method={newton}")
+            }
+            Advice::AnotherStart => f.write_str(
+                "start elsewhere: fit.initial=data, or other start values; soften constraints (soft)",
+            ),
+            Advice::FinerSteps(nodes) => write!(f, "the steps are coarse: grid.nodes={nodes}"),
+            Advice::Pattern {
+                kind,
+                has_sigma,
+                pattern,
+            } => write_pattern(f, kind, *has_sigma, pattern),
+            Advice::LargerSigma { times, fit } => write!(
+                f,
+                "the residuals are {times:.1} times sigma, and the readings are matched to {}: sigma is too small (sigma: \
+                 estimate)",
+                percent(*fit, 2)
+            ),
+            Advice::NoneBetter {
+                kind,
+                fit,
+                is_white,
+            } => {
+                let left = match is_white {
+                    true => "looks like noise",
+                    false => "is nearly noise",
+                };
+                let fit = percent(*fit, 0);
+                write!(
+                    f,
+                    "the {kind} is matched to {fit} only, but what is left {left}: no other device would do much better"
+                )
+            }
+            Advice::Mismatch {
+                channel,
+                fit,
+                from_readings,
+                suspect,
+                absent,
+            } => {
+                match channel {
+                    None => f.write_str("the readings are")?,
+                    Some((kind, record)) => write!(f, "the {kind} of {record} is")?,
+                }
+                write!(f, " matched to {} only: ", percent(*fit, 0))?;
+                if *from_readings {
+                    f.write_str("start from the readings (fit.initial=data), or ")?;
+                }
+                write_suspect(f, suspect, &more_freedom(absent))
+            }
+            Advice::MoreFreedom { absent } => {
+                write!(f, "the residuals have a pattern: {}", more_freedom(absent))
+            }
+            Advice::Constant { function, p_value } => write!(
+                f,
+                "a constant {function} would match as well (p = {}): basis: constant",
+                significant(*p_value, 1)
+            ),
+            Advice::StudyOfHidden {
+                parameters: [of, seen],
+                can_be_simpler,
+            } => {
+                write!(f, "{of} free values, {seen} of them visible at most: ")?;
+                if *can_be_simpler {
+                    f.write_str("fewer (knots), or add `smooth`; ")?;
+                }
+                f.write_str("`kmcfit study` tells which are seen")
+            }
+            Advice::Study => f.write_str(
+                "`kmcfit study` tells how sure each function is, and with `study.candidates` which experiment would show most",
+            ),
+        }
+    }
+}
+
+/// The suspect, and else what gives the functions more freedom.
+fn write_suspect(f: &mut fmt::Formatter<'_>, suspect: &Suspect, freedom: &str) -> fmt::Result {
+    let (drive, start_is_given) = match suspect {
+        Suspect::Functions => return f.write_str(freedom),
+        Suspect::UnknownForce => {
+            return write!(
+                f,
+                "{freedom}, or, if something unknown keeps it moving, compare accelerations instead of motions \
+                 (fit.method=equation-error)"
+            );
+        }
+        Suspect::Drive {
+            is_base: true,
+            start_is_given,
+        } => ("the motion of the base", start_is_given),
+        Suspect::Drive { start_is_given, .. } => ("the force", start_is_given),
+    };
+    let start = match start_is_given {
+        true => ", and the motion the right start (initial: estimate)",
+        false => "",
+    };
+    write!(
+        f,
+        "look whether {drive} has the right sign (`gain: -1` of a sensor turns it), unit and times{start}; or {freedom}"
+    )
+}
+
+/// Functions that change more, and terms that the model does not have.
+fn more_freedom(absent: &[&str]) -> String {
+    let functions = "let a function change more (basis: piecewise-linear, more knots)";
+    let terms = absent
+        .join(", ")
+        .replace("friction", "friction with its width");
+    match absent.is_empty() {
+        true => functions.into(),
+        false => format!("{functions}, or add a term ({terms})"),
+    }
+}
+
+fn write_pattern(
+    f: &mut fmt::Formatter<'_>,
+    kind: &str,
+    has_sigma: bool,
+    pattern: &PatternSummary,
+) -> fmt::Result {
     match pattern {
         PatternSummary::FarOff { readings, first } => {
-            let lie = match readings {
-                1 => format!("one reading of the {kind} lies far off, at {first} s"),
-                _ => {
-                    format!("{readings} readings of the {kind} lie far off, the first at {first} s")
-                }
+            match readings {
+                1 => write!(f, "one reading of the {kind} lies far off, at {first} s")?,
+                _ => write!(
+                    f,
+                    "{readings} readings of the {kind} lie far off, the first at {first} s"
+                )?,
+            }
+            let sigma = match has_sigma {
+                true => "",
+                false => ", with `sigma`",
             };
-            let sigma = match channel.sigma {
-                Some(_) => "",
-                None => ", with `sigma`",
-            };
-            format!("{lie}: a robust loss (loss: {{{kind}: huber}}{sigma}) in the experiment")
+            write!(
+                f,
+                ": a robust loss (loss: {{{kind}: huber}}{sigma}) in the experiment"
+            )
         }
-        PatternSummary::Offset => format!(
+        PatternSummary::Offset => write!(
+            f,
             "the residuals of the {kind} have an offset: sensors: {{{kind}: {{offset: estimate}}}} in the experiment"
         ),
         PatternSummary::Tone { frequency, beside } => {
             let end = if frequency > beside { "max" } else { "min" };
-            format!(
+            write!(
+                f,
                 "the residuals of the {kind} swing at {} Hz, the readings at {}: of a hum or another mode a band leaves \
                  little (band: {{{end}: {}}}) in the experiment",
                 significant(*frequency, 3),
@@ -264,31 +467,10 @@ fn about_pattern(channel: &ChannelSummary, pattern: &PatternSummary) -> String {
                 significant((frequency * beside).sqrt(), 2)
             )
         }
-        PatternSummary::Drift => format!(
+        PatternSummary::Drift => write!(
+            f,
             "the residuals of the {kind} drift: sensors: {{{kind}: {{offset: estimate, drift: estimate}}}} in the \
              experiment"
         ),
     }
-}
-
-fn about_ending(document: &ResultDocument) -> Option<String> {
-    let status = document.outcome.status.as_str();
-    let is = |s: Status| s.name() == status;
-    let newton = Solver::GaussNewton.name();
-    Some(match () {
-        () if is(Status::MaxIterations) => format!(
-            "the iterations ran out: fit.stop.iterations={}",
-            10 * document.counts.iterations.max(1)
-        ),
-        () if is(Status::TimeLimit) => "the time ran out: a larger fit.stop.seconds".into(),
-        () if is(Status::Interrupted) => "`kmcfit resume` goes on with this fit".into(),
-        () if is(Status::Stalled) && document.model.method != newton => {
-            format!("the search is stuck: fit.method={newton}")
-        }
-        () if is(Status::Stalled) || is(Status::Infeasible) || is(Status::Failed) => {
-            "start elsewhere: fit.initial=data, or other start values; soften constraints (soft)"
-                .into()
-        }
-        () => return None,
-    })
 }

@@ -16,7 +16,7 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
-mod advice;
+pub mod advice;
 mod axis;
 mod columns;
 pub mod compare;
