@@ -1,5 +1,6 @@
 //! The command line: one file per command, no numerics.
 
+mod analyses;
 mod arguments;
 mod check;
 mod compare;

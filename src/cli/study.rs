@@ -4,11 +4,12 @@ use super::compare::{children, claim, entries, files_of, side_by_side, verdict};
 use super::fit::{note_discarded, search};
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, OK, Overrides, inputs, interrupt, print, say, stem, unwritable,
+    Failure, NOT_CONVERGED, OK, Overrides, analyses, inputs, interrupt, print, say, stem,
+    unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
-use crate::report::study::{FitPiece, StudyDocument, gather};
+use crate::report::study::{FitPiece, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
@@ -17,6 +18,8 @@ use kmcfit_core::internals::identifiability::count;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -199,10 +202,12 @@ fn study(
             ..StudyDocument::default()
         },
     };
-    let done = work.run().map_err(|trouble| match trouble {
-        Trouble::Disk(error) => Failure::from(unwritable(folder.path(), &error)),
-        Trouble::Numerical(reason) => Failure::Numerical(reason),
-    })?;
+    let done = match work.run() {
+        Ok(()) => true,
+        Err(Trouble::Interrupted) => false,
+        Err(Trouble::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
+        Err(Trouble::Numerical(reason)) => return Err(Failure::Numerical(reason)),
+    };
     let mut document = work.document;
     if done {
         document.status = "complete".into();
@@ -261,6 +266,7 @@ fn fit_journal(folder: &Path, heading: &Heading, go_on: bool) -> Option<FitJourn
 
 /// Why a study cannot go on.
 enum Trouble {
+    Interrupted,
     Disk(io::Error),
     Numerical(String),
 }
@@ -270,6 +276,9 @@ impl From<io::Error> for Trouble {
         Trouble::Disk(error)
     }
 }
+
+/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation there.
+type Optimum<'a> = (&'a Problem, &'a [f64], &'a Evaluation);
 
 /// A study at work.
 struct Work<'a> {
@@ -285,91 +294,75 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn interrupted(&self) -> bool {
-        self.flag.load(Ordering::Relaxed)
+    /// All analyses, up to an interrupt.
+    fn run(&mut self) -> Result<(), Trouble> {
+        let (problem, theta, evaluation) = self.fit()?;
+        let optimum = (&problem, theta.as_slice(), &evaluation);
+        self.at_the_optimum(optimum)?;
+        self.further_fits(optimum)?;
+        self.extremes(optimum)
     }
 
-    /// All pieces; whether none was left out because of an interrupt.
-    fn run(&mut self) -> Result<bool, Trouble> {
-        let Some((problem, theta, evaluation)) = self.fit()? else {
-            return Ok(false);
-        };
-        let (plan, threads) = (&self.model.study, self.threads);
-        macro_rules! piece {
-            ($name:expr, $compute:expr) => {{
-                if self.interrupted() {
-                    return Ok(false);
-                }
-                let name: &str = $name;
-                if std::io::stderr().is_terminal() {
-                    say("studying", name);
-                }
-                let flag = Arc::clone(&self.flag);
-                // What an interrupt may have cut short is no piece.
-                let whole = || !flag.load(Ordering::Relaxed);
-                match self.journal.analysis(name, || $compute, whole)? {
-                    Some(result) => result,
-                    None => return Ok(false),
-                }
-            }};
-        }
-        let spectrum = piece!("spectrum", gather::spectrum(&problem, &theta, &evaluation));
-        self.document.spectrum = Some(spectrum);
-        let truth = self.model.truth.as_ref();
-        let bands = piece!(
-            "bands",
-            gather::bands(&problem, &theta, &evaluation, plan, truth)
-        );
-        self.document.bands = Some(bands);
+    /// Analyses of the linearised fit and of one number at a time.
+    fn at_the_optimum(&mut self, optimum: Optimum) -> Result<(), Trouble> {
+        let (problem, theta, evaluation) = optimum;
+        let model = self.model;
+        let plan = &model.study;
+        let spectrum = || analyses::spectrum(problem, theta, evaluation);
+        self.document.spectrum = Some(self.analysis("spectrum", spectrum)?);
+        let truth = model.truth.as_ref();
+        let bands = || analyses::bands(problem, theta, evaluation, plan, truth);
+        self.document.bands = Some(self.analysis("bands", bands)?);
         for (i, target) in plan.profiles.iter().enumerate() {
-            let Some(of) = gather::linear(&problem, target) else {
+            let Some(of) = analyses::linear(problem, target) else {
                 continue;
             };
-            let found = piece!(
-                &format!("profile {i}"),
-                gather::profile_of(&problem, &theta, &of, plan)
-            );
-            match found {
-                Ok(found) => self.document.profiles.push(found),
-                Err(reason) => self.fail(&format!("the profile of {}", of.name), &reason),
-            }
+            let profile = || analyses::profile_of(problem, theta, &of, plan);
+            let found = self.analysis(&format!("profile {i}"), profile)?;
+            let found = self.or_fail(&format!("the profile of {}", of.name), found);
+            self.document.profiles.extend(found);
         }
         if !plan.candidates.is_empty() {
-            self.document.candidates = piece!(
-                "candidates",
-                gather::candidates(&problem, &theta, &evaluation, &plan.candidates)
-            );
+            let candidates = || analyses::candidates(problem, theta, evaluation, &plan.candidates);
+            self.document.candidates = self.analysis("candidates", candidates)?;
         }
-        self.document.equivalents = piece!(
-            "equivalents",
-            gather::equivalents(&problem, &evaluation, &plan.equivalents)
-        );
+        let equivalents = || analyses::equivalents(problem, evaluation, &plan.equivalents);
+        self.document.equivalents = self.analysis("equivalents", equivalents)?;
+        Ok(())
+    }
+
+    /// Further fits: from other starting points, of constant functions, of other noise.
+    fn further_fits(&mut self, (problem, theta, _): Optimum) -> Result<(), Trouble> {
+        let (model, threads) = (self.model, self.threads);
+        let plan = &model.study;
         if plan.starts > 0 {
-            let found = piece!(
-                "starts",
-                gather::multistart(self.model, &problem, &theta, plan, threads)
-            );
-            self.document.multistart = Some(found);
+            let starts = || analyses::multistart(model, problem, theta, plan, threads);
+            self.document.multistart = Some(self.analysis("starts", starts)?);
         }
         if plan.varies {
-            match piece!("varies", gather::varies(&problem, &theta, plan, threads)) {
-                Ok(found) => self.document.varies = found,
-                Err(reason) => self.fail("whether each function varies", &reason),
-            }
+            let varies = || analyses::varies(problem, theta, plan, threads);
+            let found = self.analysis("varies", varies)?;
+            let found = self.or_fail("whether each function varies", found);
+            self.document.varies = found.unwrap_or_default();
         }
         if plan.replicates > 0 {
-            match piece!("refits", gather::refits(&problem, &theta, plan, threads)) {
-                Ok(found) => self.document.bootstrap = found,
-                Err(reason) => self.fail("refits", &reason),
-            }
+            let refits = || analyses::refits(problem, theta, plan, threads);
+            let found = self.analysis("refits", refits)?;
+            self.document.bootstrap = self.or_fail("refits", found).unwrap_or_default();
         }
-        let model = self.model;
-        let (tubes, predictions) = piece!("tubes", {
-            let level = gather::level(&problem, &theta, &evaluation, plan);
-            let (tubes, extremes) = gather::tubes(&problem, &theta, &level, plan, threads);
-            let predictions = gather::predictions(&problem, &theta, &evaluation, model, &extremes);
+        Ok(())
+    }
+
+    /// Extremes of the functions, and the predictions of the systems that have them.
+    fn extremes(&mut self, (problem, theta, evaluation): Optimum) -> Result<(), Trouble> {
+        let (model, threads) = (self.model, self.threads);
+        let plan = &model.study;
+        let (tubes, predictions) = self.analysis("tubes", || {
+            let level = analyses::level(problem, theta, evaluation, plan);
+            let (tubes, extremes) = analyses::tubes(problem, theta, &level, plan, threads);
+            let predictions = analyses::predictions(problem, theta, evaluation, model, &extremes);
             (tubes, predictions)
-        });
+        })?;
         if tubes.is_empty() {
             let reason = "the optimum itself is not within the stated level and the constraints";
             self.fail("tubes", reason);
@@ -377,15 +370,38 @@ impl Work<'_> {
         self.document.tubes = tubes;
         self.document.budgeted = !problem.penalties.is_empty();
         self.document.predictions = predictions;
-        Ok(true)
+        Ok(())
+    }
+
+    /// One analysis: from the journal, or computed now. An interrupt may have cut it short; then it is not kept.
+    fn analysis<T: Serialize + DeserializeOwned>(
+        &mut self,
+        name: &str,
+        compute: impl FnOnce() -> T,
+    ) -> Result<T, Trouble> {
+        let flag = Arc::clone(&self.flag);
+        let whole = || !flag.load(Ordering::Relaxed);
+        if !whole() {
+            return Err(Trouble::Interrupted);
+        }
+        if io::stderr().is_terminal() {
+            say("studying", name);
+        }
+        let found = self.journal.analysis(name, compute, whole)?;
+        found.ok_or(Trouble::Interrupted)
+    }
+
+    /// The result of an analysis, or a note of its failure.
+    fn or_fail<T>(&mut self, what: &str, found: Result<T, String>) -> Option<T> {
+        found.map_err(|reason| self.fail(what, &reason)).ok()
     }
 
     fn fail(&mut self, what: &str, reason: &str) {
         self.document.failures.push(format!("{what}: {reason}"));
     }
 
-    /// The fit, from the journal if it is there; `None` if it was interrupted.
-    fn fit(&mut self) -> Result<Option<(Problem, Vec<f64>, Evaluation)>, Trouble> {
+    /// The fit, from the journal if it is there.
+    fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), Trouble> {
         let model = self.model;
         let progress = Progress::new(&model.settings.stopping);
         let (folder, heading, go_on) = (self.folder, &self.heading, self.go_on);
@@ -396,30 +412,33 @@ impl Work<'_> {
             let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            interrupted = Some(gather::fit(problem, &found));
-            Ok::<_, String>(gather::fit(problem, &found))
+            interrupted = Some(analyses::fit(problem, &found));
+            Ok::<_, String>(analyses::fit(problem, &found))
         };
         let whole = || !flag.load(Ordering::Relaxed);
         let is_right = |kept: &Result<FitPiece, String>| {
             kept.as_ref()
-                .map_or(true, |fit| gather::is_of(&model.problem, fit))
+                .map_or(true, |fit| analyses::is_of(&model.problem, fit))
         };
         self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.analysis("fit", compute, whole)?;
         let Some(fitted) = fitted else {
             // The best so far is told, and the journal of the fit has what it goes on from.
             self.document.fit = interrupted;
-            return Ok(None);
+            return Err(Trouble::Interrupted);
         };
         let fit = fitted.map_err(Trouble::Numerical)?;
         FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted.name();
-        let problem = gather::as_fitted(&model.problem, &fit);
+        let problem = analyses::as_fitted(&model.problem, &fit);
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);
         let evaluation = problem
             .evaluate(&theta)
             .map_err(|breakdown| Trouble::Numerical(breakdown.to_string()))?;
-        Ok((!interrupted).then_some((problem, theta, evaluation)))
+        match interrupted {
+            true => Err(Trouble::Interrupted),
+            false => Ok((problem, theta, evaluation)),
+        }
     }
 }

@@ -38,6 +38,11 @@ impl<'a> Checked<'a> {
         Ok(Self(text))
     }
 
+    /// The text.
+    pub(super) fn text(&self) -> &'a str {
+        self.0
+    }
+
     /// The value of the text.
     #[allow(clippy::disallowed_methods, reason = "the text is checked")]
     pub(super) fn read<T: DeserializeOwned>(&self) -> Result<T, serde_yaml::Error> {

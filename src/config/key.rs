@@ -1,7 +1,7 @@
 //! Keys of a model file: meaning, kind of value, unit, default and an example of each.
 //!
-//! `keys!` declares the struct that reads a map together with this documentation, so that the reader, `kmcfit explain` and
-//! the JSON schema cannot disagree.
+//! `keys!` (`map.rs`) declares the struct that reads a map together with this documentation, so that the reader,
+//! `kmcfit explain` and the JSON schema cannot disagree.
 
 /// What may stand behind a key.
 #[derive(Debug, Clone, Copy)]
@@ -28,27 +28,6 @@ pub enum Kind {
     List(&'static Kind),
     /// One of several kinds.
     AnyOf(&'static [Kind]),
-}
-
-/// A type that is read from the value of a key.
-pub trait Value {
-    /// What may stand behind the key.
-    const KIND: Kind;
-    /// Whether the key must be there.
-    const REQUIRED: bool = true;
-}
-
-impl<T: Value> Value for Option<T> {
-    const KIND: Kind = T::KIND;
-    const REQUIRED: bool = false;
-}
-
-impl<T: Value> Value for Vec<T> {
-    const KIND: Kind = Kind::List(&T::KIND);
-}
-
-impl Value for bool {
-    const KIND: Kind = Kind::Bool;
 }
 
 /// Keys that stand together in one map.
@@ -92,60 +71,3 @@ impl Kind {
         }
     }
 }
-
-/// Declares a map of a model file: a struct that serde reads, and the documentation of its keys. A field that is no
-/// `Option` is a required key.
-macro_rules! keys {
-    (
-        $(#[doc = $text:literal])+
-        pub struct $name:ident $(($derive:ident))? = $group:literal, expecting $expecting:literal {$(
-            $(#[doc = $about:literal])+
-            $key:ident: $value:ty,
-            example $example:literal
-            $(, unit $unit:literal)?
-            $(, default $default:literal)?;
-        )+}
-    ) => {
-        $(#[doc = $text])+
-        #[derive(Debug, Clone, $($derive,)? PartialEq, serde::Deserialize)]
-        #[serde(deny_unknown_fields, expecting = $expecting)]
-        pub struct $name {$(
-            $(#[doc = $about])+
-            pub $key: $value,
-        )+}
-
-        impl $name {
-            /// The keys of the map.
-            pub const GROUP: &'static $crate::config::key::Group = {
-                static GROUP: $crate::config::key::Group = $crate::config::key::Group {
-                    name: $group,
-                    text: concat!($($text),+).trim_ascii_start(),
-                    keys: &[$($crate::config::key::Key {
-                        name: stringify!($key),
-                        kind: <$value as $crate::config::key::Value>::KIND,
-                        text: concat!($($about),+).trim_ascii_start(),
-                        example: $example,
-                        unit: $crate::config::key::given(&[$($unit)?]),
-                        default: $crate::config::key::given(&[$($default)?]),
-                        required: <$value as $crate::config::key::Value>::REQUIRED,
-                    }),+],
-                };
-                &GROUP
-            };
-        }
-
-        impl $crate::config::key::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Map($name::GROUP);
-        }
-    };
-}
-
-/// The only text, if there is one.
-pub const fn given(texts: &[&'static str]) -> Option<&'static str> {
-    match texts {
-        [] => None,
-        [text, ..] => Some(text),
-    }
-}
-
-pub(super) use keys;

@@ -6,13 +6,14 @@
 //! finds the line of a key again.
 
 mod build;
-mod complaint;
+mod choice;
 mod expansion;
 mod failure;
 mod guard;
 pub mod key;
 pub mod keys;
 pub mod locate;
+mod map;
 mod model_file;
 mod overrides;
 pub mod scalar;
@@ -21,6 +22,7 @@ pub mod spec;
 mod starter;
 mod story;
 mod syntax;
+mod value;
 
 pub use build::{
     Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, Purpose, StudyPlan,

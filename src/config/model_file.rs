@@ -131,9 +131,7 @@ impl ModelFile {
                 .expected(MODEL_FILE)
                 .hint("begin with `format: 1`"));
         }
-        let spec = Checked::new(&path, &text)?
-            .read()
-            .map_err(|error| failure::input_error(&path, &text, &error))?;
+        let spec = failure::read(&path, &Checked::new(&path, &text)?)?;
         let model = Self {
             path,
             text,

@@ -9,15 +9,12 @@ mod study;
 pub use experiment::*;
 pub use study::*;
 
-use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
+use crate::config::map::keys;
 
+use super::choice::choice;
 pub use super::scalar::{ColumnSpec, WeightRule};
-use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList, OneOrMany};
-use super::scalar::{Scalar, Start, Text, Weight};
-use super::scalar::{choice, deserialize_scalar, scalar_visits};
+use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList};
+use super::scalar::{Start, Text, Weight};
 
 keys! {
     /// A model: records of one device, what is sought, and how.
@@ -72,7 +69,7 @@ keys! {
 
 choice! {
     /// How the motion is stepped through time.
-    pub enum StepMethod {
+    pub type StepMethod = kmcfit_core::internals::system::Method {
         /// The midpoint rule of the paper.
         Midpoint = "midpoint",
         /// The classical Runge-Kutta method of order four.
@@ -148,7 +145,7 @@ keys! {
         /// Largest value allowed.
         max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
         /// Penalty on squared derivatives, added to J; or a list of such.
-        smooth: Option<OneOrMany<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
+        smooth: Option<OneOrList<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
         /// Penalty on the total variation: a jump costs no more than a slow change.
         variation: Option<VariationSpec>, example "{weight: 0.01}", default "none";
         /// Of Coulomb friction: speed over which the sign of the velocity is smoothed, well below the speeds of the
@@ -197,7 +194,7 @@ keys! {
 
 choice! {
     /// Name of a coefficient function.
-    pub enum FunctionName {
+    pub type FunctionName = kmcfit_core::internals::functions::CoefficientKind {
         /// Mass m(t).
         Mass = "mass",
         /// Damping c(t).
@@ -253,7 +250,7 @@ keys! {
 
 choice! {
     /// Shape that a function must have.
-    pub enum ShapeName {
+    pub type ShapeName = kmcfit_core::internals::constraints::Shape {
         /// It never rises.
         NonIncreasing = "non-increasing",
         /// It never falls.
@@ -311,7 +308,7 @@ choice! {
 
 choice! {
     /// Where a fit starts.
-    pub enum InitialName {
+    pub type InitialName = kmcfit_core::internals::solvers::Initial {
         /// From the start values of the functions.
         Functions = "functions",
         /// From the smoothed readings, put into the equation of motion.
@@ -321,7 +318,7 @@ choice! {
 
 choice! {
     /// How the gradient is computed.
-    pub enum Gradient {
+    pub type Gradient = kmcfit_core::internals::objective::GradientKind {
         /// The exact gradient of the discretised cost.
         Discrete = "discrete",
         /// The adjoint differential equation, discretised afterwards.

@@ -5,7 +5,7 @@ use super::guard::{Checked, LONGEST_MODEL};
 use super::locate::{Segment, locate};
 use super::model_file::check_path;
 use super::scalar::{Format, Text};
-use crate::config::key::keys;
+use crate::config::map::keys;
 use crate::error::InputError;
 use crate::input::read_text;
 use std::path::{Path, PathBuf};
@@ -44,9 +44,7 @@ impl Story {
         if locate(&text, &[Segment::Key("story".into())]).depth == 0 {
             return Ok(None);
         }
-        let spec: StorySpec = checked
-            .read()
-            .map_err(|error| failure::input_error(path, &text, &error))?;
+        let spec: StorySpec = failure::read(path, &checked)?;
         if spec.story.is_empty() {
             return Err(InputError::file(path, "the story has no model")
                 .key("story")

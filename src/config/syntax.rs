@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::locate::place;
 use super::locate::{self, Position};
+use super::value::Scalar;
 use crate::error::InputError;
 use crate::input::quote;
 
@@ -121,6 +122,16 @@ pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) ->
         Some(line) => problem.expected(format!("the end of what begins in line {line}")),
         None => problem,
     }
+}
+
+/// A list or a map in the place of a text. The YAML crate refuses these itself, and says so as text alone.
+pub(super) fn unexpected(error: &serde_yaml::Error) -> Option<Scalar<'static>> {
+    let message = error.to_string();
+    let kinds = [("sequence", Scalar::List), ("map", Scalar::Map)];
+    let mut kinds = kinds.into_iter();
+    kinds.find_map(|(kind, found)| {
+        (message.contains(&format!("invalid type: {kind}, expected text"))).then_some(found)
+    })
 }
 
 /// The error for a character that YAML does not allow; the parser does not say where it is.

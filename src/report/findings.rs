@@ -23,6 +23,14 @@ pub fn unidentified(why: &Unidentified) -> String {
     format!("the device is not identified: {why}")
 }
 
+/// A record that took no part in the fit and is matched to so many per cent only.
+pub fn unpredicted((record, percent): (&str, f64)) -> String {
+    format!(
+        "the record `{record}`, which was held out, is matched to {} only: the device does not predict it",
+        super::advice::percent(percent, 0)
+    )
+}
+
 /// A warning.
 pub fn warning(warning: &FitWarning) -> String {
     match warning {

@@ -2,7 +2,7 @@
 
 use super::seen::SeenChannel;
 use crate::config::{HoldOut, Model};
-use kmcfit_core::internals::assessment::{FitAssessment, StepCheck};
+use kmcfit_core::internals::assessment::{FitAssessment, POOR, StepCheck, diagnostics};
 use kmcfit_core::internals::identifiability::{Bands, Judgement};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -71,6 +71,15 @@ impl HeldOut {
                 &model.settings,
             ),
         }
+    }
+
+    /// Its name and the fit of its worst channel, per cent, where the found system does not predict it.
+    pub fn poor(&self) -> Option<(&str, f64)> {
+        let channels = self.channels();
+        let fits = channels.iter();
+        let fits = fits.map(|c| diagnostics(c.channel, c.predicted).fit_percent);
+        let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
+        Some((&self.out.experiment.name, worst))
     }
 
     /// Its channels; none where there is no motion.

@@ -16,7 +16,7 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
-mod advice;
+pub mod advice;
 mod axis;
 mod columns;
 pub mod compare;
@@ -27,7 +27,7 @@ pub mod document;
 mod drawn;
 pub mod figure;
 pub mod figures;
-mod findings;
+pub(crate) mod findings;
 mod finished;
 mod knowledge;
 mod known;
@@ -39,6 +39,7 @@ mod page;
 mod panel;
 mod predict;
 mod run;
+mod run_findings;
 mod seen;
 mod shape;
 pub mod study;

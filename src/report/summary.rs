@@ -1,6 +1,6 @@
 //! What a person reads in ten seconds.
 
-use super::advice;
+use super::advice::{self, Advice};
 use super::cost::CostKind;
 use super::document::ChannelSummary;
 use super::document::{Prediction, ResultDocument};
@@ -103,7 +103,13 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
         ("how well", well.into_iter().collect()),
         ("how sure", known.settled.clone()),
         ("open", known.open.clone()),
-        ("try next", advice::next(document)),
+        (
+            "try next",
+            advice::next(document)
+                .iter()
+                .map(Advice::to_string)
+                .collect(),
+        ),
     ] {
         for (i, sentence) in sentences.iter().enumerate() {
             let label = if i == 0 { label } else { "" };

@@ -2,6 +2,9 @@
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
+use kmcfit::report::Run;
+use kmcfit::report::advice::{self, Advice};
+use kmcfit::report::document::PatternSummary;
 use serde_json::Value;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -119,6 +122,18 @@ fn what_to_try_next_helps() {
             summary.contains(&format!("try next  {advice}\n")),
             "{summary}"
         );
+        let run = Run::open(bench.path("runs/model")).expect("a run");
+        let advised = advice::next(&run.document);
+        let Some(Advice::Pattern { kind, pattern, .. }) = advised.first() else {
+            panic!("{advised:?}");
+        };
+        let is_named = match pattern {
+            PatternSummary::FarOff { readings, .. } => *readings == 3 && cure.contains("huber"),
+            PatternSummary::Offset => !cure.contains("drift"),
+            PatternSummary::Drift => cure.contains("drift"),
+            PatternSummary::Tone { .. } => false,
+        };
+        assert!(kind == "displacement" && is_named, "{pattern:?}");
         bench.write(
             "model.yaml",
             &spoilt.replace(sigma, &format!("{sigma}{cure}")),

@@ -2,7 +2,7 @@
 
 use super::Purpose;
 use super::experiments::is_held_out;
-use crate::config::spec::{FitMethod, Gradient, InitialName, StopSpec};
+use crate::config::spec::{FitMethod, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use kmcfit_core::internals::objective::GradientKind;
@@ -25,17 +25,14 @@ pub(super) fn build(
     takes_steps(file, solver)?;
     can_constrain(file, problem, solver)?;
     can_regularise(file, problem, searches, solver)?;
-    let initial = match spec.and_then(|f| f.initial) {
-        Some(InitialName::Functions) | None => Initial::Functions,
-        Some(InitialName::Data) => Initial::Data,
-    };
+    let initial = spec.and_then(|f| f.initial);
     let stopping = match spec.and_then(|f| f.stop.as_ref()) {
         Some(stop) => stopping(file, stop)?,
         None => Stopping::default(),
     };
     Ok(FitSettings {
         solver,
-        initial,
+        initial: initial.unwrap_or(Initial::Functions),
         gradient,
         stopping,
         interrupt: None,
@@ -159,22 +156,18 @@ fn can_regularise(
 }
 
 fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputError> {
-    match file.spec.fit.as_ref().and_then(|f| f.gradient) {
-        Some(Gradient::Discrete) | None => Ok(GradientKind::Discrete),
-        Some(Gradient::Continuous) => {
-            let has_readings = problem.experiments.iter().any(|e| !e.channels.is_empty());
-            if has_readings && !problem.supports_continuous() {
-                return Err(file
-                    .error_at(
-                        "fit.gradient",
-                        "the continuous adjoint is that of the integral cost with a reading at every node",
-                    )
-                    .found("`continuous` with a sigma or with fewer readings than nodes")
-                    .expected("`discrete`, which has no such limits"));
-            }
-            Ok(GradientKind::Continuous)
-        }
+    let asked = file.spec.fit.as_ref().and_then(|f| f.gradient);
+    let has_readings = problem.experiments.iter().any(|e| !e.channels.is_empty());
+    if asked == Some(GradientKind::Continuous) && has_readings && !problem.supports_continuous() {
+        return Err(file
+            .error_at(
+                "fit.gradient",
+                "the continuous adjoint is that of the integral cost with a reading at every node",
+            )
+            .found("`continuous` with a sigma or with fewer readings than nodes")
+            .expected("`discrete`, which has no such limits"));
     }
+    Ok(asked.unwrap_or(GradientKind::Discrete))
 }
 
 fn memory(file: &ModelFile) -> Result<Option<usize>, InputError> {

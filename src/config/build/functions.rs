@@ -7,11 +7,26 @@ mod start;
 use super::on_grid::{Wanted, column_on_grid};
 use crate::config::ModelFile;
 use crate::config::NumberOrColumn;
-use crate::config::scalar::Start;
-use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, OwnFunctionsSpec};
+use crate::config::scalar::{Start, Text};
+use crate::config::spec::{Basis, ColumnSpec, FunctionSpec};
 use crate::error::InputError;
 use kmcfit_core::internals::functions::{self, CoefficientFunction, CoefficientKind};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients, Term};
+
+/// The part of a map with a key for each function, required or not.
+macro_rules! by_kind {
+    ($map:expr, $kind:expr) => {
+        match $kind {
+            CoefficientKind::Mass => Option::from(&$map.mass),
+            CoefficientKind::Damping => Option::from(&$map.damping),
+            CoefficientKind::Stiffness => Option::from(&$map.stiffness),
+            CoefficientKind::CubicStiffness => $map.cubic_stiffness.as_ref(),
+            CoefficientKind::QuadraticDamping => $map.quadratic_damping.as_ref(),
+            CoefficientKind::CoulombFriction => $map.coulomb_friction.as_ref(),
+            CoefficientKind::Offset => $map.offset.as_ref(),
+        }
+    };
+}
 
 /// A function as the model gives it, and where.
 pub(super) struct Slot<'a> {
@@ -33,7 +48,7 @@ pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
         Some(Slot {
             key: format!("functions.{}", quantity.name()),
             quantity,
-            spec: main_spec(file, quantity)?,
+            spec: by_kind!(file.spec.functions, quantity)?,
             owner: None,
         })
     });
@@ -46,7 +61,7 @@ pub(super) fn slots(file: &ModelFile) -> Vec<Slot<'_>> {
             Some(Slot {
                 key: format!("experiments[{i}].functions.{}", quantity.name()),
                 quantity,
-                spec: own_spec(own, quantity)?,
+                spec: by_kind!(own, quantity)?,
                 owner: Some(i),
             })
         }));
@@ -205,31 +220,6 @@ pub(super) fn build(
     Ok(list)
 }
 
-fn main_spec(file: &ModelFile, quantity: CoefficientKind) -> Option<&FunctionSpec> {
-    let functions = &file.spec.functions;
-    match quantity {
-        CoefficientKind::Mass => Some(&functions.mass),
-        CoefficientKind::Damping => Some(&functions.damping),
-        CoefficientKind::Stiffness => Some(&functions.stiffness),
-        CoefficientKind::CubicStiffness => functions.cubic_stiffness.as_ref(),
-        CoefficientKind::QuadraticDamping => functions.quadratic_damping.as_ref(),
-        CoefficientKind::CoulombFriction => functions.coulomb_friction.as_ref(),
-        CoefficientKind::Offset => functions.offset.as_ref(),
-    }
-}
-
-fn own_spec(own: &OwnFunctionsSpec, quantity: CoefficientKind) -> Option<&FunctionSpec> {
-    match quantity {
-        CoefficientKind::Mass => own.mass.as_ref(),
-        CoefficientKind::Damping => own.damping.as_ref(),
-        CoefficientKind::Stiffness => own.stiffness.as_ref(),
-        CoefficientKind::CubicStiffness => own.cubic_stiffness.as_ref(),
-        CoefficientKind::QuadraticDamping => own.quadratic_damping.as_ref(),
-        CoefficientKind::CoulombFriction => own.coulomb_friction.as_ref(),
-        CoefficientKind::Offset => own.offset.as_ref(),
-    }
-}
-
 fn function(file: &ModelFile, grid: &Grid, slot: &Slot) -> Result<CoefficientFunction, InputError> {
     let (key, quantity, spec) = (slot.key.as_str(), slot.quantity, slot.spec);
     basis::keys_fit(file, key, spec)?;
@@ -335,15 +325,7 @@ pub(super) fn truth(
         return Ok(None);
     };
     let column = |quantity: CoefficientKind| {
-        let named = spec.columns.as_ref().and_then(|c| match quantity {
-            CoefficientKind::Mass => c.mass.as_ref(),
-            CoefficientKind::Damping => c.damping.as_ref(),
-            CoefficientKind::Stiffness => c.stiffness.as_ref(),
-            CoefficientKind::CubicStiffness => c.cubic_stiffness.as_ref(),
-            CoefficientKind::QuadraticDamping => c.quadratic_damping.as_ref(),
-            CoefficientKind::CoulombFriction => c.coulomb_friction.as_ref(),
-            CoefficientKind::Offset => c.offset.as_ref(),
-        });
+        let named: Option<&Text> = (spec.columns.as_ref()).and_then(|c| by_kind!(c, quantity));
         let name = named.map_or(quantity.column(), |name| name.0.as_str());
         let wanted = Wanted {
             data: &spec.data.0,

@@ -7,7 +7,6 @@ use super::Purpose;
 use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
-use crate::config::spec::StepMethod;
 use crate::error::{InputError, Place};
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
@@ -142,8 +141,6 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
 
 /// The stepper; classical Runge–Kutta unless the model says otherwise.
 pub(super) fn method(file: &ModelFile) -> Method {
-    match file.spec.grid.as_ref().and_then(|g| g.method) {
-        Some(StepMethod::Midpoint) => Method::Midpoint,
-        Some(StepMethod::Rk4) | None => Method::Rk4,
-    }
+    let method = file.spec.grid.as_ref().and_then(|g| g.method);
+    method.unwrap_or(Method::Rk4)
 }

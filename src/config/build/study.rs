@@ -5,12 +5,11 @@ use super::functions::values;
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
 use crate::config::spec::{
-    CandidateSpec, ChannelName, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
+    CandidateSpec, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
 };
 use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::did_you_mean;
-use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
@@ -315,14 +314,11 @@ fn function(
     file: &ModelFile,
     problem: &Problem,
     key: &str,
-    name: FunctionName,
+    quantity: FunctionName,
 ) -> Result<usize, InputError> {
-    let quantity = CoefficientKind::ALL
-        .into_iter()
-        .find(|q| q.name() == name.name());
     let main = problem.functions.assembly(0);
-    let of = |f: &&usize| Some(problem.functions.get(**f).quantity) == quantity;
-    let key = format!("{key}.function");
+    let of = |f: &&usize| problem.functions.get(**f).quantity == quantity;
+    let (key, name) = (format!("{key}.function"), quantity.name());
     match main.iter().find(of) {
         Some(&f) if problem.functions.get(f).parameters() > 0 => Ok(f),
         Some(_) => Err(file
@@ -354,11 +350,7 @@ fn candidate(
         experiment.drive = Input { force, base: None };
         experiment.excitation = Some(experiment.drive.on(grid, nodes));
     }
-    let kind = match spec.channel {
-        None | Some(ChannelName::Displacement) => ChannelKind::Displacement,
-        Some(ChannelName::Velocity) => ChannelKind::Velocity,
-        Some(ChannelName::Acceleration) => ChannelKind::Acceleration,
-    };
+    let kind = spec.channel.unwrap_or(ChannelKind::Displacement);
     let weighting = match (spec.sigma, problem.channels().next()) {
         (Some(sigma), _) if sigma.0 <= 0.0 => {
             return Err(file

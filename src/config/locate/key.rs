@@ -1,5 +1,6 @@
 //! The reader of one key of a map.
 
+use crate::config::value::{Scalar, scalar_visits};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::cell::Cell;
 use std::fmt;
@@ -25,13 +26,15 @@ impl<'de> DeserializeSeed<'de> for Key<'_> {
     }
 }
 
-/// Keys that are no text are never wanted.
-macro_rules! other_key {
-    ($($visit:ident($($value:ty)?)),+) => {$(
-        fn $visit<E: Error>(self $(, _: $value)?) -> Result<bool, E> {
-            Ok(false)
+impl Key<'_> {
+    /// A key that is no text is never the wanted one.
+    fn scalar<E: Error>(self, key: Scalar<'_>) -> Result<bool, E> {
+        let same = matches!(key, Scalar::Text(key) if self.wanted == Some(key));
+        match self.stop.filter(|_| same) {
+            Some(hit) => Err(stop(hit)),
+            None => Ok(same),
         }
-    )+};
+    }
 }
 
 impl<'de> Visitor<'de> for Key<'_> {
@@ -41,24 +44,7 @@ impl<'de> Visitor<'de> for Key<'_> {
         f.write_str("a key")
     }
 
-    fn visit_str<E: Error>(self, key: &str) -> Result<bool, E> {
-        let same = self.wanted == Some(key);
-        match self.stop.filter(|_| same) {
-            Some(hit) => Err(stop(hit)),
-            None => Ok(same),
-        }
-    }
-
-    other_key!(
-        visit_unit(),
-        visit_none(),
-        visit_bool(bool),
-        visit_u64(u64),
-        visit_i64(i64),
-        visit_u128(u128),
-        visit_i128(i128),
-        visit_f64(f64)
-    );
+    scalar_visits!(bool);
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<bool, A::Error> {
         while list.next_element::<IgnoredAny>()?.is_some() {}

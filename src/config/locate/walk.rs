@@ -2,6 +2,7 @@
 
 use super::Segment;
 use super::key::{Key, stop};
+use crate::config::value::{Scalar, scalar_visits};
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };
@@ -28,6 +29,14 @@ impl Walk<'_> {
     pub fn stop<E: Error>(&self) -> E {
         stop(self.hit)
     }
+
+    /// A scalar: stop if it is the goal, go on if it is not.
+    fn scalar<E: Error>(self, _: Scalar<'_>) -> Result<(), E> {
+        match self.path.is_empty() && self.goal == Goal::Value {
+            true => Err(self.stop()),
+            false => Ok(()),
+        }
+    }
 }
 
 impl<'de> DeserializeSeed<'de> for Walk<'_> {
@@ -38,18 +47,6 @@ impl<'de> DeserializeSeed<'de> for Walk<'_> {
     }
 }
 
-/// What a walk does with a scalar: stop if it is the goal, go on if it is not.
-macro_rules! at_scalar {
-    ($($visit:ident($($value:ty)?)),+) => {$(
-        fn $visit<E: Error>(self $(, _: $value)?) -> Result<(), E> {
-            match self.path.is_empty() && self.goal == Goal::Value {
-                true => Err(self.stop()),
-                false => Ok(()),
-            }
-        }
-    )+};
-}
-
 impl<'de> Visitor<'de> for Walk<'_> {
     type Value = ();
 
@@ -57,17 +54,7 @@ impl<'de> Visitor<'de> for Walk<'_> {
         f.write_str("anything")
     }
 
-    at_scalar!(
-        visit_unit(),
-        visit_none(),
-        visit_bool(bool),
-        visit_u64(u64),
-        visit_i64(i64),
-        visit_u128(u128),
-        visit_i128(i128),
-        visit_f64(f64),
-        visit_str(&str)
-    );
+    scalar_visits!(());
 
     fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<(), A::Error> {
         match self.path.is_empty() && self.goal == Goal::Value {

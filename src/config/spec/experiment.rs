@@ -1,16 +1,11 @@
 //! Keys of an experiment: its file, channels, sensors, what drives it, and its beginning.
 
-use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
+use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
-use crate::config::scalar::{
-    ColumnId, Count, Estimate, Number, NumberOrEstimate, Scalar, ScalarOr,
-};
+use crate::config::choice::choice;
+use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
 use crate::config::scalar::{Sigma, Text};
-use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
 
 keys! {
     /// One record.
@@ -280,7 +275,7 @@ keys! {
 
 choice! {
     /// How values between samples are found.
-    pub enum InterpolationName {
+    pub type InterpolationName = kmcfit_core::internals::signal::Interpolation {
         /// The last sample holds.
         Hold = "hold",
         /// Linear between samples.

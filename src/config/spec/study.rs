@@ -1,13 +1,10 @@
 //! Keys of a study.
 
-use crate::config::key::keys;
-use serde::Deserialize;
-use serde::de::{Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
-use std::fmt;
+use crate::config::map::keys;
 
 use super::{ForceSpec, FunctionName, StateSpec};
-use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Scalar, Text};
-use crate::config::scalar::{choice, deserialize_scalar, scalar_visits};
+use crate::config::choice::choice;
+use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
     /// What `kmcfit study` looks into besides what it always does.
@@ -102,7 +99,7 @@ keys! {
 
 choice! {
     /// Kind of a channel.
-    pub enum ChannelName {
+    pub type ChannelName = kmcfit_core::internals::record::ChannelKind {
         /// Displacement.
         Displacement = "displacement",
         /// Velocity.

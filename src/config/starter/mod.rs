@@ -119,87 +119,11 @@ fn text(
         quoted(&name),
         quoted(data)
     );
-    let mut line = |key: &str, value: String, comment: &str| {
-        text += &commented(&format!("{key}{value}"), comment);
-    };
-    line(
-        "    columns: ",
-        columns.named(table),
-        "by name or by number from 1",
-    );
-    if let Some(rate) = sample_rate {
-        line("    sample_rate: ", rate.to_string(), "Hz");
-    }
-    if let Some(units) = columns.units() {
-        line("    units: ", units, "converted to SI");
-    }
-    if let Some(begins) = motion.begins {
-        line(
-            "    window: ",
-            format!("{{min: {begins}}}"),
-            "s; before, nothing moves: the device is held or not yet struck",
-        );
-    }
-    let between = format!("{{interpolation: {}}}", motion.between);
-    if columns.has(Role::Force) {
-        line(
-            "    force: ",
-            between.clone(),
-            "between samples: or hold, linear, cubic",
-        );
-    }
-    if columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement) {
-        line(
-            "    base: ",
-            between,
-            "between samples: or hold, linear, cubic",
-        );
-    }
-    let sigmas: Vec<String> = (columns.channels())
-        .map(|role| format!("{}: estimate", role.key()))
-        .collect();
-    line(
-        "    sigma: ",
-        format!("{{{}}}", sigmas.join(", ")),
-        "standard deviation of a reading, SI; a number, if it is known",
-    );
-    if motion.far_off.is_some() {
-        line(
-            "    loss: ",
-            format!("{{{}: huber}}", motion.channel.0.key()),
-            "readings far off count little; squares count them in full",
-        );
-    }
-    let mut sensors = Vec::new();
-    let mut why = Vec::new();
-    if columns.has(Role::Acceleration) {
-        sensors.push("acceleration: {offset: estimate}");
-        why.push("accelerometers have one; leave it out if yours has none");
-    }
-    // A force may be what holds a displacement off zero.
-    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
-        if motion.drifts {
-            sensors.push("displacement: {offset: estimate, drift: estimate}");
-            why.push("the readings swing about a line that rises or falls");
-        } else if motion.is_off_centre {
-            sensors.push("displacement: {offset: estimate}");
-            why.push("the readings swing about another value than zero");
+    for (key, value, comment) in keys(table, columns, motion, sample_rate) {
+        if let Some(value) = value {
+            text += &commented(&format!("{key}: {value}"), &comment);
         }
     }
-    if !sensors.is_empty() {
-        let sensors = format!("{{{}}}", sensors.join(", "));
-        line("    sensors: ", sensors, &why.join("; "));
-    }
-    line(
-        "    initial: ",
-        "estimate".into(),
-        "or {displacement: …, velocity: …} in m and m/s",
-    );
-    line(
-        "grid: ",
-        "{nodes: auto}".into(),
-        "as many steps as the frequencies of the readings ask for",
-    );
     text + &functions(columns, motion)
         + &commented(
             "# truth: {data: truth.csv}",
@@ -209,6 +133,96 @@ fn text(
             "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
             "",
         )
+}
+
+/// The keys of the record and the grid, each with its value, if the model needs it, and a comment.
+fn keys(
+    table: &Table,
+    columns: &Columns,
+    motion: &Motion,
+    sample_rate: Option<f64>,
+) -> Vec<(&'static str, Option<String>, String)> {
+    let sigmas: Vec<String> = (columns.channels())
+        .map(|role| format!("{}: estimate", role.key()))
+        .collect();
+    let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
+    let between = format!("{{interpolation: {}}}", motion.between);
+    let or = "between samples: or hold, linear, cubic";
+    let (sensors, why) = sensors(columns, motion);
+    let robust = format!("{{{}: huber}}", motion.channel.0.key());
+    let keys = [
+        (
+            "    columns",
+            Some(columns.named(table)),
+            "by name or by number from 1",
+        ),
+        ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
+        ("    units", columns.units(), "converted to SI"),
+        (
+            "    window",
+            motion.begins.map(|begins| format!("{{min: {begins}}}")),
+            "s; before, nothing moves: the device is held or not yet struck",
+        ),
+        (
+            "    force",
+            columns.has(Role::Force).then(|| between.clone()),
+            or,
+        ),
+        ("    base", has_base.then_some(between), or),
+        (
+            "    sigma",
+            Some(format!("{{{}}}", sigmas.join(", "))),
+            "standard deviation of a reading, SI; a number, if it is known",
+        ),
+        (
+            "    loss",
+            motion.far_off.map(|_| robust),
+            "readings far off count little; squares count them in full",
+        ),
+        (
+            "    sensors",
+            (!sensors.is_empty()).then(|| format!("{{{}}}", sensors.join(", "))),
+            &why.join("; "),
+        ),
+        (
+            "    initial",
+            Some("estimate".into()),
+            "or {displacement: …, velocity: …} in m and m/s",
+        ),
+        (
+            "grid",
+            Some("{nodes: auto}".into()),
+            "as many steps as the frequencies of the readings ask for",
+        ),
+    ];
+    let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
+    owned.into()
+}
+
+/// Sensors with parameters of their own, and the reasons for them.
+fn sensors(columns: &Columns, motion: &Motion) -> (Vec<&'static str>, Vec<&'static str>) {
+    let mut sensors = Vec::new();
+    if columns.has(Role::Acceleration) {
+        sensors.push((
+            "acceleration: {offset: estimate}",
+            "accelerometers have one; leave it out if yours has none",
+        ));
+    }
+    // A force may be what holds a displacement off zero.
+    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
+        if motion.drifts {
+            sensors.push((
+                "displacement: {offset: estimate, drift: estimate}",
+                "the readings swing about a line that rises or falls",
+            ));
+        } else if motion.is_off_centre {
+            sensors.push((
+                "displacement: {offset: estimate}",
+                "the readings swing about another value than zero",
+            ));
+        }
+    }
+    sensors.into_iter().unzip()
 }
 
 /// The functions: a start that has the dominant frequency.

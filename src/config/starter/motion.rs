@@ -71,25 +71,7 @@ impl Motion {
                 "there is no column of a motion",
             ));
         };
-        let values = in_si(table, column)?;
-        let mut pairs: Vec<(f64, f64)> = (times.iter().copied().zip(values))
-            .filter(|(_, value)| value.is_finite())
-            .collect();
-        if pairs.len() < FEWEST {
-            return Err(InputError::file(table.path(), "there are too few readings")
-                .found(pairs.len())
-                .expected(format!("{FEWEST} or more")));
-        }
-        if let Some((_, still)) = pairs
-            .first()
-            .filter(|(_, first)| pairs.iter().all(|(_, x)| x == first))
-        {
-            return Err(InputError::file(table.path(), "the readings do not move")
-                .found(format!("{} readings, all of them {still}", pairs.len()))
-                .expected(
-                    "the motion of a device: nothing can be learnt from one that stands still",
-                ));
-        }
+        let mut pairs = moving(table, &times, in_si(table, column)?)?;
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let spacing = median(&spacings);
         let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;
@@ -122,12 +104,9 @@ impl Motion {
             frequency: beside_line.or_else(|| frequency(pairs, spacing)),
             is_off_centre: off_centre(pairs),
             drifts: beside_line.is_some(),
-            force: force.map(|f| {
-                spread(
-                    &f.into_iter()
-                        .filter(|x| x.is_finite())
-                        .collect::<Vec<f64>>(),
-                )
+            force: force.map(|mut force| {
+                force.retain(|x| x.is_finite());
+                spread(&force)
             }),
             motion: spread(&values_of(pairs)),
             power,
@@ -155,6 +134,24 @@ impl Motion {
             some => format!(", {some} missing"),
         };
         format!("{kind} {} s{missing}", super::short(self.spacing))
+    }
+}
+
+/// The readings with their times; there must be enough, and they must not stand still.
+fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f64)>, InputError> {
+    let pairs = times.iter().copied().zip(values);
+    let pairs: Vec<(f64, f64)> = pairs.filter(|(_, value)| value.is_finite()).collect();
+    if pairs.len() < FEWEST {
+        return Err(InputError::file(table.path(), "there are too few readings")
+            .found(pairs.len())
+            .expected(format!("{FEWEST} or more")));
+    }
+    let still = pairs[0].1;
+    match pairs.iter().all(|(_, x)| *x == still) {
+        false => Ok(pairs),
+        true => Err(InputError::file(table.path(), "the readings do not move")
+            .found(format!("{} readings, all of them {still}", pairs.len()))
+            .expected("the motion of a device: nothing can be learnt from one that stands still")),
     }
 }
 

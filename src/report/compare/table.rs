@@ -67,103 +67,114 @@ pub(super) fn short(x: f64) -> String {
     }
 }
 
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Cell::Text(text)
+    }
+}
+
+impl From<u64> for Cell {
+    fn from(count: u64) -> Self {
+        Cell::Count(count)
+    }
+}
+
+impl<N: Into<Option<f64>>> From<(N,)> for Cell {
+    fn from((number,): (N,)) -> Self {
+        Cell::Number(number.into())
+    }
+}
+
+/// Rows of a table in the making.
+struct Rows<'a> {
+    runs: &'a [Measures],
+    rows: Vec<Row>,
+}
+
+impl<'a> Rows<'a> {
+    fn of(runs: &'a [Measures]) -> Self {
+        let rows = Vec::new();
+        Self { runs, rows }
+    }
+
+    /// A row of texts, of counts, or of numbers: `(x,)`.
+    fn add<C: Into<Cell>>(&mut self, label: &str, header: &str, of: impl Fn(&Measures) -> C) {
+        self.rows.push(Row {
+            label: label.into(),
+            header: header.into(),
+            cells: self.runs.iter().map(|run| of(run).into()).collect(),
+        });
+    }
+
+    /// A row of numbers with a unit, as people and as headers have it.
+    fn add_in<N: Into<Option<f64>>>(
+        &mut self,
+        unit: [&str; 2],
+        label: &str,
+        header: &str,
+        of: impl Fn(&Measures) -> N,
+    ) {
+        let label = format!("{label} ({})", unit[0]);
+        self.add(&label, &format!("{header}_{}", unit[1]), |m| (of(m),));
+    }
+}
+
 /// The quantities that are compared; the same ones for any runs, but for the initial states.
 fn rows(runs: &[Measures]) -> Vec<Row> {
-    let text = |label: &str, header: &str, of: fn(&Measures) -> String| {
-        row(runs, label, header, |m| Cell::Text(of(m)))
-    };
-    let count = |label: &str, header: &str, of: fn(&Measures) -> u64| {
-        row(runs, label, header, |m| Cell::Count(of(m)))
-    };
-    let number = |label: &str, header: &str, of: fn(&Measures) -> Option<f64>| {
-        row(runs, label, header, |m| Cell::Number(of(m)))
-    };
-    let error = |label: &str, header: &str, of: fn(&Errors) -> f64| {
-        row(runs, label, header, |m| {
-            Cell::Number(m.errors.as_ref().map(of))
-        })
-    };
     let units = Units::of(runs);
-    let Units {
-        mass,
-        damping,
+    let metre = units.metre;
+    let error = |of: fn(&Errors) -> f64| move |m: &Measures| m.errors.as_ref().map(of);
+    let mut t = Rows::of(runs);
+    t.add("status", "status", |m| m.status.clone());
+    t.add("method", "method", |m| m.method.clone());
+    t.add("nodes", "nodes", |m| m.nodes as u64);
+    t.add("free values", "parameters", |m| m.parameters as u64);
+    t.add(&misfit_label(runs, metre), "misfit", |m| (m.misfit,));
+    let worst = "worst fit of a channel (%)";
+    t.add(worst, "worst_fit_percent", |m| (m.worst_fit,));
+    let ratio = |m: &Measures| (m.has_ratio.then_some(m.cost_ratio),);
+    t.add("J/J0", "cost_ratio", ratio);
+    t.add("iterations", "iterations", |m| m.iterations);
+    t.add_in(["s", "s"], "time", "seconds", |m| m.seconds);
+    let (mass, damping, stiffness) = (units.mass, units.damping, units.stiffness);
+    t.add_in(mass, "largest error of m", "mass_error", error(|e| e.mass));
+    t.add_in(damping, "  of c", "damping_error", error(|e| e.damping));
+    t.add_in(
         stiffness,
-        metre,
-        ..
-    } = units;
-    let of = |what: &str, unit: [&str; 2]| format!("{what} ({})", unit[0]);
-    let under = |what: &str, unit: [&str; 2]| format!("{what}_{}", unit[1]);
-    let mut rows = vec![
-        text("status", "status", |m| m.status.clone()),
-        text("method", "method", |m| m.method.clone()),
-        count("nodes", "nodes", |m| m.nodes as u64),
-        count("free values", "parameters", |m| m.parameters as u64),
-        number(&misfit_label(runs, metre), "misfit", |m| Some(m.misfit)),
-        number("worst fit of a channel (%)", "worst_fit_percent", |m| {
-            m.worst_fit
-        }),
-        number("J/J0", "cost_ratio", |m| {
-            m.has_ratio.then_some(m.cost_ratio)
-        }),
-        count("iterations", "iterations", |m| m.iterations),
-        number("time (s)", "seconds_s", |m| Some(m.seconds)),
-        error(
-            &of("largest error of m", mass),
-            &under("mass_error", mass),
-            |e| e.mass,
-        ),
-        error(
-            &of("  of c", damping),
-            &under("damping_error", damping),
-            |e| e.damping,
-        ),
-        error(
-            &of("  of k", stiffness),
-            &under("stiffness_error", stiffness),
-            |e| e.stiffness,
-        ),
-        error("  of k/m (1/s²)", "k_over_m_error_per_s2", |e| e.k_over_m),
-        error("  of c/m (1/s)", "c_over_m_error_per_s", |e| e.c_over_m),
-        number(&of("smallest m", mass), &under("mass_min", mass), |m| {
-            Some(m.smallest_mass)
-        }),
-        number(
-            &of("smallest c", damping),
-            &under("damping_min", damping),
-            |m| Some(m.smallest_damping),
-        ),
-        number("largest violation (relative)", "max_violation", |m| {
-            m.max_violation
-        }),
-        number(
-            &of("∫(m″)² dt", units.mass_roughness),
-            &under("mass_roughness", units.mass_roughness),
-            |m| Some(m.roughness.mass),
-        ),
-        number(
-            &of("∫(c′)² dt", units.damping_roughness),
-            &under("damping_roughness", units.damping_roughness),
-            |m| Some(m.roughness.damping),
-        ),
-        number(
-            &of("∫(k′)² dt", units.stiffness_roughness),
-            &under("stiffness_roughness", units.stiffness_roughness),
-            |m| Some(m.roughness.stiffness),
-        ),
-    ];
+        "  of k",
+        "stiffness_error",
+        error(|e| e.stiffness),
+    );
+    let per_s2 = ["1/s²", "per_s2"];
+    t.add_in(per_s2, "  of k/m", "k_over_m_error", error(|e| e.k_over_m));
+    let per_s = ["1/s", "per_s"];
+    t.add_in(per_s, "  of c/m", "c_over_m_error", error(|e| e.c_over_m));
+    t.add_in(mass, "smallest m", "mass_min", |m| m.smallest_mass);
+    t.add_in(damping, "smallest c", "damping_min", |m| m.smallest_damping);
+    let violation = "largest violation (relative)";
+    t.add(violation, "max_violation", |m| (m.max_violation,));
+    let [mass, damping, stiffness] = units.roughness;
+    t.add_in(mass, "∫(m″)² dt", "mass_roughness", |m| {
+        m.roughness.mass
+    });
+    t.add_in(damping, "∫(c′)² dt", "damping_roughness", |m| {
+        m.roughness.damping
+    });
+    t.add_in(stiffness, "∫(k′)² dt", "stiffness_roughness", |m| {
+        m.roughness.stiffness
+    });
     for (i, (y, v)) in shared_states(runs).into_iter().enumerate() {
         let first = match i {
             0 => format!("cost ({metre}² s) from"),
             _ => "  from".into(),
         };
-        rows.push(row(
-            runs,
+        t.add(
             &format!("{first} y = {y} {metre}, v = {v} {metre}/s"),
             &format!("cost_from_{y}_{metre}_{v}_{metre}_per_s_{metre}2_s"),
-            |m| Cell::Number(find(m, (y, v)).and_then(|p| p.cost)),
-        ));
+            |m| (find(m, (y, v)).and_then(|p| p.cost),),
+        );
     }
-    rows
+    t.rows
 }
 
 /// The quantities that at least one run knows: those that people are shown.
@@ -174,39 +185,32 @@ pub(super) fn known_rows(runs: &[Measures]) -> Vec<Row> {
 
 /// The rows of the CSV file: what the page and the terminal say elsewhere comes with it.
 pub(super) fn csv_rows(runs: &[Measures]) -> Vec<Row> {
-    let text =
-        |header: &str, of: fn(&Measures) -> String| row(runs, "", header, |m| Cell::Text(of(m)));
-    let error = |header: &str, of: fn(&Errors) -> f64| {
-        row(runs, "", header, |m| {
-            Cell::Number(m.errors.as_ref().map(of))
-        })
-    };
-    let mut all = vec![
-        text("name", |m| m.name.clone()),
-        text("title", |m| m.title.clone()),
-    ];
+    let error = |of: fn(&Errors) -> f64| move |m: &Measures| (m.errors.as_ref().map(of),);
+    let mut all = Rows::of(runs);
+    all.add("", "name", |m| m.name.clone());
+    all.add("", "title", |m| m.title.clone());
     for row in rows(runs) {
         let header = row.header.clone();
-        all.push(row);
+        all.rows.push(row);
         match header.as_str() {
-            "misfit" => all.push(text("misfit_unit", |m| m.misfit_unit.into())),
+            "misfit" => all.add("", "misfit_unit", |m| m.misfit_unit.to_owned()),
             "c_over_m_error_per_s" => {
-                all.push(error("k_over_m_relative_error", |e| e.k_over_m_relative));
-                all.push(error("c_over_m_relative_error", |e| e.c_over_m_relative));
+                all.add(
+                    "",
+                    "k_over_m_relative_error",
+                    error(|e| e.k_over_m_relative),
+                );
+                all.add(
+                    "",
+                    "c_over_m_relative_error",
+                    error(|e| e.c_over_m_relative),
+                );
             }
             _ => {}
         }
     }
-    all.push(text("verdict", |m| m.verdict.clone()));
-    all
-}
-
-fn row(runs: &[Measures], label: &str, header: &str, of: impl Fn(&Measures) -> Cell) -> Row {
-    Row {
-        label: label.into(),
-        header: header.into(),
-        cells: runs.iter().map(of).collect(),
-    }
+    all.add("", "verdict", |m| m.verdict.clone());
+    all.rows
 }
 
 /// The units of the rows, as people and as headers have them: those of rotations where all runs are.
@@ -215,9 +219,8 @@ struct Units {
     mass: [&'static str; 2],
     damping: [&'static str; 2],
     stiffness: [&'static str; 2],
-    mass_roughness: [&'static str; 2],
-    damping_roughness: [&'static str; 2],
-    stiffness_roughness: [&'static str; 2],
+    /// Of mass, damping and stiffness.
+    roughness: [[&'static str; 2]; 3],
 }
 
 impl Units {
@@ -228,18 +231,22 @@ impl Units {
                 mass: ["kg m²", "kg_m2"],
                 damping: ["N m s/rad", "N_m_s_per_rad"],
                 stiffness: ["N m/rad", "N_m_per_rad"],
-                mass_roughness: ["kg² m⁴/s³", "kg2_m4_per_s3"],
-                damping_roughness: ["N² m² s/rad²", "N2_m2_s_per_rad2"],
-                stiffness_roughness: ["N² m²/(rad² s)", "N2_m2_per_rad2_s"],
+                roughness: [
+                    ["kg² m⁴/s³", "kg2_m4_per_s3"],
+                    ["N² m² s/rad²", "N2_m2_s_per_rad2"],
+                    ["N² m²/(rad² s)", "N2_m2_per_rad2_s"],
+                ],
             },
             false => Self {
                 metre: "m",
                 mass: ["kg", "kg"],
                 damping: ["N s/m", "N_s_per_m"],
                 stiffness: ["N/m", "N_per_m"],
-                mass_roughness: ["kg²/s³", "kg2_per_s3"],
-                damping_roughness: ["N² s/m²", "N2_s_per_m2"],
-                stiffness_roughness: ["N²/(m² s)", "N2_per_m2_s"],
+                roughness: [
+                    ["kg²/s³", "kg2_per_s3"],
+                    ["N² s/m²", "N2_s_per_m2"],
+                    ["N²/(m² s)", "N2_per_m2_s"],
+                ],
             },
         }
     }

@@ -1,11 +1,13 @@
 //! `result.json`: the document that a run leaves behind. Its keys are stable.
 
 mod channel;
+mod search;
 
 pub use channel::{
     ChannelSummary, HoldOutSummary, IgnoredSummary, PatternSummary, RefinedSummary, ScalarSummary,
     StatisticsSummary,
 };
+pub use search::{PathSummary, RungSummary, WeightSummary};
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
@@ -363,23 +365,6 @@ pub struct ActiveSummary {
     pub sentence: String,
 }
 
-/// One attempt of the start ladder.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RungSummary {
-    /// Where it started.
-    pub start: String,
-    /// J at its start; absent if the start had no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub initial_cost: Option<f64>,
-    /// J at its end; absent if the start had no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cost: Option<f64>,
-    /// Iterations it took.
-    pub iterations: u64,
-    /// How it ended.
-    pub status: String,
-}
-
 /// A soft constraint that is broken.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SlackSummary {
@@ -391,48 +376,6 @@ pub struct SlackSummary {
     pub largest: f64,
     /// Part of J that it costs.
     pub price: f64,
-}
-
-/// How the weight of the smoothness was chosen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct WeightSummary {
-    /// The rule asked for.
-    pub rule: String,
-    /// The weight used.
-    pub weight: f64,
-    /// What each rule picks on the path; absent where it picks none.
-    pub picks: BTreeMap<String, f64>,
-    /// Seed of the random vectors behind the degrees of freedom.
-    pub seed: u64,
-    /// What the user should know about the choice.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
-    /// The fits along the path, by falling weight.
-    pub path: Vec<PathSummary>,
-}
-
-impl WeightSummary {
-    /// Iterations of all fits along the path.
-    pub fn iterations(&self) -> u64 {
-        self.path.iter().map(|point| point.iterations).sum()
-    }
-}
-
-/// One fit along the path of weights.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PathSummary {
-    /// Weight.
-    pub weight: f64,
-    /// Iterations of this fit, all its starts together.
-    #[serde(default)]
-    pub iterations: u64,
-    /// Misfit of the readings.
-    pub misfit: f64,
-    /// `sum |L theta - target|^2` of the penalties on the path.
-    pub roughness: f64,
-    /// Effective number of parameters that the data determine; absent where it is not known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub degrees_of_freedom: Option<f64>,
 }
 
 /// What a run leaves behind that could not begin: its outcome and nothing else.

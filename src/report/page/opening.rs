@@ -1,7 +1,7 @@
 //! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
 
 use super::table::{list, number, table};
-use crate::report::advice;
+use crate::report::advice::{self, Advice};
 use crate::report::cost::CostKind;
 use crate::report::document::ChannelSummary;
 use crate::report::document::{FunctionSummary, ResultDocument};
@@ -22,7 +22,10 @@ pub(super) fn opening(document: &ResultDocument) -> String {
         text += "<h3>What stays open</h3>\n";
         text += &list(&known.open);
     }
-    let next = advice::next(document);
+    let next: Vec<String> = advice::next(document)
+        .iter()
+        .map(Advice::to_string)
+        .collect();
     if !next.is_empty() {
         text += "<h3>What to try next</h3>\n";
         text += &list(&next);

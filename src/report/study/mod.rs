@@ -1,7 +1,6 @@
 //! What a study found: pieces that are kept as they are finished, one document, figures, one page.
 
 mod figures;
-pub mod gather;
 mod page;
 mod pieces;
 mod text;
@@ -11,6 +10,8 @@ pub use pieces::{
     EquivalentRecord, FitPiece, JudgementRecord, MultistartPiece, NamedRecord, Numbers,
     PredictionRecord, ProfilePiece, SpectrumPiece, StudyDocument, TubeRecord, VariesRecord,
 };
+
+pub use text::ENDED;
 
 use super::{json, render};
 use crate::results::{Claim, OutputFolder};

@@ -1,6 +1,8 @@
 //! A study for a terminal: its sentences.
 
-use super::StudyDocument;
+use super::{
+    BandsPiece, BootstrapRecord, PredictionRecord, SpectrumPiece, StudyDocument, TubeRecord,
+};
 use crate::digits::significant;
 
 /// How the search for an extreme device ends when it has found it.
@@ -22,58 +24,80 @@ pub fn text(study: &StudyDocument) -> String {
 
 /// The headings and their sentences.
 pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
-    let mut sections = vec![("Before the fit", study.before.clone())];
-    if let Some(fit) = &study.fit {
-        let line = format!("{}: {}; J = {:.6e}", fit.status, fit.reason, fit.cost);
-        sections.push(("The fit", vec![line]));
-    }
-    if let Some(spectrum) = &study.spectrum {
-        let mut lines = vec![spectrum.sentence.clone()];
-        let mut names: Vec<&str> = spectrum.unseen.iter().map(|n| n.name.as_str()).collect();
-        names.sort_unstable();
-        names.dedup();
-        for name in names {
-            let count = spectrum.unseen.iter().filter(|n| n.name == name).count();
-            lines.push(match count {
-                1 => format!("one unseen direction is the {name}"),
-                _ => format!("{count} unseen directions are the {name}"),
-            });
-        }
-        sections.push(("What the readings see", lines));
-    }
-    if let Some(bands) = &study.bands {
-        let verdicts = bands.verdicts.iter().map(|v| v.sentence.clone());
-        let notes = bands.notes.iter().cloned();
-        sections.push((
+    let multistart = study.multistart.iter();
+    let sections = [
+        ("Before the fit", study.before.clone()),
+        (
+            "The fit",
+            lines(study.fit.as_slice(), |fit| {
+                format!("{}: {}; J = {:.6e}", fit.status, fit.reason, fit.cost)
+            }),
+        ),
+        (
+            "What the readings see",
+            study.spectrum.iter().flat_map(spectrum).collect(),
+        ),
+        (
             "What is known of each function",
-            verdicts.chain(notes).collect(),
-        ));
-    }
-    let mut add = |heading, lines: Vec<String>| {
-        if !lines.is_empty() {
-            sections.push((heading, lines));
-        }
-    };
-    add(
-        "Profiles",
-        study.profiles.iter().map(|p| p.sentence.clone()).collect(),
-    );
-    let tube = |t: &super::TubeRecord| {
-        let width = |i: &usize| t.high[*i] - t.low[*i];
-        let widest = (0..t.times.len().min(t.low.len()))
-            .max_by(|a, b| width(a).total_cmp(&width(b)))
-            .unwrap_or(0);
-        format!(
-            "{}: widest at {} s, from {} to {} {}, among devices with a misfit of at most {:.4e}",
-            t.name,
-            t.times[widest],
-            significant(t.low[widest], 6),
-            significant(t.high[widest], 6),
-            t.unit,
-            t.level
-        )
-    };
-    let mut lines: Vec<String> = study.tubes.iter().map(tube).collect();
+            study.bands.iter().flat_map(bands).collect(),
+        ),
+        ("Profiles", lines(&study.profiles, |p| p.sentence.clone())),
+        ("The widest tubes", tubes(study)),
+        (
+            "Other devices with the same motion",
+            lines(&study.equivalents, |e| {
+                format!(
+                    "{}: moves like the fit to {:.1e} of the largest displacement",
+                    e.name, e.motion_error
+                )
+            }),
+        ),
+        (
+            "Fits from many starts",
+            multistart.flat_map(|m| m.sentences.clone()).collect(),
+        ),
+        (
+            "Does it vary?",
+            lines(&study.varies, |v| v.sentence.clone()),
+        ),
+        ("Refits", lines(&study.bootstrap, interval)),
+        (
+            "Which experiment next",
+            lines(&study.candidates, |c| c.sentence.clone()),
+        ),
+        (
+            "Motions from elsewhere",
+            lines(&study.predictions, prediction),
+        ),
+        ("Not done", study.failures.clone()),
+    ];
+    let mut sections = Vec::from(sections);
+    sections.retain(|(_, lines)| !lines.is_empty());
+    sections
+}
+
+fn lines<T>(list: &[T], line: impl Fn(&T) -> String) -> Vec<String> {
+    list.iter().map(line).collect()
+}
+
+fn spectrum(spectrum: &SpectrumPiece) -> Vec<String> {
+    let mut lines = vec![spectrum.sentence.clone()];
+    let mut names: Vec<&str> = spectrum.unseen.iter().map(|n| n.name.as_str()).collect();
+    names.sort_unstable();
+    lines.extend(names.chunk_by(|a, b| a == b).map(|same| match same {
+        [name] => format!("one unseen direction is the {name}"),
+        _ => format!("{} unseen directions are the {}", same.len(), same[0]),
+    }));
+    lines
+}
+
+fn bands(bands: &BandsPiece) -> Vec<String> {
+    let verdicts = bands.verdicts.iter().map(|v| v.sentence.clone());
+    verdicts.chain(bands.notes.iter().cloned()).collect()
+}
+
+fn tubes(study: &StudyDocument) -> Vec<String> {
+    let mut lines = lines(&study.tubes, tube);
     let open = study.tubes.iter().flat_map(|t| &t.devices);
     let open = open
         .filter(|(_, _, ended)| ended != ENDED)
@@ -86,25 +110,26 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
                 .into(),
         );
     }
-    add("The widest tubes", lines);
-    let equivalent = |e: &super::EquivalentRecord| {
-        format!(
-            "{}: moves like the fit to {:.1e} of the largest displacement",
-            e.name, e.motion_error
-        )
-    };
-    add(
-        "Other devices with the same motion",
-        study.equivalents.iter().map(equivalent).collect(),
-    );
-    if let Some(multistart) = &study.multistart {
-        add("Fits from many starts", multistart.sentences.clone());
-    }
-    add(
-        "Does it vary?",
-        study.varies.iter().map(|v| v.sentence.clone()).collect(),
-    );
-    let interval = |b: &super::BootstrapRecord| match b.interval {
+    lines
+}
+
+fn tube(t: &TubeRecord) -> String {
+    let width = |i: &usize| t.high[*i] - t.low[*i];
+    let widest = (0..t.times.len().min(t.low.len())).max_by(|a, b| width(a).total_cmp(&width(b)));
+    let widest = widest.unwrap_or(0);
+    format!(
+        "{}: widest at {} s, from {} to {} {}, among devices with a misfit of at most {:.4e}",
+        t.name,
+        t.times[widest],
+        significant(t.low[widest], 6),
+        significant(t.high[widest], 6),
+        t.unit,
+        t.level
+    )
+}
+
+fn interval(b: &BootstrapRecord) -> String {
+    match b.interval {
         Some([low, high]) => format!(
             "{}: {} to {} {}",
             b.name,
@@ -113,30 +138,16 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             b.unit
         ),
         None => format!("{}: too few refits ended well", b.name),
-    };
-    add("Refits", study.bootstrap.iter().map(interval).collect());
-    add(
-        "Which experiment next",
-        study
-            .candidates
-            .iter()
-            .map(|c| c.sentence.clone())
-            .collect(),
-    );
-    let prediction = |p: &super::PredictionRecord| match &p.furthest {
-        Some((name, distance)) => {
-            format!(
-                "{}: the device `{name}` moves up to {} m away",
-                p.name,
-                significant(*distance, 4)
-            )
-        }
+    }
+}
+
+fn prediction(p: &PredictionRecord) -> String {
+    match &p.furthest {
+        Some((name, distance)) => format!(
+            "{}: the device `{name}` moves up to {} m away",
+            p.name,
+            significant(*distance, 4)
+        ),
         None => format!("{}: no other device to compare with", p.name),
-    };
-    add(
-        "Motions from elsewhere",
-        study.predictions.iter().map(prediction).collect(),
-    );
-    add("Not done", study.failures.clone());
-    sections
+    }
 }

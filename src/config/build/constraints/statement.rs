@@ -3,7 +3,7 @@
 use crate::config::ModelFile;
 use crate::config::build::functions::values;
 use crate::config::scalar::{Number, NumberOrColumn};
-use crate::config::spec::{ConstraintSpec, FunctionName, RangeSpec, ShapeName};
+use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::digits::clock;
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
@@ -208,7 +208,7 @@ impl Reader<'_> {
 
     fn of(&self) -> CoefficientKind {
         // Kinds without a function do not ask.
-        quantity(self.spec.function.unwrap_or(FunctionName::Mass))
+        self.spec.function.unwrap_or(CoefficientKind::Mass)
     }
 
     fn statement(&self, kind: Kind) -> Result<Statement, InputError> {
@@ -254,13 +254,7 @@ impl Reader<'_> {
             return Ok(Vec::new());
         };
         self.not_empty("shape", shapes.values().len(), "at least one shape")?;
-        let statement = |(i, shape): (usize, &ShapeName)| {
-            let shape = match shape {
-                ShapeName::NonIncreasing => Shape::NonIncreasing,
-                ShapeName::NonDecreasing => Shape::NonDecreasing,
-                ShapeName::Convex => Shape::Convex,
-                ShapeName::Concave => Shape::Concave,
-            };
+        let statement = |(i, &shape): (usize, &Shape)| {
             let key = format!("{}.shape{}", self.key, shapes.place(i));
             let of = self.of();
             (key, Statement::Shape { of, shape })
@@ -318,13 +312,13 @@ impl Reader<'_> {
         let names = self.spec.equal.as_deref().unwrap_or_default();
         match names {
             [first, second] if first != second => Ok(Statement::Equal {
-                first: quantity(*first),
-                second: quantity(*second),
+                first: *first,
+                second: *second,
                 ratio: self.spec.ratio.map_or(1.0, |r| r.0),
             }),
             [first, _] => Err(self
                 .error("equal", "these are the same function")
-                .found(format!("`{first}` twice"))
+                .found(format!("`{}` twice", first.name()))
                 .expected("two functions, as in [damping, stiffness]")),
             _ => Err(self
                 .error("equal", "an equality is between two functions")
@@ -399,17 +393,5 @@ impl Reader<'_> {
                 .expected(expected)),
             _ => Ok(()),
         }
-    }
-}
-
-fn quantity(name: FunctionName) -> CoefficientKind {
-    match name {
-        FunctionName::Mass => CoefficientKind::Mass,
-        FunctionName::Damping => CoefficientKind::Damping,
-        FunctionName::Stiffness => CoefficientKind::Stiffness,
-        FunctionName::CubicStiffness => CoefficientKind::CubicStiffness,
-        FunctionName::QuadraticDamping => CoefficientKind::QuadraticDamping,
-        FunctionName::CoulombFriction => CoefficientKind::CoulombFriction,
-        FunctionName::Offset => CoefficientKind::Offset,
     }
 }

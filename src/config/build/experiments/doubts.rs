@@ -9,7 +9,7 @@ use crate::error::InputError;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment};
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
 use kmcfit_core::internals::system::Term;
 use std::f64::consts::TAU;
@@ -36,22 +36,29 @@ const AGAINST: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Warns where channels of one motion, or a reading and the known state, disagree by a factor that
-/// looks like a wrong unit.
-pub fn sizes(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    record: &Record,
-    warnings: &mut Vec<String>,
-) {
+/// Everything that looks wrong in the record of experiment `i`.
+pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) -> Vec<String> {
+    let mut doubts = sizes(spec, record);
+    doubts.extend(signs(spec, record));
+    doubts.extend(record.channels.iter().filter_map(range));
+    doubts.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
+    // The equation error asks for no motion from a start.
+    if !is_equation_error(file) {
+        doubts.extend(stillness(spec, record));
+    }
+    let name = file.experiment_name(i);
+    let placed = |doubt| format!("experiments[{i}] ({name}): {doubt}");
+    doubts.into_iter().map(placed).collect()
+}
+
+/// Channels of one motion, or a reading and the known state, that disagree by a factor that looks like a wrong unit.
+fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
+    let mut found = Vec::new();
     let mut say = |ratio: f64, what: String| {
         let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
         if let Some((_, factor)) = SUSPICIOUS.iter().find(|(f, _)| near(*f)) {
-            warnings.push(format!(
-                "experiments[{i}] ({}): {what} {ratio:.3e} times what it should be: {factor}? \
-                 `units` converts",
-                file.experiment_name(i)
+            found.push(format!(
+                "{what} {ratio:.3e} times what it should be: {factor}? `units` converts"
             ));
         }
     };
@@ -85,31 +92,28 @@ pub fn sizes(
             say(ratio, format!("the {high} beside the {low} is"));
         }
     }
+    found
 }
 
-/// Warns where channels of one motion swing against each other, as where one of them has the wrong sign.
-pub fn signs(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    record: &Record,
-    warnings: &mut Vec<String>,
-) {
-    for (place, high) in record.channels.iter().enumerate() {
-        for low in &record.channels[..place] {
-            let (Some(one), Some(other)) = (turn(spec, low.kind), turn(spec, high.kind)) else {
-                continue;
-            };
-            if one * other * together(low, high).unwrap_or_default() < -AGAINST {
-                let [low, high] = [low, high].map(|c| c.kind.name());
-                warnings.push(format!(
-                    "experiments[{i}] ({}): the {high} goes against what the {low} says of it, as if one of them had the \
-                     wrong sign: `sensors: {{{high}: {{gain: -1}}}}` turns the {high}",
-                    file.experiment_name(i)
-                ));
-            }
-        }
-    }
+/// Channels of one motion that swing against each other, as where one of them has the wrong sign.
+fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
+    let channels = &record.channels;
+    let pairs = (channels.iter().enumerate())
+        .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
+    let against = pairs.filter(|(low, high)| {
+        let turned = turn(spec, low.kind).zip(turn(spec, high.kind));
+        turned.is_some_and(|(one, other)| {
+            one * other * together(low, high).unwrap_or_default() < -AGAINST
+        })
+    });
+    let said = against.map(|(low, high)| {
+        let [low, high] = [low, high].map(|c| c.kind.name());
+        format!(
+            "the {high} goes against what the {low} says of it, as if one of them had the wrong sign: \
+             `sensors: {{{high}: {{gain: -1}}}}` turns the {high}"
+        )
+    });
+    said.collect()
 }
 
 /// The sign of a sensor's gain; `None` where that is sought.
@@ -161,33 +165,20 @@ fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
     correlation.is_finite().then_some(correlation)
 }
 
-/// Warns of a record without a drive that stands still before its motion begins: a free motion begins where nothing holds
-/// the device any more, or when it has been struck.
-pub fn stillness(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    record: &Record,
-    warnings: &mut Vec<String>,
-) {
-    let is_free = record.excitation.is_empty() && spec.force.is_none() && spec.base.is_none();
-    // The equation error asks for no motion from a start.
-    let is_free = is_free && !is_equation_error(file);
-    let begins = record
-        .channels
-        .iter()
-        .find_map(|channel| Some((channel, onset(&channel.values, channel.median_spacing)?)));
-    if let (true, Some((channel, first))) = (is_free, begins) {
-        let from = in_file(spec, channel, first);
-        warnings.push(format!(
-            "experiments[{i}] ({}): the {} stands still before {} s: a free motion begins where nothing holds or strikes the \
-             device any more: `window: {{min: {}}}`",
-            file.experiment_name(i),
-            channel.kind.name(),
-            from,
-            from,
-        ));
+/// A record without a drive that stands still before its motion begins: a free motion begins where nothing holds the device
+/// any more, or when it has been struck.
+fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<String> {
+    if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
+        return None;
     }
+    let mut channels = record.channels.iter();
+    let (channel, first) = channels.find_map(|c| Some((c, onset(&c.values, c.median_spacing)?)))?;
+    let from = in_file(spec, channel, first);
+    Some(format!(
+        "the {} stands still before {from} s: a free motion begins where nothing holds or strikes the device any more: \
+         `window: {{min: {from}}}`",
+        channel.kind.name(),
+    ))
 }
 
 /// The time of a reading, s, as its file counts.
@@ -196,55 +187,44 @@ fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
     clock(channel.times[reading] + zero, channel.median_spacing)
 }
 
-/// Warns of single readings that lie far off the others, where their squares count in full.
-pub fn outliers(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    record: &Record,
-    warnings: &mut Vec<String>,
-) {
-    for channel in record.channels.iter().filter(|c| c.is_squared()) {
-        let mut sorted = channel.values.clone();
-        sorted.sort_by(f64::total_cmp);
-        let level = sorted[sorted.len() / 2];
-        let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
-        let far = far_off(&away);
-        let Some(first) = far.first() else { continue };
-        let kind = channel.kind.name();
-        let lie = match far.len() {
-            1 => format!("one reading of the {kind} lies far off,"),
-            many => format!("{many} readings of the {kind} lie far off, the first"),
-        };
-        warnings.push(format!(
-            "experiments[{i}] ({}): {lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: \
-             huber}}`{})",
-            file.experiment_name(i),
-            significant(channel.values[*first] / channel.unit.factor(), 4),
-            channel.unit.symbol(),
-            in_file(spec, channel, *first),
-            match channel.weighting {
-                Some(_) => "",
-                None => ", with `sigma`",
-            },
-        ));
+/// Single readings that lie far off the others, where their squares count in full.
+fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<String> {
+    if !channel.is_squared() {
+        return None;
     }
+    let mut sorted = channel.values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let level = sorted[sorted.len() / 2];
+    let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
+    let far = far_off(&away);
+    let first = *far.first()?;
+    let kind = channel.kind.name();
+    let lie = match far.len() {
+        1 => format!("one reading of the {kind} lies far off,"),
+        many => format!("{many} readings of the {kind} lie far off, the first"),
+    };
+    let sigma = match channel.weighting {
+        Some(_) => "",
+        None => ", with `sigma`",
+    };
+    Some(format!(
+        "{lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: huber}}`{sigma})",
+        significant(channel.values[first] / channel.unit.factor(), 4),
+        channel.unit.symbol(),
+        in_file(spec, channel, first),
+    ))
 }
 
-/// Warns of readings that pile up at one value, as where a motion goes beyond the range of its sensor.
-pub fn ranges(file: &ModelFile, i: usize, record: &Record, warnings: &mut Vec<String>) {
-    for channel in &record.channels {
-        if let Some((readings, level)) = clipped(&channel.values) {
-            warnings.push(format!(
-                "experiments[{i}] ({}): {readings} readings of the {} lie at {} {}, the end of its range: if the sensor \
-                 reads no further, the motion was cut off there, and these readings are better left out (empty fields)",
-                file.experiment_name(i),
-                channel.kind.name(),
-                level / channel.unit.factor(),
-                channel.unit.symbol(),
-            ));
-        }
-    }
+/// Readings that pile up at one value, as where a motion goes beyond the range of its sensor.
+fn range(channel: &RawChannel) -> Option<String> {
+    let (readings, level) = clipped(&channel.values)?;
+    Some(format!(
+        "{readings} readings of the {} lie at {} {}, the end of its range: if the sensor reads no further, the motion was \
+         cut off there, and these readings are better left out (empty fields)",
+        channel.kind.name(),
+        level / channel.unit.factor(),
+        channel.unit.symbol(),
+    ))
 }
 
 /// Refuses a force offset beside sensor offsets: a motion that is shifted by `d`, a sensor that reads `d`
@@ -256,10 +236,9 @@ fn offsets(
 ) -> Result<(), InputError> {
     let mut functions = problem.functions.iter();
     let sought = functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
-    let shifted = |e: &kmcfit_core::internals::record::Experiment| {
-        let sees = |c: &kmcfit_core::internals::record::Channel| {
-            c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index())
-        };
+    let shifted = |e: &Experiment| {
+        let sees =
+            |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());
         open(e.sought[0]) && e.channels.iter().all(sees)
     };
     if !(sought && problem.experiments.iter().all(shifted)) {
@@ -288,21 +267,21 @@ pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputEr
     if !problem.oscillator.terms.iter().all(|term| term.is_linear()) {
         return Ok(());
     }
-    let gains_open = |e: &kmcfit_core::internals::record::Experiment| {
-        let gain = |c: &kmcfit_core::internals::record::Channel| {
+    let gains_open = |e: &Experiment| {
+        let gain = |c: &Channel| {
             // A base that is added to the motion is a scale of its own.
             open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
         };
         !e.channels.is_empty() && e.channels.iter().all(gain)
     };
-    let starts_open = |e: &kmcfit_core::internals::record::Experiment| {
+    let starts_open = |e: &Experiment| {
         let rest = [e.initial.displacement, e.initial.velocity];
         (0..2).all(|q| match e.sought[q] {
             Some(index) => open(Some(index)),
             None => rest[q] == 0.0,
         })
     };
-    let is_free = |e: &kmcfit_core::internals::record::Experiment| e.is_free();
+    let is_free = |e: &Experiment| e.is_free();
     for (place, e) in problem.experiments.iter().enumerate() {
         if is_free(e) && gains_open(e) && starts_open(e) {
             return Err(file
@@ -322,9 +301,7 @@ pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputEr
         }
     }
     let forced: Vec<_> = problem.experiments.iter().filter(|e| !is_free(e)).collect();
-    let by_force = |e: &&kmcfit_core::internals::record::Experiment| {
-        e.excitation.as_ref().is_some_and(|x| x.base.is_none())
-    };
+    let by_force = |e: &&Experiment| e.excitation.as_ref().is_some_and(|x| x.base.is_none());
     let mut functions = problem.functions.iter();
     let scale_is_open = functions.all(|f| f.offset.iter().all(|p| *p == 0.0));
     let held = problem.constraints.groups.iter().any(|group| {

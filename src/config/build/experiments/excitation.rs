@@ -3,7 +3,7 @@
 use super::source::{self, Wanted};
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
-use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec, InterpolationName};
+use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
 use crate::units::Kind;
 use kmcfit_core::internals::record::{BaseMotion, Experiment, Input, Waveform};
@@ -73,7 +73,7 @@ pub fn read(
                 unit: units.and_then(|u| u.force.as_ref()),
                 beside: None,
             };
-            let meant = interpolation_of(interpolation, Interpolation::Linear);
+            let meant = interpolation.unwrap_or_default();
             Some(Waveform::Samples(signal(
                 file, spec, &wanted, meant, warnings,
             )?))
@@ -96,14 +96,12 @@ fn base(
     let acceleration = columns.and_then(|c| c.base_acceleration.as_ref());
     let displacement = columns.and_then(|c| c.base_displacement.as_ref());
     let interpolation = spec.base.as_ref().and_then(|b| b.interpolation);
-    let (column, is_acceleration) = match (acceleration, displacement) {
+    let (column, kind) = match (acceleration, displacement) {
+        (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
-            return match &spec.base {
-                Some(_) => Err(file
-                    .error_at(&format!("{key}.base"), "the motion of the base is missing")
-                    .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`")),
-                None => Ok(None),
-            };
+            return Err(file
+                .error_at(&format!("{key}.base"), "the motion of the base is missing")
+                .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`"));
         }
         (Some(_), Some(_)) => {
             return Err(file
@@ -114,57 +112,41 @@ fn base(
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
         }
-        (Some(column), None) => (column, true),
-        (None, Some(column)) => (column, false),
+        (Some(column), None) => (column, Kind::Acceleration),
+        (None, Some(column)) => (column, Kind::Displacement),
     };
-    if !is_acceleration && interpolation.is_some_and(|i| i != InterpolationName::Cubic) {
+    let wanted = |name, unit, kind| Wanted {
+        experiment: i,
+        name,
+        kind,
+        column,
+        unit,
+        beside: None,
+    };
+    if kind == Kind::Acceleration {
+        let unit = units.and_then(|u| u.base_acceleration.as_ref());
+        let wanted = wanted("base_acceleration", unit, kind);
+        let meant = interpolation.unwrap_or_default();
+        return signal(file, spec, &wanted, meant, warnings)
+            .map(|signal| Some(BaseMotion::Acceleration(signal)));
+    }
+    if let Some(given) = interpolation.filter(|i| *i != Interpolation::Cubic) {
+        let name = match given {
+            Interpolation::Hold => "`hold`",
+            _ => "`linear`",
+        };
         return Err(file
             .error_at(
                 &format!("{key}.base.interpolation"),
                 "a displacement of the base is differentiated twice, so it must be smooth",
             )
-            .found(format!(
-                "`{}`",
-                interpolation.map_or("", InterpolationName::name)
-            ))
+            .found(name)
             .expected("`cubic`"));
     }
-    let wanted = Wanted {
-        experiment: i,
-        name: match is_acceleration {
-            true => "base_acceleration",
-            false => "base_displacement",
-        },
-        kind: match is_acceleration {
-            true => Kind::Acceleration,
-            false => Kind::Displacement,
-        },
-        column,
-        unit: units.and_then(|u| match is_acceleration {
-            true => u.base_acceleration.as_ref(),
-            false => u.base_displacement.as_ref(),
-        }),
-        beside: None,
-    };
-    let usual = match is_acceleration {
-        true => Interpolation::Linear,
-        false => Interpolation::Cubic,
-    };
-    let meant = interpolation_of(interpolation, usual);
-    let signal = signal(file, spec, &wanted, meant, warnings)?;
-    Ok(Some(match is_acceleration {
-        true => BaseMotion::Acceleration(signal),
-        false => BaseMotion::Displacement(signal),
-    }))
-}
-
-fn interpolation_of(given: Option<InterpolationName>, usual: Interpolation) -> Interpolation {
-    match given {
-        None => usual,
-        Some(InterpolationName::Hold) => Interpolation::Hold,
-        Some(InterpolationName::Linear) => Interpolation::Linear,
-        Some(InterpolationName::Cubic) => Interpolation::Cubic,
-    }
+    let unit = units.and_then(|u| u.base_displacement.as_ref());
+    let wanted = wanted("base_displacement", unit, kind);
+    let signal = signal(file, spec, &wanted, Interpolation::Cubic, warnings)?;
+    Ok(Some(BaseMotion::Displacement(signal)))
 }
 
 /// A column as a signal; it must have no gaps, as what drives a motion acts at all times.
@@ -250,6 +232,41 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
             .error_at(&key, "the force is missing")
             .expected("`columns: {force: …}`, or `shape` here"));
     };
+    shape_keys(file, &key, shape, spec)?;
+    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+    let (amplitude, at) = (number(spec.amplitude), number(spec.at));
+    let duration = number(spec.duration);
+    Ok(match shape {
+        ForceShape::Constant => Shape::Constant { amplitude },
+        ForceShape::Sine => Shape::Sine {
+            amplitude,
+            frequency: number(spec.frequency),
+            phase: number(spec.phase),
+        },
+        ForceShape::Sweep => Shape::Sweep {
+            amplitude,
+            from: number(spec.from),
+            to: number(spec.to),
+            start: at,
+            duration,
+            law: SweepLaw::Linear,
+        },
+        ForceShape::Step => Shape::Step { amplitude, at },
+        ForceShape::HalfSine => Shape::HalfSine {
+            amplitude,
+            at,
+            duration,
+        },
+    })
+}
+
+/// Refuses keys that a shape does not have, the absence of those that it needs, and values that make none.
+fn shape_keys(
+    file: &ModelFile,
+    key: &str,
+    shape: ForceShape,
+    spec: &ForceSpec,
+) -> Result<(), InputError> {
     let keys = [
         ("amplitude", spec.amplitude),
         ("frequency", spec.frequency),
@@ -266,74 +283,37 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
         ForceShape::Step => (&["amplitude"], &["at"]),
         ForceShape::HalfSine => (&["amplitude", "duration"], &["at"]),
     };
+    let expected = || listed_keys(needed, possible);
     for (name, value) in keys {
-        let known = needed.contains(&name) || possible.contains(&name);
-        match value {
-            Some(_) if !known => {
-                let of = listed_keys(needed, possible);
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{name}"),
-                        format!("a {shape} has no `{name}`"),
-                    )
-                    .found(format!("`{name}`"))
-                    .expected(of));
-            }
-            None if needed.contains(&name) => {
-                return Err(file
-                    .error_at(&key, format!("a {shape} needs its `{name}`"))
-                    .expected(listed_keys(needed, possible)));
-            }
-            _ => {}
+        let is_needed = needed.contains(&name);
+        if value.is_some() && !is_needed && !possible.contains(&name) {
+            let at = format!("{key}.{name}");
+            let problem = format!("a {shape} has no `{name}`");
+            return Err((file.error_at(&at, problem))
+                .found(format!("`{name}`"))
+                .expected(expected()));
+        }
+        if value.is_none() && is_needed {
+            let problem = format!("a {shape} needs its `{name}`");
+            return Err(file.error_at(key, problem).expected(expected()));
         }
     }
     if spec.interpolation.is_some() {
-        return Err(file
-            .error_at(
-                &format!("{key}.interpolation"),
-                "a shape is not interpolated",
-            )
+        let at = format!("{key}.interpolation");
+        return Err((file.error_at(&at, "a shape is not interpolated"))
             .found(format!("`interpolation` beside `{shape}`"))
             .expected("one of the two"));
     }
     for (name, value) in [("frequency", spec.frequency), ("duration", spec.duration)] {
         if let Some(value) = value.filter(|v| v.0 <= 0.0) {
+            let at = format!("{key}.{name}");
             return Err(file
-                .error_at(
-                    &format!("{key}.{name}"),
-                    format!("the {name} must be positive"),
-                )
+                .error_at(&at, format!("the {name} must be positive"))
                 .found(value.0)
                 .expected("a number greater than 0"));
         }
     }
-    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
-    let amplitude = number(spec.amplitude);
-    Ok(match shape {
-        ForceShape::Constant => Shape::Constant { amplitude },
-        ForceShape::Sine => Shape::Sine {
-            amplitude,
-            frequency: number(spec.frequency),
-            phase: number(spec.phase),
-        },
-        ForceShape::Sweep => Shape::Sweep {
-            amplitude,
-            from: number(spec.from),
-            to: number(spec.to),
-            start: number(spec.at),
-            duration: number(spec.duration),
-            law: SweepLaw::Linear,
-        },
-        ForceShape::Step => Shape::Step {
-            amplitude,
-            at: number(spec.at),
-        },
-        ForceShape::HalfSine => Shape::HalfSine {
-            amplitude,
-            at: number(spec.at),
-            duration: number(spec.duration),
-        },
-    })
+    Ok(())
 }
 
 fn listed_keys(needed: &[&str], possible: &[&str]) -> String {

@@ -166,11 +166,7 @@ fn read_one(
     };
     one_misfit(file, i, &record)?;
     excitation::covers(file, i, &record.excitation, [record.start(), record.end()])?;
-    doubts::sizes(file, i, spec, &record, warnings);
-    doubts::signs(file, i, spec, &record, warnings);
-    doubts::ranges(file, i, &record, warnings);
-    doubts::outliers(file, i, spec, &record, warnings);
-    doubts::stillness(file, i, spec, &record, warnings);
+    warnings.extend(doubts::of(file, i, spec, &record));
     Ok(record)
 }
 

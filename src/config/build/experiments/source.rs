@@ -4,7 +4,7 @@ use super::unit::Column;
 use crate::config::ModelFile;
 use crate::config::build::asked_for;
 use crate::config::scalar::{ColumnId, ScalarOr, Text};
-use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec};
+use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::error::InputError;
 use crate::observations::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
 use crate::units::{Kind, Unit};
@@ -66,19 +66,7 @@ pub fn read(
         ScalarOr::Scalar(id) => (id, None),
         ScalarOr::Map(source) => (&source.column, Some(source)),
     };
-    let (data, data_key) = match own.and_then(|s| s.data.as_ref()) {
-        Some(data) => (data, format!("{column_key}.data")),
-        None => {
-            let data = spec.data.as_ref().ok_or_else(|| {
-                file.error_at(&experiment, "this experiment has no data")
-                    .expected("`data`, a CSV file with the readings")
-            })?;
-            (data, format!("{experiment}.data"))
-        }
-    };
-    let table = Table::read_with(file.resolve(&data.0), &format(spec))
-        .map_err(|error| about_format(file, &experiment, error))
-        .map_err(asked_for(file, &data_key))?;
+    let table = table(file, spec, &experiment, &column_key, own)?;
     let column_key = match own {
         Some(_) => format!("{column_key}.column"),
         None => column_key,
@@ -122,24 +110,8 @@ pub fn read(
             .found(format!("`{label}`"))
             .expected("two columns"));
     }
-    let window = window(file, &experiment, spec)?;
+    let inside = inside(file, &experiment, spec, &times.values)?;
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
-    let inside: Vec<usize> = (0..times.values.len())
-        .filter(|&r| (window[0]..=window[1]).contains(&times.values[r]))
-        .collect();
-    if inside.is_empty() {
-        return Err(file
-            .error_at(
-                &format!("{experiment}.window"),
-                "no reading lies in the window",
-            )
-            .found(format!("{} s to {} s", window[0], window[1]))
-            .expected(format!(
-                "a part of {} s to {} s",
-                times.values[0],
-                times.values[times.values.len() - 1]
-            )));
-    }
     Ok(Source {
         times: inside.iter().map(|&r| times.values[r] - zero).collect(),
         values: inside.iter().map(|&r| factor * values[r]).collect(),
@@ -149,6 +121,51 @@ pub fn read(
         label,
         format: table.format().to_string(),
     })
+}
+
+/// The file of a column: its own, or that of the experiment.
+fn table(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    experiment: &str,
+    column_key: &str,
+    own: Option<&SourceSpec>,
+) -> Result<Table, InputError> {
+    let own = own.and_then(|s| s.data.as_ref());
+    let key = format!("{}.data", own.map_or(experiment, |_| column_key));
+    let data = own.or(spec.data.as_ref()).ok_or_else(|| {
+        file.error_at(experiment, "this experiment has no data")
+            .expected("`data`, a CSV file with the readings")
+    })?;
+    Table::read_with(file.resolve(&data.0), &format(spec))
+        .map_err(|error| about_format(file, experiment, error))
+        .map_err(asked_for(file, &key))
+}
+
+/// The rows in the window.
+fn inside(
+    file: &ModelFile,
+    experiment: &str,
+    spec: &ExperimentSpec,
+    times: &[f64],
+) -> Result<Vec<usize>, InputError> {
+    let [from, to] = window(file, experiment, spec)?;
+    let is_inside = |r: &usize| (from..=to).contains(&times[*r]);
+    let inside: Vec<usize> = (0..times.len()).filter(is_inside).collect();
+    match inside.is_empty() {
+        false => Ok(inside),
+        true => Err(file
+            .error_at(
+                &format!("{experiment}.window"),
+                "no reading lies in the window",
+            )
+            .found(format!("{from} s to {to} s"))
+            .expected(format!(
+                "a part of {} s to {} s",
+                times[0],
+                times[times.len() - 1]
+            ))),
+    }
 }
 
 /// How the files of an experiment are written.
@@ -193,7 +210,7 @@ fn times(
     file: &ModelFile,
     spec: &ExperimentSpec,
     experiment: &str,
-    own: Option<&crate::config::spec::SourceSpec>,
+    own: Option<&SourceSpec>,
     table: &Table,
     warnings: &mut Vec<String>,
 ) -> Result<Times, InputError> {

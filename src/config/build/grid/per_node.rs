@@ -22,8 +22,6 @@ const SIMULATION: usize = 100;
 /// For each pair that L-BFGS remembers and each function that is free at every node: two numbers and their
 /// duals, and the same once more while a checkpoint is written.
 const PAIR: usize = 72;
-/// Steepest descent: the problem and the point that a second thread keeps.
-const FOLLOWER: usize = 800;
 /// Gauss-Newton with few free values, and for each record: start from the readings, Jacobian.
 const FEW: usize = 1000;
 const FEW_RECORD: usize = 300;
@@ -53,7 +51,7 @@ pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
     let fit = spec.fit.as_ref();
     let method = fit.and_then(|f| f.method);
     let own = match method.unwrap_or(FitMethod::GaussNewton) {
-        FitMethod::SteepestDescent => FOLLOWER,
+        FitMethod::SteepestDescent => 0,
         FitMethod::Lbfgs => {
             let memory = fit.and_then(|f| f.memory).map_or(DEFAULT_MEMORY, |m| m.0);
             PAIR.saturating_mul(memory).saturating_mul(nodal)
@@ -159,7 +157,7 @@ mod tests {
     #[test]
     fn the_estimate_of_shipped_models_is_above_what_was_measured() {
         let measured = [
-            ("paper", 1450),
+            ("paper", 805),
             ("paper-lbfgs", 4660),
             ("paper-smooth", 3320),
             ("knots", 1710),

@@ -208,42 +208,14 @@ fn read_one(
         decimate(file, &key, factor.0, &mut source, &mut ignored)?;
     }
     let span = [source.times[0], source.times[source.times.len() - 1]];
-    let present: Vec<usize> = (0..source.values.len())
-        .filter(|&r| !source.values[r].is_nan())
-        .collect();
+    let present = present(file, &format!("{key}.columns.{}", kind.name()), &source)?;
     let missing = source.values.len() - present.len();
-    if present.is_empty() {
-        return Err(file
-            .error_at(
-                &format!("{key}.columns.{}", kind.name()),
-                "all readings are missing",
-            )
-            .found(format!(
-                "{missing} rows without a number in `{}`",
-                source.label
-            ))
-            .expected("at least some readings"));
-    }
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
     }
-    let times: Vec<f64> = present.iter().map(|&r| source.times[r]).collect();
-    let values: Vec<f64> = present.iter().map(|&r| source.values[r]).collect();
-    let sigmas = source
-        .beside
-        .map(|s| present.iter().map(|&r| s[r]).collect::<Vec<f64>>());
-    if values.len() < Grid::FEWEST_NODES {
-        return Err(file
-            .error_at(
-                &format!("{key}.columns.{}", kind.name()),
-                "there are too few readings",
-            )
-            .found(match values.len() {
-                1 => "1 reading".to_owned(),
-                count => format!("{count} readings"),
-            })
-            .expected(format!("at least {}", Grid::FEWEST_NODES)));
-    }
+    let pick = |column: &[f64]| -> Vec<f64> { present.iter().map(|&r| column[r]).collect() };
+    let (times, values) = (pick(&source.times), pick(&source.values));
+    let sigmas = source.beside.as_deref().map(pick);
     let spacing = even_spacing(&times);
     if spacing.is_none() && missing == 0 && nearly_equal(&times) {
         warnings.push(format!(
@@ -270,4 +242,30 @@ fn read_one(
         ignored,
         format: source.format,
     })
+}
+
+/// The rows with a reading; there must be enough of them.
+fn present(
+    file: &ModelFile,
+    column: &str,
+    source: &source::Source,
+) -> Result<Vec<usize>, InputError> {
+    let rows = 0..source.values.len();
+    let present: Vec<usize> = rows.filter(|&r| !source.values[r].is_nan()).collect();
+    let found = match present.len() {
+        0 => {
+            let (missing, label) = (source.values.len(), &source.label);
+            return Err(file
+                .error_at(column, "all readings are missing")
+                .found(format!("{missing} rows without a number in `{label}`"))
+                .expected("at least some readings"));
+        }
+        1 => "1 reading".to_owned(),
+        count if count < Grid::FEWEST_NODES => format!("{count} readings"),
+        _ => return Ok(present),
+    };
+    Err(file
+        .error_at(column, "there are too few readings")
+        .found(found)
+        .expected(format!("at least {}", Grid::FEWEST_NODES)))
 }

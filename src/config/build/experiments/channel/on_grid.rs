@@ -7,7 +7,7 @@ use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
 use kmcfit_core::internals::functions::{ScalarParameter, Value};
 use kmcfit_core::internals::record::{
-    Channel, ChannelKind, Experiment, Sensor, Weighting, integral_over,
+    Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over,
 };
 use kmcfit_core::internals::signal::even_spacing;
 use kmcfit_core::internals::system::{Grid, InputSample};
@@ -64,36 +64,51 @@ pub fn place(
         };
         channel = channel.with_surroundings(times.iter().map(around).collect());
     }
-    if drive.base.is_some() {
-        let usual = raw.kind == ChannelKind::Acceleration;
-        let absolute = of_kind.sensor.and_then(|s| s.absolute);
-        if absolute.unwrap_or(usual) {
-            let motion = times.iter().map(|t| drive.base_motion_at(raw.kind, *t));
-            let motion: Option<Vec<f64>> = motion.collect();
-            channel = channel.with_base(motion.ok_or_else(|| {
-                let name = raw.kind.name();
-                file.error_at(
-                    &format!("experiments[{i}].sensors.{name}.absolute"),
-                    format!("the {name} of the base is not known"),
-                )
-                .found("the acceleration of the base only")
-                .expected("`columns: {base_displacement: …}`, or no `absolute: true`")
-            })?);
-        }
-    } else if of_kind.sensor.and_then(|s| s.absolute).is_some() {
-        let name = raw.kind.name();
-        return Err(file
-            .error_at(
-                &format!("experiments[{i}].sensors.{name}.absolute"),
-                "the base does not move, so there is only one motion to measure",
-            )
-            .found("`absolute` without a motion of the base")
-            .expected("no `absolute`"));
+    if let Some(base) = base_motion(file, i, &of_kind, drive, &times)? {
+        channel = channel.with_base(base);
     }
     if !raw.filter.is_empty() {
         channel = channel.with_filter(raw.filter);
     }
     Ok(channel)
+}
+
+/// The motion of the base at the times of a sensor that measures the motion in space.
+fn base_motion(
+    file: &ModelFile,
+    i: usize,
+    of_kind: &Spec,
+    drive: &Input,
+    times: &[f64],
+) -> Result<Option<Vec<f64>>, InputError> {
+    let kind = of_kind.kind;
+    let asked = of_kind.sensor.and_then(|s| s.absolute);
+    let key = format!("experiments[{i}].sensors.{}.absolute", kind.name());
+    if drive.base.is_none() {
+        return match asked {
+            None => Ok(None),
+            Some(_) => Err(file
+                .error_at(
+                    &key,
+                    "the base does not move, so there is only one motion to measure",
+                )
+                .found("`absolute` without a motion of the base")
+                .expected("no `absolute`")),
+        };
+    }
+    if !asked.unwrap_or(kind == ChannelKind::Acceleration) {
+        return Ok(None);
+    }
+    let motion = times.iter().map(|t| drive.base_motion_at(kind, *t));
+    let motion: Option<Vec<f64>> = motion.collect();
+    motion.map(Some).ok_or_else(|| {
+        file.error_at(
+            &key,
+            format!("the {} of the base is not known", kind.name()),
+        )
+        .found("the acceleration of the base only")
+        .expected("`columns: {base_displacement: …}`, or no `absolute: true`")
+    })
 }
 
 fn sensor(

@@ -1,7 +1,7 @@
 //! What comes next: other experiments, and other motions.
 
 use crate::config::{Candidate, Model};
-use crate::report::study::pieces::*;
+use crate::report::study::*;
 use kmcfit_core::internals::identifiability::{self, CandidateChannel, rank_experiments};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;

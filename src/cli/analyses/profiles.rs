@@ -1,7 +1,7 @@
 //! Profiles of single numbers.
 
 use crate::config::{StudyPlan, StudyTarget};
-use crate::report::study::pieces::*;
+use crate::report::study::*;
 use kmcfit_core::internals::diagnostics::chi_square_one;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::study::Linear;

@@ -12,7 +12,7 @@ pub use others::{equivalents, level, tubes};
 pub use profiles::{linear, profile_of};
 pub use seen::{bands, spectrum};
 
-use super::pieces::*;
+use crate::report::study::*;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::solvers::Fit;

@@ -1,8 +1,7 @@
 //! Other devices that match: tubes, and those with the same motion.
 
 use crate::config::{Equivalent, StudyPlan};
-use crate::report::study::pieces::*;
-use crate::report::study::text::ENDED;
+use crate::report::study::*;
 use kmcfit_core::internals::diagnostics::chi_square_one;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::objective::Evaluation;

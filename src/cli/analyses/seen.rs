@@ -2,7 +2,7 @@
 
 use crate::config::StudyPlan;
 use crate::report::findings;
-use crate::report::study::pieces::*;
+use crate::report::study::*;
 use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::normal_half_width;
 use kmcfit_core::internals::functions::Ratios;

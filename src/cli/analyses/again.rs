@@ -2,7 +2,7 @@
 
 use super::linear;
 use crate::config::{Model, StudyPlan};
-use crate::report::study::pieces::*;
+use crate::report::study::*;
 use kmcfit_core::internals::functions::Parameterization;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::study::Linear;
