@@ -16,6 +16,9 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Regularisations that are tried for the least violations.
 const VIOLATION_ATTEMPTS: [f64; 2] = [1e-8, 1e-12];
 
+/// Corrections of the active set of the least violations: each row may be in it, and no time is lost where a program was refused.
+const VIOLATION_ROUNDS: usize = 24;
+
 /// `sum_i y_i (row_i z) <= bound` for every feasible point, as a linear function of the variables.
 struct Combination {
     slope: Vec<f64>,
@@ -139,7 +142,7 @@ impl Subproblem {
         });
         let mut from = from.chain(std::iter::once(PrimalDual::zero(&sub)));
         from.any(|point| {
-            let (found, _) = sub.polish(point);
+            let (found, _) = sub.polish_within(point, VIOLATION_ROUNDS, VIOLATION_ROUNDS / 4);
             let proof = PrimalDual {
                 equalities: found.equalities,
                 inequalities: found.inequalities,

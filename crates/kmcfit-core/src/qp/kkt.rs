@@ -8,7 +8,7 @@ use super::{PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
 /// Error of a sum of a few products, relative to the sum of their sizes: each product and each partial sum is rounded.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Residuals of the optimality conditions at a point with multipliers. Multipliers have the right signs: they
 /// are projected onto their cones before, so that wrong ones count as a residual of the gradient.
@@ -34,6 +34,9 @@ pub struct Kkt {
     /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of
     /// its parts.
     pub feasibility: f64,
+    /// Whether the rounding of the residuals, larger than the cost at the point and at zero, is the reference of the shares. A
+    /// point far out along a direction that costs nothing has it too, and excuses itself.
+    pub is_rounding: bool,
 }
 
 impl Kkt {
@@ -99,7 +102,8 @@ impl Subproblem {
         residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let joined = self.joined_sizes(z);
-        let scale = self.cost_scale(z, &joined, at_zero);
+        let (cost, known) = self.cost_scales(z, &joined, at_zero);
+        let scale = cost.max(known);
         let natural = self.natural_scales(z, &joined, scale);
         let near = self.proximal.iter().zip(z);
         let mut gradient: Vec<f64> = near.map(|(d, z)| d * z).collect();
@@ -133,13 +137,14 @@ impl Subproblem {
             complementarity: share(rows.complementarity),
             violation_cost: share(rows.violation_cost),
             feasibility: rows.feasibility,
+            is_rounding: known > cost,
         }
     }
 
-    /// Half the cost that shares are of: the larger of the cost at `z` and `at_zero`, but no less than what makes a share of
+    /// The two costs whose larger half the shares are of: the larger of the cost at `z` and `at_zero`, and what makes a share of
     /// [`Kkt::COST`] of the rounding of the residuals. Where residuals cancel to nothing, that is all that can be known of
-    /// the minimum.
-    fn cost_scale(&self, z: &[f64], joined: &[f64], at_zero: f64) -> f64 {
+    /// the minimum. Half of each is returned.
+    fn cost_scales(&self, z: &[f64], joined: &[f64], at_zero: f64) -> (f64, f64) {
         let sizes = z
             .iter()
             .zip(joined)
@@ -151,7 +156,8 @@ impl Subproblem {
         let rows = self.residuals.right().iter().enumerate();
         let rounding = rows.map(|(i, f)| ROUNDING * (terms(&self.residuals, i, &sizes) + f.abs()));
         let known: f64 = rounding.map(|r| r * r).sum::<f64>() / Kkt::COST;
-        0.5 * at_zero.max(self.value(z) - self.constant).max(known)
+        let cost = at_zero.max(self.value(z) - self.constant);
+        (0.5 * cost, 0.5 * known)
     }
 
     /// The change of each variable that is as large as the other terms or the bounds of a row, of the row in which that is

@@ -1,6 +1,7 @@
 //! A program in units in which its coefficients are near 1.
 
-use super::{PrimalDual, Subproblem};
+use super::kkt::ROUNDING;
+use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Cone, Rows};
 
 /// Rounds of scaling by square roots: each halves the exponents that are left, and after twelve those of
@@ -69,6 +70,21 @@ impl Normalised {
             cones,
             cost,
         }
+    }
+
+    /// Whether a point of the original can satisfy rows as accurately as a solution has to ([`Kkt::VIOLATION`]): farther out
+    /// than this the rounding of a row's terms alone is more, relative to the largest bound.
+    pub fn resolves(&self, z: &[f64]) -> bool {
+        let rows = [
+            &self.sub.equalities,
+            &self.sub.inequalities,
+            &self.sub.absolute,
+        ];
+        let bounds = rows.into_iter().flat_map(|rows| rows.right());
+        let bounds = bounds.chain(&self.sub.upper).map(|bound| bound.abs());
+        let largest = bounds.filter(|bound| bound.is_finite()).fold(1.0, f64::max);
+        let mut sizes = z.iter().zip(&self.units).map(|(z, unit)| (z / unit).abs());
+        sizes.all(|size| ROUNDING * size <= Kkt::VIOLATION * largest)
     }
 
     /// A point of the program as one of the original.

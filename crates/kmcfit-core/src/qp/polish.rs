@@ -42,18 +42,29 @@ impl Subproblem {
 
     /// The best of `from` and the minima under the active sets that follow from it, with its residuals.
     pub fn polish(&self, from: PrimalDual) -> (PrimalDual, Kkt) {
+        self.polish_within(from, ROUNDS, IN_VAIN)
+    }
+
+    /// [`Subproblem::polish`] with at most `rounds` corrections of the active set, at most `most_in_vain` of them in a row without a
+    /// better point.
+    pub(super) fn polish_within(
+        &self,
+        from: PrimalDual,
+        rounds: usize,
+        most_in_vain: usize,
+    ) -> (PrimalDual, Kkt) {
         let kkt = self.kkt(&from);
         let mut best = (from, kkt);
         // A solution that is as near to its rows as constraints hold needs no repair.
-        let is_near = kkt.is_solution() && kkt.feasibility <= TOLERANCE;
-        if is_near || !self.can_be_polished() || !best.0.is_finite() {
+        let is_near = |kkt: &Kkt| kkt.is_solution() && kkt.feasibility <= TOLERANCE;
+        if is_near(&kkt) || !self.can_be_polished() || !best.0.is_finite() {
             return best;
         }
         let mut set = self.active_set(&best.0);
         let mut seen = vec![set.clone()];
         let mut point = best.0.clone();
         let mut in_vain = 0;
-        for _ in 0..ROUNDS {
+        for _ in 0..rounds {
             let Some(next) = self.minimum_on(&set, &point) else {
                 break;
             };
@@ -63,7 +74,7 @@ impl Subproblem {
                 best = (next.clone(), kkt);
             }
             in_vain = if is_better { 0 } else { in_vain + 1 };
-            if kkt.is_solution() || in_vain > IN_VAIN {
+            if is_near(&kkt) || in_vain > most_in_vain {
                 break;
             }
             let corrected = self.corrected(&set, &next);

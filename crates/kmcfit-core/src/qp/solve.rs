@@ -171,6 +171,12 @@ impl Subproblem {
             match ending {
                 Ending::Point(point) => {
                     let kkt = self.kkt(&point);
+                    let is_far = kkt.is_rounding
+                        && !(normalised.get_or_insert_with(|| Normalised::new(self)))
+                            .resolves(&point.z);
+                    if is_far {
+                        continue;
+                    }
                     if is_enough(&kkt) {
                         let status = match kkt.is_solution() {
                             true => ConicStatus::Solved,
