@@ -359,20 +359,21 @@ fn a_damaged_exchange_is_refused() {
         has_new.then_some(bench)
     });
     let killed = killed.expect("an exchange");
-    let damages: [(&str, &dyn Fn(&Path)); 4] = [
-        ("new/result.json", &|path| {
-            fs::write(path, "{}").expect("room")
-        }),
-        ("new/result.json", &|path| {
-            fs::remove_file(path).expect("removed")
-        }),
-        ("plan.json", &|path| fs::remove_file(path).expect("removed")),
-        ("plan.json", &|path| fs::write(path, "{}").expect("room")),
+    // `None` removes the file.
+    let damages = [
+        ("new/result.json", Some("{}")),
+        ("new/result.json", None),
+        ("plan.json", None),
+        ("plan.json", Some("{}")),
     ];
     for (name, damage) in damages {
         let bench = Workbench::in_memory();
         crate::tree::copy(&killed.path(""), &bench.path(""));
-        damage(&bench.path(&format!("{exchange}/{name}")));
+        let path = bench.path(&format!("{exchange}/{name}"));
+        match damage {
+            Some(text) => fs::write(path, text).expect("room"),
+            None => fs::remove_file(path).expect("removed"),
+        }
         let before = tree(&bench.path("run"));
         let (code, _, stderr) = bench.run(&["predict", "run", "--initial", "1,0"]);
         assert_eq!(code, 2, "{name}: {stderr}");

@@ -22,7 +22,7 @@ pub struct Band {
     pub name: String,
     /// Unit of the values.
     pub unit: String,
-    /// Values at the times of [`Bands::times`]; NaN where a frequency or damping ratio is not defined,
+    /// Values at the times of [`Bands::times`](super::Bands::times); NaN where a frequency or damping ratio is not defined,
     /// which a note says.
     pub values: Vec<f64>,
     /// Standard errors; infinite where not seen.
