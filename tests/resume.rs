@@ -117,7 +117,7 @@ fn lbfgs_with_its_memory_full() {
 
 #[test]
 fn gauss_newton_with_many_values() {
-    let longer = [("iterations: 100", "iterations: 9"), ("1e-6", "1e-30")];
+    let longer = [("iterations: 100", "iterations: 9"), ("1.0e-6", "1.0e-30")];
     again_and_again("paper-positive", &longer, 2);
 }
 

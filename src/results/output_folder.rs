@@ -120,6 +120,10 @@ impl OutputFolder {
     /// # Errors
     /// If the unfinished work has other inputs: it is not discarded.
     pub fn discards(&self, heading: &Heading) -> Result<bool, InputError> {
+        // Studies and comparisons keep their journals beside their results.
+        if heading.command != "fit" && self.path.join(MANIFEST).exists() {
+            return Ok(false);
+        }
         let mut is_discarded = false;
         for name in journal::NAMES {
             let path = self.path.join(name);

@@ -586,13 +586,13 @@ fn model_files() {
 fn output_folders() {
     let bench = Workbench::with_small_model();
     assert_snapshot!(refused(&bench, &["fit", "model.yaml", "--out", "model.yaml/out"]), @"
-    error: --out: the output folder cannot be made
-      found: model.yaml/out: model.yaml is a file, not a folder
+    error: --out: the output folder cannot be created
+      found: model.yaml is a file, not a folder
       expected: a folder that can be written to
     ");
     assert_snapshot!(refused(&bench, &["fit", "model.yaml", "--out", "model.yaml"]), @"
-    error: --out: the output folder cannot be made
-      found: model.yaml: model.yaml is a file, not a folder
+    error: --out: the output folder cannot be created
+      found: model.yaml is a file, not a folder
       expected: a folder that can be written to
     ");
     assert_snapshot!(
@@ -670,8 +670,8 @@ fn check_arguments() {
       expected: 3 or more
     ");
     assert_snapshot!(with(&["--out", "model.yaml/out"]), @"
-    error: --out: the output folder cannot be made
-      found: model.yaml/out: model.yaml is a file, not a folder
+    error: --out: the output folder cannot be created
+      found: model.yaml is a file, not a folder
       expected: a folder that can be written to
     ");
 }

@@ -319,6 +319,17 @@ fn a_folder_that_is_taken() {
     );
     bench.run_to(0, &["predict", "run", "--initial", "1,0"]);
     let (code, _, stderr) = bench.run(&["fit", "models/paper-lbfgs.yaml", "--out", "run"]);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(stderr.contains("unfinished work"), "{stderr}");
+    let few = [
+        "fit",
+        "models/paper.yaml",
+        "--set",
+        "fit.stop.iterations=5",
+        "--out",
+        "run",
+    ];
+    let (code, _, stderr) = bench.run(&few);
     assert_eq!(code, 0, "{stderr}");
     assert!(
         stderr.contains("note: Discarding the unfinished fit in this folder"),
@@ -515,7 +526,7 @@ fn a_folder_that_cannot_be_written_to() {
     let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--out", "/proc/kmcfit"]);
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert!(
-        stderr.starts_with("error: --out: the output folder cannot be made\n"),
+        stderr.starts_with("error: --out: the output folder cannot be created\n"),
         "{stderr}"
     );
 }
