@@ -24,9 +24,11 @@ pub fn flag() -> Arc<AtomicBool> {
 }
 
 fn register(is_set: &Arc<AtomicBool>) -> io::Result<()> {
-    let ignored = ignored();
-    let signals = [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)];
-    for (signal, code) in signals.into_iter().filter(|(signal, _)| !ignored(*signal)) {
+    for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
+        // SIGINT is always taken: shells without job control start background jobs that ignore it.
+        if signal == SIGTERM && is_ignored(SIGTERM) {
+            continue;
+        }
         // In this order: the first signal finds the flag down, sets it, and does not end the process.
         flag::register_conditional_shutdown(signal, code.into(), Arc::clone(is_set))?;
         flag::register(signal, Arc::clone(is_set))?;
@@ -39,14 +41,13 @@ fn register(is_set: &Arc<AtomicBool>) -> io::Result<()> {
     Ok(())
 }
 
-/// Which signals the process was started to ignore, as a shell does for a job in the background (`trap '' TERM`): they
-/// stay ignored. Linux lists them in `/proc/self/status`; elsewhere none is known.
-fn ignored() -> impl Fn(i32) -> bool {
+/// Whether the process was started to ignore a signal (`trap '' TERM`), which it then goes on to do. Linux lists these signals in
+/// `/proc/self/status`; elsewhere none is known.
+fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    let mask = mask.unwrap_or(0);
-    move |signal| mask >> (signal - 1) & 1 == 1
+    mask.unwrap_or(0) >> (signal - 1) & 1 == 1
 }
 
 /// The exit code of a run that a signal ended.
