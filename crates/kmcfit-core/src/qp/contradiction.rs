@@ -16,7 +16,8 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Regularisations that are tried for the least violations.
 const VIOLATION_ATTEMPTS: [f64; 2] = [1e-8, 1e-12];
 
-/// Corrections of the active set of the least violations: each row may be in it, and no time is lost where a program was refused.
+/// Most corrections of the active set of the least violations. More than in a polish: many rows are violated at the start of
+/// this search, and it runs only for programs that were refused.
 const VIOLATION_ROUNDS: usize = 24;
 
 /// `sum_i y_i (row_i z) <= bound` for every feasible point, as a linear function of the variables.

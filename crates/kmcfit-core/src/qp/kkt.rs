@@ -34,8 +34,9 @@ pub struct Kkt {
     /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of
     /// its parts.
     pub feasibility: f64,
-    /// Whether the rounding of the residuals, larger than the cost at the point and at zero, is the reference of the shares. A
-    /// point far out along a direction that costs nothing has it too, and excuses itself.
+    /// Whether the reference of the shares is the rounding of the residuals, which exceeds the cost at the point and at zero. It
+    /// also does at a point far out along a direction without cost, whatever the minimum is: such a point is judged in normalised
+    /// units before it is accepted.
     pub is_rounding: bool,
 }
 

@@ -69,7 +69,8 @@ impl Subproblem {
                 break;
             };
             let kkt = self.kkt(&next);
-            let is_better = kkt.is_better_than(&best.1);
+            // The first that is near enough is the end, even if its multipliers are less accurate.
+            let is_better = is_near(&kkt) || kkt.is_better_than(&best.1);
             if is_better {
                 best = (next.clone(), kkt);
             }
