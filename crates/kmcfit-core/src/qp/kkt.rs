@@ -34,10 +34,6 @@ pub struct Kkt {
     /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of
     /// its parts.
     pub feasibility: f64,
-    /// Whether the reference of the shares is the rounding of the residuals, which exceeds the cost at the point and at zero. It
-    /// also does at a point far out along a direction without cost, whatever the minimum is: such a point is judged in normalised
-    /// units before it is accepted.
-    pub is_rounding: bool,
 }
 
 impl Kkt {
@@ -78,11 +74,37 @@ impl Kkt {
     }
 }
 
+/// A sum of products in twice the working precision (Ogita, Rump and Oishi 2005, Algorithm 5.3).
+///
+/// Rows that depend on each other can have multipliers of any size that cancel. In working precision a gradient would vanish in
+/// the rounding of such multipliers, and any point would seem stationary.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    value: f64,
+    error: f64,
+}
+
+impl Sum {
+    fn add_product(&mut self, a: f64, b: f64) {
+        let product = a * b;
+        let sum = self.value + product;
+        let added = sum - self.value;
+        let lost = (self.value - (sum - added)) + (product - added);
+        self.error += lost + a.mul_add(b, -product);
+        self.value = sum;
+    }
+
+    fn total(self) -> f64 {
+        self.value + self.error
+    }
+}
+
 /// Adds `factor_i a_i` for every row.
-fn add(gradient: &mut [f64], rows: &Rows, factors: &[f64]) {
+fn add(gradient: &mut [Sum], rows: &Rows, factors: &[f64]) {
     for (i, factor) in factors.iter().enumerate() {
         if *factor != 0.0 {
-            rows.row(i).for_each(|(j, a)| gradient[j] += factor * a);
+            rows.row(i)
+                .for_each(|(j, a)| gradient[j].add_product(*factor, a));
         }
     }
 }
@@ -103,11 +125,12 @@ impl Subproblem {
         residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let joined = self.joined_sizes(z);
-        let (cost, known) = self.cost_scales(z, &joined, at_zero);
-        let scale = cost.max(known);
+        let scale = self.cost_scale(z, &joined, at_zero);
         let natural = self.natural_scales(z, &joined, scale);
-        let near = self.proximal.iter().zip(z);
-        let mut gradient: Vec<f64> = near.map(|(d, z)| d * z).collect();
+        let mut gradient = vec![Sum::default(); self.variables];
+        for ((sum, d), z) in gradient.iter_mut().zip(&self.proximal).zip(z) {
+            sum.add_product(*d, *z);
+        }
         for (rows, factors) in [
             (&self.residuals, &residuals),
             (&self.absolute, &candidate.absolute),
@@ -120,6 +143,7 @@ impl Subproblem {
             let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
             add(&mut gradient, &cone.rows, &negative);
         }
+        let gradient: Vec<f64> = gradient.into_iter().map(Sum::total).collect();
         let within = gradient.iter().zip(&natural);
         let within = within.map(|(r, x)| (r * x) * (r * x)).sum::<f64>().sqrt();
         let near = gradient.iter().zip(&self.proximal);
@@ -138,14 +162,12 @@ impl Subproblem {
             complementarity: share(rows.complementarity),
             violation_cost: share(rows.violation_cost),
             feasibility: rows.feasibility,
-            is_rounding: known > cost,
         }
     }
 
-    /// The two costs whose larger half the shares are of: the larger of the cost at `z` and `at_zero`, and what makes a share of
-    /// [`Kkt::COST`] of the rounding of the residuals. Where residuals cancel to nothing, that is all that can be known of
-    /// the minimum. Half of each is returned.
-    fn cost_scales(&self, z: &[f64], joined: &[f64], at_zero: f64) -> (f64, f64) {
+    /// Reference of the shares: half the largest of the cost at `z`, `at_zero`, and the cost of which the rounding of the residuals is
+    /// a share of [`Kkt::COST`]. Where residuals cancel to nothing, the minimum is determined no better.
+    fn cost_scale(&self, z: &[f64], joined: &[f64], at_zero: f64) -> f64 {
         let sizes = z
             .iter()
             .zip(joined)
@@ -158,7 +180,7 @@ impl Subproblem {
         let rounding = rows.map(|(i, f)| ROUNDING * (terms(&self.residuals, i, &sizes) + f.abs()));
         let known: f64 = rounding.map(|r| r * r).sum::<f64>() / Kkt::COST;
         let cost = at_zero.max(self.value(z) - self.constant);
-        (0.5 * cost, 0.5 * known)
+        0.5 * cost.max(known)
     }
 
     /// The change of each variable that is as large as the other terms or the bounds of a row, of the row in which that is
@@ -398,5 +420,25 @@ mod tests {
         assert_eq!(sub.kkt(&candidate).size(), 0.0);
         candidate.absolute = vec![-0.5];
         assert!(sub.kkt(&candidate).complementarity > 0.1);
+    }
+
+    /// `(z_1 - 2)^2 + (z_2 - 1)^2` with `z_2 = 0` twice: multipliers whose rounding is larger than the gradient prove nothing.
+    #[test]
+    fn a_gradient_does_not_vanish_in_the_rounding_of_multipliers_that_cancel() {
+        let mut sub = Subproblem::new(2);
+        sub.residuals.push([(0, 1.0)], 2.0);
+        sub.equalities.push([(1, 1.0)], 0.0);
+        sub.equalities.push([(1, 3.0)], 0.0);
+        sub.residuals.push([(1, 1.0)], 1.0);
+        let kkt = sub.kkt(&PrimalDual {
+            z: vec![2.0, 0.0],
+            equalities: [-3.0, 1.0].map(|y| y * 2f64.powi(100)).to_vec(),
+            ..PrimalDual::zero(&sub)
+        });
+        // The gradient in the second variable is -1, its natural size sqrt(5) at half the cost at zero, 2.5.
+        assert!(
+            (kkt.stationarity - 5f64.sqrt() / 2.5).abs() < 1e-15,
+            "{kkt:?}"
+        );
     }
 }

@@ -65,8 +65,12 @@ impl Symmetric {
     }
 
     /// Scales rows and columns alike until their largest entries are near 1; returns the scales.
+    ///
+    /// Many scalings do that. The one that is reached starts from the diagonal: pivots there keep their size beside the
+    /// shift, as large entries in their rows would not let them.
     fn equilibrate(&mut self) -> Vec<f64> {
         let mut total = vec![1.0; self.signs.len()];
+        self.rescale(&mut total, &self.scales_from_diagonal());
         for _ in 0..EQUILIBRATIONS {
             let mut largest = vec![0.0f64; total.len()];
             for &(i, j, a) in &self.entries {
@@ -77,12 +81,49 @@ impl Symmetric {
                 .iter()
                 .map(|&l| if l > 0.0 { 1.0 / l.sqrt() } else { 1.0 })
                 .collect();
-            for (i, j, a) in &mut self.entries {
-                *a *= scale[*i] * scale[*j];
-            }
-            total.iter_mut().zip(&scale).for_each(|(t, s)| *t *= s);
+            self.rescale(&mut total, &scale);
         }
         total
+    }
+
+    /// 1 for negative pivots that are not zero, then for every row what brings its largest entry in the columns that have a scale to 1.
+    fn scales_from_diagonal(&self) -> Vec<f64> {
+        let mut scales: Vec<Option<f64>> = vec![None; self.signs.len()];
+        for &(i, j, a) in &self.entries {
+            if i == j && a < 0.0 {
+                scales[i] = Some(1.0 / (-a).sqrt());
+            }
+        }
+        for _ in 0..2 {
+            let mut largest = vec![0.0f64; scales.len()];
+            for &(i, j, a) in &self.entries {
+                if i == j {
+                    largest[i] = largest[i].max(a.abs().sqrt());
+                    continue;
+                }
+                for (i, j) in [(i, j), (j, i)] {
+                    if let Some(scale) = scales[j] {
+                        largest[i] = largest[i].max(a.abs() * scale);
+                    }
+                }
+            }
+            for (scale, largest) in scales.iter_mut().zip(&largest) {
+                if scale.is_none() && *largest > 0.0 {
+                    *scale = Some(1.0 / largest);
+                }
+            }
+        }
+        scales
+            .into_iter()
+            .map(|scale| scale.unwrap_or(1.0))
+            .collect()
+    }
+
+    fn rescale(&mut self, total: &mut [f64], scale: &[f64]) {
+        for (i, j, a) in &mut self.entries {
+            *a *= scale[*i] * scale[*j];
+        }
+        total.iter_mut().zip(scale).for_each(|(t, s)| *t *= s);
     }
 
     fn refine(&self, factor: &mut QDLDLFactorisation<f64>, b: &[f64]) -> (Vec<f64>, f64) {

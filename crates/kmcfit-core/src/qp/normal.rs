@@ -1,8 +1,8 @@
 //! A program in units in which its coefficients are near 1.
 
 use super::kkt::ROUNDING;
-use super::{Kkt, PrimalDual, Subproblem};
-use crate::constraints::{Cone, Rows};
+use super::{PrimalDual, Subproblem};
+use crate::constraints::{Cone, Rows, TOLERANCE};
 
 /// Rounds of scaling by square roots: each halves the exponents that are left, and after twelve those of
 /// the largest and smallest numbers are below 1.
@@ -72,8 +72,9 @@ impl Normalised {
         }
     }
 
-    /// Whether a point of the original can satisfy rows as accurately as a solution has to ([`Kkt::VIOLATION`]): farther out
-    /// than this the rounding of a row's terms alone is more, relative to the largest bound.
+    /// Whether a point of the original is near enough for its rows and its cost to be computed as accurately as constraints hold
+    /// ([`TOLERANCE`]): farther out along a direction without cost, the rounding of the terms of a row exceeds that share of the largest bound,
+    /// and residuals relative to those terms are small at any point.
     pub fn resolves(&self, z: &[f64]) -> bool {
         let rows = [
             &self.sub.equalities,
@@ -84,7 +85,7 @@ impl Normalised {
         let bounds = bounds.chain(&self.sub.upper).map(|bound| bound.abs());
         let largest = bounds.filter(|bound| bound.is_finite()).fold(1.0, f64::max);
         let mut sizes = z.iter().zip(&self.units).map(|(z, unit)| (z / unit).abs());
-        sizes.all(|size| ROUNDING * size <= Kkt::VIOLATION * largest)
+        sizes.all(|size| ROUNDING * size <= TOLERANCE * largest)
     }
 
     /// A point of the program as one of the original.
@@ -174,4 +175,22 @@ fn units(sub: &Subproblem) -> Vec<f64> {
         *unit = power_of_two(*unit);
     }
     units
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `z_1 - z_2 = 1` in other units of the variables: far out along the line the terms of the row round more than it may be violated by.
+    #[test]
+    fn points_whose_rows_are_only_rounding_are_not_resolved() {
+        let units = [2f64.powi(20), 2f64.powi(-20)];
+        let mut sub = Subproblem::new(2);
+        sub.equalities
+            .push([(0, 1.0 / units[0]), (1, -1.0 / units[1])], 1.0);
+        let normalised = Normalised::new(&sub);
+        let at = |z: f64| [(z + 1.0) * units[0], z * units[1]];
+        assert!(normalised.resolves(&at(1e3)));
+        assert!(!normalised.resolves(&at(1e12)));
+    }
 }

@@ -63,6 +63,9 @@ impl Subproblem {
         let mut set = self.active_set(&best.0);
         let mut seen = vec![set.clone()];
         let mut point = best.0.clone();
+        // Multipliers of rows that depend on each other are determined up to multiples: those nearest to zero cancel least.
+        point.equalities.fill(0.0);
+        point.inequalities.fill(0.0);
         let mut in_vain = 0;
         for _ in 0..rounds {
             let Some(next) = self.minimum_on(&set, &point) else {

@@ -171,10 +171,8 @@ impl Subproblem {
             match ending {
                 Ending::Point(point) => {
                     let kkt = self.kkt(&point);
-                    let is_far = kkt.is_rounding
-                        && !(normalised.get_or_insert_with(|| Normalised::new(self)))
-                            .resolves(&point.z);
-                    if is_far {
+                    let normalised = normalised.get_or_insert_with(|| Normalised::new(self));
+                    if !normalised.resolves(&point.z) {
                         continue;
                     }
                     if is_enough(&kkt) {
