@@ -12,12 +12,14 @@ use super::executor::{Prepared, search, search_prepared};
 use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
+use super::start_projection::StartProjection;
 use super::starts::{
     Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
     truncated_steps,
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
+use crate::constraints::TOLERANCE;
 use crate::host::Instant;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
@@ -221,31 +223,48 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 None => start.to_vec(),
             },
             StartStrategy::StartValues | StartStrategy::Continued => start.to_vec(),
-            StartStrategy::EquationError => data_start(&mut self.timings),
+            StartStrategy::EquationError => {
+                let found = data_start(&mut self.timings);
+                self.inside(found)
+            }
             StartStrategy::GrowingHorizon => {
                 let from = data_start(&mut self.timings);
                 let (found, counts, timings) =
                     growing_horizon_start(problem, from, &self.probing, self.watch);
                 self.counts += counts;
                 self.timings += timings;
-                found
+                self.inside(found)
             }
             StartStrategy::Collocation => {
                 let flag = self.settings.interrupt.as_ref();
                 let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
                 let timings = &mut self.timings;
-                self.watch.piece(start.len(), &interrupted, || {
+                let found = self.watch.piece(start.len(), &interrupted, || {
                     let found = timed(&mut timings.start, || {
                         collocation_start(problem, start, &interrupted)
                     });
                     found.unwrap_or_else(|| data_start(timings))
-                })
+                });
+                self.inside(found)
             }
         };
         Prepared {
             parameters,
             evaluation: None,
             spare: None,
+        }
+    }
+
+    /// A starting point made from the data, moved into the constraint set if its program ended outside, which rows of very
+    /// different scales cause; the start values if it cannot be moved.
+    fn inside(&self, parameters: Vec<f64>) -> Vec<f64> {
+        if self.problem.constraints.hold(&parameters, TOLERANCE) {
+            return parameters;
+        }
+        match self.problem.feasible_start(&parameters) {
+            StartProjection::Kept(inside) => inside,
+            StartProjection::Moved { parameters, .. } => parameters,
+            _ => self.start.to_vec(),
         }
     }
 

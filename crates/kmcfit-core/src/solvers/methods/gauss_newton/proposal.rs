@@ -72,7 +72,12 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
     let least = least_decrease(work.problem(), cost);
     // False for NaN.
     let is_sound = |predicted: &f64| *predicted >= -least;
-    let moved = |z: &[f64]| constraints.moved(&point.parameters, z);
+    // Rounding of the step, or a clipped parameter, may break a row that the step itself satisfies.
+    let moved = |z: &[f64]| {
+        let parameters = constraints.moved(&point.parameters, z);
+        let is_inside = constraints.hold(&parameters, constraints::TOLERANCE);
+        is_inside.then_some(parameters)
+    };
     let exact = |parameters: Vec<f64>, predicted: f64| {
         Answer::Step(Proposal {
             parameters,
@@ -83,14 +88,17 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
     let plain = work.algebra(|| sub.solve_plain());
     let plain = plain.map(|z| (cost - sub.value(&z), z));
     if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
-        if sub.holds(&z, 0.1 * constraints::TOLERANCE) {
-            return exact(moved(&z), best);
+        if sub.holds(&z, 0.1 * constraints::TOLERANCE)
+            && let Some(parameters) = moved(&z)
+        {
+            return exact(parameters, best);
         }
         if constraints.are_simple() {
-            let parameters = moved(&z);
-            let predicted = cost - model_cost(work, sub, point, &parameters);
-            if predicted >= CLIPPED * best && is_sound(&predicted) {
-                return exact(parameters, predicted);
+            if let Some(parameters) = moved(&z) {
+                let predicted = cost - model_cost(work, sub, point, &parameters);
+                if predicted >= CLIPPED * best && is_sound(&predicted) {
+                    return exact(parameters, predicted);
+                }
             }
             let near = 0.1 * constraints::TOLERANCE;
             let held = work.algebra(|| sub.solve_held(z, near));
@@ -98,8 +106,9 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
             if let Some((predicted, z)) = held
                 && predicted >= CLIPPED * best
                 && is_sound(&predicted)
+                && let Some(parameters) = moved(&z)
             {
-                return exact(moved(&z), predicted);
+                return exact(parameters, predicted);
             }
         }
     }
@@ -108,10 +117,9 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
     if !solution.status.is_point() {
         return Answer::Unsolved(solution.status);
     }
-    let parameters = moved(&solution.z);
-    if !constraints.hold(&parameters, constraints::TOLERANCE) {
+    let Some(parameters) = moved(&solution.z) else {
         return Answer::Unsolved(ConicStatus::Stalled);
-    }
+    };
     // Not the program's own value: its solution satisfies the steps only to its accuracy.
     let model = model_cost(work, sub, point, &parameters);
     let predicted = cost - model;
