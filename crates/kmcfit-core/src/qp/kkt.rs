@@ -4,6 +4,7 @@
 //! conditions of Karush, Kuhn and Tucker are computed from the program's data, each in a unit in which
 //! it means the same whatever the units of rows, variables and cost are.
 
+use super::sum::{Sum, add, distances};
 use super::{PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
@@ -74,41 +75,6 @@ impl Kkt {
     }
 }
 
-/// A sum of products in twice the working precision (Ogita, Rump and Oishi 2005, Algorithm 5.3).
-///
-/// Rows that depend on each other can have multipliers of any size that cancel. In working precision a gradient would vanish in
-/// the rounding of such multipliers, and any point would seem stationary.
-#[derive(Clone, Copy, Default)]
-struct Sum {
-    value: f64,
-    error: f64,
-}
-
-impl Sum {
-    fn add_product(&mut self, a: f64, b: f64) {
-        let product = a * b;
-        let sum = self.value + product;
-        let added = sum - self.value;
-        let lost = (self.value - (sum - added)) + (product - added);
-        self.error += lost + a.mul_add(b, -product);
-        self.value = sum;
-    }
-
-    fn total(self) -> f64 {
-        self.value + self.error
-    }
-}
-
-/// Adds `factor_i a_i` for every row.
-fn add(gradient: &mut [Sum], rows: &Rows, factors: &[f64]) {
-    for (i, factor) in factors.iter().enumerate() {
-        if *factor != 0.0 {
-            rows.row(i)
-                .for_each(|(j, a)| gradient[j].add_product(*factor, a));
-        }
-    }
-}
-
 /// `sum_j |a_ij| x_j`.
 fn terms(rows: &Rows, i: usize, x: &[f64]) -> f64 {
     rows.row(i).map(|(j, a)| (a * x[j]).abs()).sum()
@@ -120,9 +86,7 @@ impl Subproblem {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
         let z = &candidate.z;
-        let mut residuals = self.residuals.multiply(z);
-        let right = self.residuals.right();
-        residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
+        let residuals = distances(&self.residuals, z);
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let joined = self.joined_sizes(z);
         let scale = self.cost_scale(z, &joined, at_zero);
@@ -143,7 +107,7 @@ impl Subproblem {
             let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
             add(&mut gradient, &cone.rows, &negative);
         }
-        let gradient: Vec<f64> = gradient.into_iter().map(Sum::total).collect();
+        let gradient: Vec<f64> = gradient.iter().map(Sum::total).collect();
         let within = gradient.iter().zip(&natural);
         let within = within.map(|(r, x)| (r * x) * (r * x)).sum::<f64>().sqrt();
         let near = gradient.iter().zip(&self.proximal);
@@ -230,10 +194,10 @@ impl Subproblem {
 
     fn add_rows(&self, candidate: &PrimalDual, natural: &[f64], sums: &mut RowResiduals) {
         let z = &candidate.z;
-        let values = self.equalities.multiply(z);
-        for (i, (value, right)) in values.iter().zip(self.equalities.right()).enumerate() {
+        for (i, distance) in distances(&self.equalities, z).into_iter().enumerate() {
+            let right = self.equalities.right()[i];
             let size = terms(&self.equalities, i, natural).max(right.abs());
-            sums.violate((value - right).abs(), size, candidate.equalities[i]);
+            sums.violate(distance.abs(), size, candidate.equalities[i]);
         }
         let values = self.inequalities.multiply(z);
         for (i, value) in values.iter().enumerate() {
@@ -254,9 +218,7 @@ impl Subproblem {
                 sums.complementarity += (multiplier * (bound - value)).abs();
             }
         }
-        let values = self.absolute.multiply(z);
-        for (i, (value, right)) in values.iter().zip(self.absolute.right()).enumerate() {
-            let jump = value - right;
+        for (i, jump) in distances(&self.absolute, z).into_iter().enumerate() {
             let half = 0.5 * self.absolute_weights[i];
             let lost = half - candidate.absolute[i] * jump.signum();
             sums.complementarity += lost.max(0.0) * jump.abs();

@@ -16,6 +16,7 @@ mod primal_dual;
 mod projection;
 mod solve;
 mod subproblem;
+mod sum;
 
 pub use kkt::Kkt;
 pub use primal_dual::PrimalDual;
