@@ -18,7 +18,7 @@ const PROGRAMS: u64 = 500;
 const REFUSALS: usize = 5;
 /// Accuracy of the minimum, relative to the larger of it and the cost at zero.
 const COST: f64 = 1e-9;
-/// Accuracy of the constraints, relative to the terms of their rows: that of a solution ([`kmcfit_core::internals::qp::Kkt::VIOLATION`]).
+/// Accuracy of the constraints, relative to the natural sizes of the terms of their rows: that of a solution ([`kmcfit_core::internals::qp::Kkt::VIOLATION`]).
 const ROWS: f64 = 1e-8;
 /// Largest exponent of two of a scale: twelve decades from the smallest to the largest.
 const OCTAVES: i32 = 20;
@@ -204,13 +204,27 @@ fn cost(program: &Program, z: &[f64]) -> f64 {
     squares.chain(proximal).chain(absolute).sum()
 }
 
-/// The largest violation of a row at `z`, in the units of the integers, relative to the largest of its terms, its bound
-/// and 1, an ordinary number among them.
-fn violation(program: &Program, z: &[f64]) -> f64 {
+/// The natural size of each variable: the larger of `|z_j|` and the change that costs as much as `scale` by the squares in which
+/// it stands.
+fn natural_sizes(program: &Program, z: &[f64], scale: f64) -> Vec<f64> {
+    let size = |(j, z): (usize, &f64)| {
+        let squares = program.squares.iter().map(|(a, _)| a[j] * a[j]);
+        match squares.sum::<i128>() + program.proximal[j] {
+            0 => z.abs(),
+            curvature => z.abs().max((scale / curvature as f64).sqrt()),
+        }
+    };
+    z.iter().enumerate().map(size).collect()
+}
+
+/// The largest violation of a row at `z`, in the units of the integers, relative to the largest of its terms at the natural sizes, its
+/// bound and 1, an ordinary number among them.
+fn violation(program: &Program, z: &[f64], scale: f64) -> f64 {
+    let sizes = natural_sizes(program, z, scale);
     let outside = |a: &[i128], lower: Option<i128>, upper: Option<i128>| {
-        let terms = || a.iter().zip(z).map(|(a, z)| *a as f64 * z);
-        let size = terms().map(f64::abs).sum::<f64>().max(1.0);
-        let value: f64 = terms().sum();
+        let value = residual(a, z, 0);
+        let terms = a.iter().zip(&sizes).map(|(a, x)| (*a as f64).abs() * x);
+        let size = terms.sum::<f64>().max(1.0);
         let below = lower.map_or(0.0, |b| (b as f64 - value) / size.max((b as f64).abs()));
         let above = upper.map_or(0.0, |b| (value - b as f64) / size.max((b as f64).abs()));
         below.max(above)
@@ -261,7 +275,7 @@ fn check(seed: u64) {
                 let (found, at_zero) = (cost(&exact, &z), cost(&exact, &vec![0.0; exact.n]));
                 // 1 is an ordinary cost among integers.
                 let error = (found - minimum).abs() / at_zero.max(minimum).max(1.0);
-                let outside = violation(&exact, &z);
+                let outside = violation(&exact, &z, at_zero.max(found));
                 if !(error <= COST && outside <= ROWS) {
                     wrong.push(format!(
                         "{number}: {found:e} for {minimum:e}, rows to {outside:.1e}"

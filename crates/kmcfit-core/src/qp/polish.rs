@@ -13,9 +13,6 @@ use crate::constraints::{Rows, TOLERANCE};
 const ROUNDS: usize = 12;
 /// Corrections in a row that bring no better point: two, since a wrong row is let go only after it was held.
 const IN_VAIN: usize = 2;
-/// Residuals, as shares of those of a solution, that need no repair: a row is violated by no more than a share of its natural
-/// size, and its terms may be some ten times smaller.
-const EXACT: f64 = 1e-3;
 
 /// Where a row or an absolute value is held.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -58,8 +55,9 @@ impl Subproblem {
     ) -> (PrimalDual, Kkt) {
         let kkt = self.kkt(&from);
         let mut best = (from, kkt);
+        // A solution that is as near to its rows as constraints hold needs no repair.
         let is_near = |kkt: &Kkt| kkt.is_solution() && kkt.feasibility <= TOLERANCE;
-        if kkt.size() <= EXACT || !self.can_be_polished() || !best.0.is_finite() {
+        if is_near(&kkt) || !self.can_be_polished() || !best.0.is_finite() {
             return best;
         }
         let mut set = self.active_set(&best.0);
