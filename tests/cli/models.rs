@@ -1,7 +1,6 @@
 //! Every shipped model, and what a run leaves behind.
 
 use crate::workbench::{MODEL, Workbench, column, paper_run, repository, table};
-use insta::assert_snapshot;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -26,11 +25,25 @@ fn fitted(name: &str, code: i32) -> (Workbench, Value) {
 }
 
 /// The work of a shipped model is pinned, so that lost efficiency is seen without a clock. More work
-/// is a loss, and less a gain to be taken in by `cargo insta test --review`.
+/// is a loss, and less a gain to be pinned. The system's sines depend on the processor in
+/// their last bit, which moves the end of a search by an iteration: the band is two, and a twentieth.
 fn takes_as_much_work_as_ever(name: &str, result: &Value) {
+    let pinned = repository(&format!("tests/cli/work/{name}.txt"));
+    let pinned =
+        fs::read_to_string(&pinned).unwrap_or_else(|e| panic!("{}: {e}", pinned.display()));
     let keys = ["iterations", "forward", "adjoint", "tangent", "qp"];
-    let counts = keys.map(|key| format!("{key}: {}", result["counts"][key]));
-    assert_snapshot!(work_of(name), counts.join("\n"));
+    let mut lines = pinned.lines();
+    for key in keys {
+        let line = lines.next().unwrap_or_default();
+        let count = line.strip_prefix(&format!("{key}: "));
+        let count: u64 = count.and_then(|n| n.parse().ok()).expect("a pinned count");
+        let found = result["counts"][key].as_u64().expect("a count");
+        let band = if count == 0 { 0 } else { 2 + count / 20 };
+        assert!(
+            found.abs_diff(count) <= band,
+            "{name}: {key} {found}, pinned {count} within {band}"
+        );
+    }
     // What is timed is what is counted.
     for key in &keys[1..] {
         let (timed, counted) = (&result["timings"][key], &result["counts"][key]);
@@ -41,11 +54,6 @@ fn takes_as_much_work_as_ever(name: &str, result: &Value) {
     // Time that was told twice would leave nothing for the rest.
     let other = &result["timings"]["other"]["seconds"];
     assert!(other.as_f64().expect("a number") > 0.0, "{name}: {result}");
-}
-
-/// Name of the snapshot of a model's work.
-fn work_of(name: &str) -> String {
-    format!("work-of-{name}")
 }
 
 #[test]
@@ -92,8 +100,8 @@ fn every_shipped_model_is_run_here() {
     ];
     for file in run_here.iter().filter(|file| !without_fit.contains(file)) {
         let name = file.strip_suffix(".yaml").expect("YAML");
-        let snapshot = format!("tests/cli/snapshots/cli__models__{}.snap", work_of(name));
-        assert!(repository(&snapshot).exists(), "{snapshot}");
+        let pinned = format!("tests/cli/work/{name}.txt");
+        assert!(repository(&pinned).exists(), "{pinned}");
     }
 }
 
