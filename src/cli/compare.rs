@@ -126,9 +126,10 @@ fn finish(
     let flag = interrupt::flag();
     let (comparison, interrupted) =
         side_by_side(entries, children, &flag, &mut journal, is_resumed)?;
-    comparison
+    let written = comparison
         .write(folder)
-        .map_err(|error| unwritable(folder.path(), &error))?;
+        .and_then(|()| journal.finish_if(!interrupted));
+    written.map_err(|error| unwritable(folder.path(), &error))?;
     if as_json {
         print(&json(&comparison.document()));
     } else {

@@ -118,9 +118,10 @@ fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> R
         true => comparison,
         false => comparison.told_as(&story.title),
     };
-    comparison
+    let written = comparison
         .write(&folder)
-        .map_err(|error| unwritable(folder.path(), &error))?;
+        .and_then(|()| journal.finish_if(!interrupted));
+    written.map_err(|error| unwritable(folder.path(), &error))?;
     if as_json {
         print(&json(&comparison.document()));
     } else {
@@ -212,9 +213,10 @@ fn study(
     if done {
         document.status = "complete".into();
     }
-    document
+    let written = document
         .write(&folder)
-        .map_err(|error| unwritable(folder.path(), &error))?;
+        .and_then(|()| work.journal.finish_if(done));
+    written.map_err(|error| unwritable(folder.path(), &error))?;
     match as_json {
         true => print(&json(&document)),
         false => {

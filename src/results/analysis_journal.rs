@@ -20,6 +20,18 @@ struct Line {
     result: Value,
 }
 
+/// Name of the line that is written once the results are; no analysis has it, and no file.
+const FINISHED: &str = "results/written";
+
+/// Whether the work of a journal is finished and its results were written.
+pub(super) fn is_finished(path: &Path) -> bool {
+    let Ok(text) = JournalText::read(path, WHAT) else {
+        return false;
+    };
+    text.lines()
+        .any(|(line, _): (Line, _)| line.analysis == FINISHED)
+}
+
 /// The finished analyses, on disk as soon as they are.
 #[derive(Debug)]
 pub struct AnalysisJournal {
@@ -71,6 +83,17 @@ impl AnalysisJournal {
     /// Whether there is an analysis of this name.
     pub fn has(&self, name: &str) -> bool {
         self.done.contains_key(name)
+    }
+
+    /// Marks the work as finished if it `is_done`: its results are written, and may be replaced by those of other inputs.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn finish_if(&mut self, is_done: bool) -> io::Result<()> {
+        match is_done {
+            true => self.analysis(FINISHED, || true, || true).map(drop),
+            false => Ok(()),
+        }
     }
 
     /// Forgets an analysis that does not have the expected form, so that it is made again.

@@ -50,7 +50,9 @@ impl FileRecord {
     }
 }
 
+/// A file of another length or digest.
 const CHANGED: &str = "this file was changed since kmcfit wrote it";
+/// A file whose length or contents cannot be read.
 const UNREADABLE: &str = "this file cannot be read, to see whether kmcfit wrote it";
 
 /// What stands where the manifest names a file.

@@ -1,5 +1,6 @@
 //! Output folders: checked before the work begins, written as a whole at its end.
 
+use super::analysis_journal;
 use super::claim::Claim;
 use super::exchange::{self, Stage};
 use super::heading::Heading;
@@ -56,6 +57,10 @@ impl OutputFolder {
             match e.kind() {
                 // The text names the file in the way.
                 io::ErrorKind::Other => error.found(e),
+                // The system's text for a file system that is kept by the kernel, as /proc is.
+                io::ErrorKind::NotFound => {
+                    error.found(format!("{} takes no new folders", existing(path).display()))
+                }
                 _ => error,
             }
         })?;
@@ -120,16 +125,16 @@ impl OutputFolder {
     /// # Errors
     /// If the unfinished work has other inputs: it is not discarded.
     pub fn discards(&self, heading: &Heading) -> Result<bool, InputError> {
-        // Studies and comparisons keep their journals beside their results.
-        if heading.command != "fit" && self.path.join(MANIFEST).exists() {
-            return Ok(false);
-        }
         let mut is_discarded = false;
         for name in journal::NAMES {
             let path = self.path.join(name);
             let Some(before) = journal::heading_of(&path) else {
                 continue;
             };
+            // Studies and comparisons keep their journals beside their results.
+            if analysis_journal::is_finished(&path) {
+                continue;
+            }
             if !heading.has_inputs_of(&before) {
                 return Err(self.unfinished(&path, &before));
             }

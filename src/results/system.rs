@@ -125,9 +125,10 @@ pub fn create_folders(folder: &Path) -> io::Result<()> {
         Some(other) => Err(io::Error::other(format!(
             "{} is {}, not a folder",
             other.display(),
-            match other.is_symlink() {
-                true => "a link that leads to no folder",
-                false => "a file",
+            match other {
+                other if other.is_symlink() => "a link that leads to no folder",
+                other if other.is_file() => "a file",
+                _ => "a device, a pipe or a socket",
             }
         ))),
         None => fs::create_dir_all(folder),

@@ -265,10 +265,37 @@ fn other_things_in_the_place_of_the_folder_are_named() {
         ("link/run", "a link"),
         ("link", "a link"),
         ("file", "a file"),
+        ("/dev/null", "a device"),
+        #[cfg(target_os = "linux")]
+        ("/proc/kmcfit", "/proc takes no new folders"),
     ] {
         let stderr = refused(&bench, &["fit", "model.yaml", "--out", out], "--out");
         assert!(stderr.contains(what), "{stderr}");
         assert!(!stderr.contains("os error"), "{stderr}");
+    }
+}
+
+/// A study that was killed over the results of an older one is unfinished work as well; a finished one is replaced.
+#[test]
+fn a_study_killed_over_older_results_is_not_replaced_unsaid() {
+    for command in ["study", "compare"] {
+        let bench = Workbench::with_small_model();
+        let run = || bench.run(&[command, "model.yaml", "--out", "twice"]);
+        let is_said = |stderr: &str| stderr.contains("Discarding the unfinished");
+        for _ in 0..2 {
+            let (code, _, stderr) = run();
+            assert!(code == 0 || code == 3, "{stderr}");
+            assert!(!is_said(&stderr), "{stderr}");
+        }
+        // Killed after its first line.
+        let journal = format!("twice/{command}.journal");
+        let text = bench.read(&journal);
+        let heading = text.lines().next().expect("a heading");
+        bench.write(&journal, &format!("{heading}\n"));
+        bench.write("other.yaml", &bench.read("model.yaml"));
+        refused(&bench, &[command, "other.yaml", "--out", "twice"], &journal);
+        let (_, _, stderr) = run();
+        assert!(is_said(&stderr), "{stderr}");
     }
 }
 
