@@ -128,6 +128,14 @@ impl Parameterization {
         &self.list[index]
     }
 
+    /// The Gram matrix of function `index` of the list.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub(crate) fn gram(&self, index: usize) -> &Gram {
+        &self.grams[index]
+    }
+
     /// The functions: those of the main device, mass first, then those of single experiments.
     pub fn iter(&self) -> impl Iterator<Item = &CoefficientFunction> {
         self.list.iter()

@@ -9,7 +9,7 @@ use super::components::{Component, components};
 use super::directions::Directions;
 use super::linear::{column_space, null_space};
 use super::sensitivity::Spectrum;
-use crate::functions::{Design, Gram};
+use crate::functions::Design;
 use crate::problem::Problem;
 use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
@@ -333,7 +333,7 @@ fn change(
             Design::Empty => {}
             Design::Identity => part.copy_from_slice(&product),
             design @ Design::Sparse(_) => {
-                let gram = Gram::new(design, &weights).expect("independent functions");
+                let gram = functions.gram(f);
                 let mut step = vec![0.0; part.len()];
                 // Twice: the second pass removes what the normal equations lose.
                 for _ in 0..2 {
