@@ -292,3 +292,43 @@ fn links_lead_somewhere() {
     }
     assert!(count > 50, "{count}");
 }
+
+/// The names between backquotes in a text.
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+/// Whether a test is there: a path, `module::function`, or a module or function, of the tests of reliability.
+fn is_test(name: &str) -> bool {
+    let folder = repository("tests/reliability");
+    let source = |module: &str| fs::read_to_string(folder.join(format!("{module}.rs")));
+    let has = |source: &str, function: &str| source.contains(&format!("fn {function}("));
+    if name.contains('/') {
+        return repository(name).exists();
+    }
+    match name.split_once("::") {
+        Some((module, function)) => source(module).is_ok_and(|source| has(&source, function)),
+        None => {
+            let files = fs::read_dir(&folder).expect("a folder").flatten();
+            let mut sources = files.filter_map(|file| fs::read_to_string(file.path()).ok());
+            source(name).is_ok() || sources.any(|source| has(&source, name))
+        }
+    }
+}
+
+#[test]
+fn each_promise_names_its_tests() {
+    let page = page("docs/crash_safety.md");
+    let rows = page.lines().filter(|line| line.starts_with("| ")).skip(1);
+    let mut count = 0;
+    for row in rows {
+        let (_, tests) = row.trim_end_matches(" |").rsplit_once(" | ").expect(row);
+        assert!(quoted(tests).count() > 0, "{row}");
+        for name in quoted(tests).filter(|name| !name.contains(' ')) {
+            assert!(is_test(name), "{name}");
+            count += 1;
+        }
+    }
+    assert!(count > 20, "{count}");
+    assert!(!is_test("outputs::no_such_test") && !is_test("no_such_test"));
+}

@@ -9,6 +9,8 @@ mod random_folders;
 mod signals;
 mod streams;
 mod tree;
+#[cfg(target_os = "linux")]
+mod unprivileged;
 #[allow(dead_code, reason = "shared with the tests of the command line")]
 #[path = "../cli/workbench.rs"]
 mod workbench;

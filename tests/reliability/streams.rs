@@ -1,6 +1,8 @@
 //! Standard output and standard error that cannot be written.
 
 use crate::tree::whole_run;
+#[cfg(target_os = "linux")]
+use crate::unprivileged::run_unprivileged;
 use crate::workbench::{MODEL, Workbench};
 use std::process::{Command, Stdio};
 
@@ -92,36 +94,13 @@ fn threads_that_cannot_be_had() {
     bench.run_to(0, &[&study[..], &["many", "--threads", "100000"]].concat());
     let read = |run: &str| bench.read(&format!("{run}/study.json"));
     assert!(read("one") == read("many"));
-    // The limit on processes does not hold for the administrator.
-    let program = bench.path("kmcfit");
-    std::fs::copy(env!("CARGO_BIN_EXE_kmcfit"), &program).expect("a copy");
     std::fs::create_dir(bench.path("limited")).expect("a folder");
-    let line = format!(
-        "chmod -R a+rwX '{0}' && exec setpriv --reuid=65534 --clear-groups prlimit --nproc=1          '{1}' study models/linear-mass.yaml --out limited --threads 8",
-        bench.path("").display(),
-        program.display()
-    );
-    let can = Command::new("setpriv")
-        .args([
-            "--reuid=65534",
-            "--clear-groups",
-            "prlimit",
-            "--nproc=1",
-            "true",
-        ])
-        .status();
-    if !can.is_ok_and(|status| status.success()) {
-        eprintln!("SKIPPED: this process may not change its user");
-        return;
+    let one_process = ["prlimit", "--nproc=1"];
+    let limited = [&study[..], &["limited", "--threads", "8"]].concat();
+    if let Some((code, stderr)) = run_unprivileged(&bench, "true", &one_process, &limited) {
+        assert_eq!(code, 0, "{stderr}");
+        assert!(read("one") == read("limited"));
     }
-    let output = Command::new("sh")
-        .args(["-c", &line])
-        .current_dir(bench.path(""))
-        .output()
-        .expect("a shell");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    assert!(read("one") == read("limited"));
 }
 
 /// File systems that are full or read-only, where this process may mount some.
