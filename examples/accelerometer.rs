@@ -3,7 +3,7 @@
 use kmcfit::observations::Table;
 use kmcfit_core::Interpolation;
 use kmcfit_core::{BandSettings, Bands};
-use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Builder, CoefficientSpec, Record};
 use std::error::Error;
 
 /// Value and standard error of mass (kg), damping (N s/m) and stiffness (N/m).
@@ -18,9 +18,9 @@ pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
         .acceleration(times, table.column("a_m_per_s2")?)
         .sigma(0.02);
     let device = [
-        Part::constant(3.0),
-        Part::constant(0.0),
-        Part::constant(200.0),
+        CoefficientSpec::constant(3.0),
+        CoefficientSpec::constant(0.0),
+        CoefficientSpec::constant(200.0),
     ];
     let problem = Builder::new(device).record(record).nodes(4801).build()?;
     let fit = problem.fit()?;

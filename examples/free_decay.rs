@@ -1,6 +1,6 @@
 // A free decay from arrays: which damping and stiffness, if the mass is known?
 
-use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Builder, CoefficientSpec, Record};
 use std::error::Error;
 
 /// Damping (N s/m) and stiffness (N/m).
@@ -12,9 +12,9 @@ pub fn found() -> Result<[f64; 2], Box<dyn Error>> {
     let motion: Vec<f64> = times.iter().map(decay).collect();
 
     let device = [
-        Part::fixed(1.0),
-        Part::constant(1.0).min(0.0),
-        Part::constant(2000.0).min(0.0),
+        CoefficientSpec::fixed(1.0),
+        CoefficientSpec::constant(1.0).min(0.0),
+        CoefficientSpec::constant(2000.0).min(0.0),
     ];
     let record = Record::new("ring-down")
         .from_state(0.01, 0.0)

@@ -3,7 +3,7 @@
 use kmcfit::observations::Table;
 use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
-use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Shape, Statement};
 use std::error::Error;
 
@@ -15,15 +15,15 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
         .displacement(table.column("t_s")?, table.column("y_m")?);
     let device = [
         // Positive, and bent as little as the record lets it be.
-        Part::nodal(2.0).min(0.05).smooth(2, 1e-3),
-        Part::nodal(1.0).min(0.0).smooth(2, 1e-3),
+        CoefficientSpec::nodal(2.0).min(0.05).smooth(2, 1e-3),
+        CoefficientSpec::nodal(1.0).min(0.0).smooth(2, 1e-3),
         // Free motion shows ratios alone: one function must be known.
-        Part::fixed(1.0),
+        CoefficientSpec::fixed(1.0),
     ];
     let problem = Builder::new(device)
         .record(record)
         .method(Method::Midpoint)
-        .demand(Statement::Shape {
+        .constrain(Statement::Shape {
             of: CoefficientKind::Mass,
             shape: Shape::NonIncreasing,
         })

@@ -1,7 +1,7 @@
 // Before measuring: what can a record show? One free decay, and the same with a shaker run.
 
 use kmcfit_core::internals::identifiability::{Symmetry, count};
-use kmcfit_core::{Builder, Part, Record};
+use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 use std::error::Error;
 
@@ -37,7 +37,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         .from_state(0.0, 0.0)
         .force(&times, &force)
         .displacement(&times, &shaken.displacement);
-    let parts = || [1.0, 0.1, 4.0].map(|start| Part::piecewise_linear(11, start));
+    let parts = || [1.0, 0.1, 4.0].map(|start| CoefficientSpec::piecewise_linear(11, start));
     let alone = Builder::new(parts()).record(free.clone()).build()?;
     let pair = Builder::new(parts()).record(free).record(forced).build()?;
     Ok([alone, pair].map(|problem| {

@@ -2,10 +2,13 @@
 
 use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit::observations::Table;
-use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::builder::{
+    BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
+};
 use kmcfit_core::internals::constraints::{Shape, Statement};
-use kmcfit_core::internals::functions::{Basis, CoefficientKind};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::system::Method;
 use std::path::Path;
 
@@ -59,26 +62,28 @@ constraints:
 fit: {stop: {iterations: 20, tolerance: 1e-10}}
 ",
     );
-    let mass = Part::piecewise_linear(11, 2.0).min(0.05).smooth(2, 0.1);
-    let damping = Part::b_spline(6, 1.0)
+    let mass = CoefficientSpec::piecewise_linear(11, 2.0)
+        .min(0.05)
+        .smooth(2, 0.1);
+    let damping = CoefficientSpec::b_spline(6, 1.0)
         .min(0.0)
         .smooth(0, 0.01)
         .smooth(1, 0.1);
-    let stiffness = Part::polynomial(&[1.5, -0.01]).max(4.0);
+    let stiffness = CoefficientSpec::polynomial(&[1.5, -0.01]).max(4.0);
     let of = CoefficientKind::Mass;
     let built = Builder::new([mass, damping, stiffness])
         .record(paper_record())
         .method(Method::Midpoint)
-        .demand(Statement::Value {
+        .constrain(Statement::Value {
             of: CoefficientKind::Stiffness,
             at: 0.0,
             value: 1.0,
         })
-        .demand(Statement::Shape {
+        .constrain(Statement::Shape {
             of,
             shape: Shape::NonIncreasing,
         })
-        .prefer(Statement::Mean { of, value: 0.75 }, 10.0)
+        .penalize(Statement::Mean { of, value: 0.75 }, 10.0)
         .build()
         .unwrap();
     same_way(&built, &written);
@@ -111,12 +116,12 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
         .sigma(0.02)
         .loss(written.0.experiments[0].channels[0].loss());
     let device = [
-        Part::constant(3.0),
-        Part::constant(0.5).variation(0.1),
-        Part::piecewise_constant(3, 2000.0).variation(1e-6),
+        CoefficientSpec::constant(3.0),
+        CoefficientSpec::constant(0.5).variation(0.1),
+        CoefficientSpec::piecewise_constant(3, 2000.0).variation(1e-6),
     ];
     let built = Builder::new(device)
-        .cubic_stiffness(Part::fixed(0.0))
+        .cubic_stiffness(CoefficientSpec::fixed(0.0))
         .record(record)
         .nodes(4801)
         .build()
@@ -127,114 +132,191 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
 /// What cannot be meant is refused with its part, and nothing panics.
 #[test]
 fn what_cannot_be_meant_is_refused() {
-    let one = || Part::constant(1.0);
-    let device = || [one(), one(), one()];
+    let one = || CoefficientSpec::constant(1.0);
+    let system = || [one(), one(), one()];
     let record = paper_record;
     let times = [0.0, 1.0, 2.0];
     let values = [1.0, 0.5, 0.2];
     let short = || Record::new("short").from_state(1.0, 0.0);
-    let mass = |part: Part| Builder::new([part, one(), one()]).record(record());
+    let mass = |spec: CoefficientSpec| Builder::new([spec, one(), one()]).record(record());
     let of = CoefficientKind::Mass;
     let cases: Vec<(Builder, &str)> = vec![
-        (Builder::new(device()), "records: there are none"),
+        (Builder::new(system()), "experiments: there are no records"),
         (
-            Builder::new(device()).record(short()),
-            "record `short`: there are no readings",
+            Builder::new(system()).record(short()),
+            "experiments[0]: this experiment has no readings",
         ),
         (
-            Builder::new(device()).record(short().displacement(&times, &values[..2])),
-            "record `short`: displacement: 2 values at 3 times",
+            Builder::new(system()).record(short().displacement(&times, &values[..2])),
+            "experiments[0].columns.displacement: there is not one time for each sample\n  found: 2 values at 3 times",
         ),
         (
-            Builder::new(device()).record(short().velocity(&[0.0, 2.0, 1.0], &values)),
-            "record `short`: velocity: the times do not increase",
+            Builder::new(system()).record(short().velocity(&[0.0, 2.0, 1.0], &values)),
+            "experiments[0].columns.velocity: these samples make no record\n  found: times that do not increase",
         ),
         (
-            Builder::new(device()).record(short().displacement(&times, &[1.0, f64::NAN, 0.0])),
-            "record `short`: displacement: a time or reading is not a finite number",
+            Builder::new(system()).record(short().displacement(&times, &[1.0, f64::NAN, 0.0])),
+            "found: a time or sample that is not a finite number",
         ),
         (
-            Builder::new(device()).record(short().displacement(&times, &values).sigma(0.0)),
-            "record `short`: displacement: sigma is not a positive number",
+            Builder::new(system()).record(short().displacement(&times, &values).sigma(0.0)),
+            "experiments[0].sigma.displacement: a standard deviation must be positive\n  found: 0",
         ),
         (
-            Builder::new(device()).record(short().displacement(&times[..2], &values[..2])),
-            "grid: 2 nodes, fewer than 3",
+            Builder::new(system()).record(
+                short()
+                    .displacement(&times, &values)
+                    .loss(Loss::Huber { threshold: 1.0 }),
+            ),
+            "experiments[0].loss.displacement: a robust loss needs to know which residuals are large",
         ),
         (
-            Builder::new(device()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
-            "grid: `nodes` is needed: the readings are not all at the same, equally spaced times",
+            Builder::new(system()).record(short().velocity(&times, &values)),
+            "experiments[0]: readings of the velocity need a sigma",
         ),
         (
-            Builder::new(device()).record(record().force(&times, &values)),
-            "record `free decay`: force: it does not cover 0 s to 25 s",
+            Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
+            "grid.nodes: this number of nodes cannot be used\n  found: 2",
         ),
         (
-            mass(Part::constant(-1.0)),
-            "mass: it must be positive at all times, not -1",
+            Builder::new(system()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
+            "grid.nodes: the number of nodes is missing",
         ),
         (
-            mass(Part::fixed(f64::INFINITY)),
-            "mass: its start is inf, not a finite number",
+            Builder::new(system()).record(record()).record(record()),
+            "experiments[1].name: two experiments have the same name",
         ),
         (
-            mass(Part::piecewise_linear(1, 1.0)),
-            "mass: 1 knots, but from 2 to 2000 fit the grid",
+            Builder::new(system()).record(record().validation()),
+            "experiments: every experiment is held out of the fit",
         ),
         (
-            mass(Part::b_spline(usize::MAX, 1.0)),
-            "mass: 18446744073709551615 knots, but from 2 to 1998 fit the grid",
+            Builder::new(system()).record(record().force(&times, &values)),
+            "experiments[0].columns.force: the force is shorter than the record\n  found: 0 s to 2 s",
         ),
         (
-            mass(Part::polynomial(&[0.0; 2000])),
-            "mass: degree 1999, but at most 313 fits the grid",
+            mass(CoefficientSpec::constant(-1.0)),
+            "functions.mass.start: the mass must be positive at all times\n  found: -1",
         ),
         (
-            mass(Part::sought(
-                Basis::Polynomial { degree: usize::MAX },
-                vec![1.0],
+            mass(CoefficientSpec::fixed(f64::INFINITY)),
+            "functions.mass.fixed: not a finite number\n  found: inf",
+        ),
+        (
+            mass(CoefficientSpec::fixed_at_nodes(vec![1.0; 3])),
+            "functions.mass.fixed: there is not one value per node\n  found: 3 values\n  expected: 2000 values",
+        ),
+        (
+            mass(CoefficientSpec::piecewise_linear(1, 1.0)),
+            "functions.mass.knots: there are fewer than two knots\n  found: 1",
+        ),
+        (
+            mass(CoefficientSpec::b_spline(usize::MAX, 1.0)),
+            "found: 18446744073709551615 knots on 2000 nodes\n  expected: at most 1998 knots",
+        ),
+        (
+            mass(CoefficientSpec::polynomial(&[0.0; 2000])),
+            "functions.mass.degree: the degree is too high for the grid\n  found: 1999 on 2000 nodes\n  expected: at most 313",
+        ),
+        (
+            mass(CoefficientSpec::polynomial(&[])),
+            "functions.mass.start: the list does not fit the basis\n  found: 0 numbers for `polynomial`",
+        ),
+        (
+            mass(CoefficientSpec::estimated(
+                BasisSpec::Polynomial { degree: usize::MAX },
+                Start::Constant(1.0),
             )),
-            "mass: degree 18446744073709551615, but at most 313 fits the grid",
+            "found: 18446744073709551615 on 2000 nodes",
         ),
         (
-            mass(Part::constant(1.0)).nodes(usize::MAX),
-            "grid: 18446744073709551615 nodes, more than 100000000",
+            mass(one()).nodes(usize::MAX),
+            "grid.nodes: this number of nodes cannot be used\n  found: 18446744073709551615",
         ),
         (
-            mass(Part::sought(Basis::Constant, vec![1.0, 2.0])),
-            "mass: 2 start values, but 1 parameters",
-        ),
-        (
-            mass(Part::sought(
-                Basis::PiecewiseLinear {
-                    knots: vec![0.0, 30.0],
-                },
-                vec![1.0, 1.0],
+            mass(CoefficientSpec::estimated(
+                BasisSpec::Constant,
+                Start::Parameters(vec![1.0, 2.0]),
             )),
-            "mass: its knots must increase from 0 s to 25 s, the ends of the record",
+            "found: 2 numbers for `constant`\n  expected: 1 number, the value at all times",
         ),
-        (mass(one().max(0.0)), "mass: `max` leaves no mass"),
+        (
+            mass(CoefficientSpec::estimated(
+                BasisSpec::PiecewiseLinear(Knots::Times(vec![0.0, 30.0])),
+                Start::Constant(1.0),
+            )),
+            "functions.mass.knots[1]: this knot lies outside the record\n  found: 30\n  expected: a time from 0 s to 25 s",
+        ),
+        (
+            mass(CoefficientSpec::estimated(
+                BasisSpec::PiecewiseLinear(Knots::Times(vec![0.0, f64::NAN, 25.0])),
+                Start::Constant(1.0),
+            )),
+            "functions.mass.knots[1]: this knot lies outside the record\n  found: NaN",
+        ),
+        (
+            mass(one().max(0.0)),
+            "functions.mass.max: this leaves no mass: it must be positive at all times",
+        ),
+        (
+            mass(one().min(f64::NAN)),
+            "functions.mass.min: not a finite number",
+        ),
+        (
+            mass(one().min(2.0).max(1.0)),
+            "functions.mass.min: the smallest value is above the largest",
+        ),
+        (
+            mass(CoefficientSpec::fixed(1.0).min(0.0)),
+            "functions.mass.min: a fixed function cannot be limited or smoothed",
+        ),
         (
             mass(one().smooth(3, 1.0)),
-            "mass: order 3 of `smooth` is not 0, 1 or 2",
+            "functions.mass.smooth[0].order: this derivative cannot be penalised\n  found: 3",
         ),
         (
             mass(one().variation(-1.0)),
-            "mass: the weight -1 is not a finite number of at least 0",
+            "functions.mass.variation.weight: a weight cannot be negative\n  found: -1",
         ),
         (
-            mass(one()).coulomb_friction(Part::constant(1.0), 0.0),
-            "coulomb_friction: its width is 0 m/s, not positive",
+            mass(one()).coulomb_friction(CoefficientSpec::constant(1.0), 0.0),
+            "functions.coulomb_friction.width: the width must be positive\n  found: 0",
         ),
         (
-            mass(one().min(2.0)).demand(Statement::Mean { of, value: 1.0 }),
-            "demands: they contradict each other",
+            mass(one().width(1.0)),
+            "functions.mass.width: only Coulomb friction has a width",
         ),
         (
-            Builder::new([Part::fixed(1.0), one(), one()])
+            mass(one().min(2.0)).constrain(Statement::Mean { of, value: 1.0 }),
+            "constraints: these constraints contradict each other",
+        ),
+        (
+            mass(one()).penalize(Statement::Mean { of, value: 1.0 }, 0.0),
+            "constraints[0].soft: the weight of a soft constraint must be positive\n  found: 0",
+        ),
+        (
+            mass(one()).penalize(Statement::DampingRatio { max: 0.1 }, 1.0),
+            "constraints[0].soft: a cap on the damping ratio cannot be soft",
+        ),
+        (
+            Builder::new([CoefficientSpec::fixed(1.0), one(), one()])
                 .record(record())
-                .demand(Statement::Mean { of, value: 1.0 }),
-            "mass cannot be constrained: fixed",
+                .constrain(Statement::Mean { of, value: 1.0 }),
+            "constraints[0]: mass is fixed, so it cannot be constrained",
+        ),
+        (
+            Builder::new(system()).record(record().coefficient(of, one())),
+            "functions.mass: no experiment uses this function",
+        ),
+        (
+            Builder::new(system())
+                .record(record().coefficient(CoefficientKind::CubicStiffness, one())),
+            "experiments[0].functions.cubic_stiffness: the device has no such function",
+        ),
+        (
+            Builder::new(system())
+                .record(record().initial([ScalarSpec::Known(f64::NAN), ScalarSpec::ESTIMATED])),
+            "experiments[0].initial.displacement: not a finite number",
         ),
     ];
     for (builder, expected) in cases {

@@ -9,7 +9,11 @@ pub mod assessment {
     };
 }
 pub mod builder {
-    pub use crate::builder::{Builder, Part, Record};
+    pub use crate::builder::{
+        BasisSpec, BuildError, BuildNotice, Builder, Built, ChannelSpec, CoefficientSpec,
+        Contradiction, Knots, PenaltyWeight, Record, ScalarSpec, SensorSpec, Smoothness, Start,
+        WeightSearch, listed,
+    };
 }
 pub mod constraints {
     pub use crate::constraints::{
@@ -89,7 +93,7 @@ pub mod study {
 pub mod system {
     pub use crate::system::{
         Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
-        SystemTangent, Term, TimePoint, quadrature,
+        SystemTangent, Term, TimePoint, quadrature, round_time,
     };
 }
 pub mod threads {

@@ -20,57 +20,35 @@
 //!
 //! # Example
 //!
-//! A device whose mass falls along a line is simulated, and found again from its motion:
+//! A system whose mass falls along a line is simulated, and identified from its response:
 //!
 //! ```
-//! use kmcfit_core::{NodalCoefficients, Grid, Method, System, State, Term};
-//! use kmcfit_core::{Basis, CoefficientFunction, Parameterization, CoefficientKind};
-//! use kmcfit_core::GradientKind;
-//! use kmcfit_core::{Channel, Experiment, Weighting};
-//! use kmcfit_core::Problem;
-//! use kmcfit_core::{FitSettings, Initial, Solver, Status, Stopping, fit};
+//! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record, Status};
+//! use kmcfit_core::{Grid, Method, NodalCoefficients, State, System, Term};
 //!
-//! // The device: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
-//! let grid = Grid::new(0.0, 25.0, 1001).expect("a grid");
-//! let nodes = grid.nodes();
+//! // The system: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
+//! let grid = Grid::new(0.0, 25.0, 1001).ok_or("a grid")?;
+//! let (times, nodes) = (grid.times(), grid.nodes());
 //! let truth = NodalCoefficients {
-//!     mass: grid.times().iter().map(|t| 1.0 - t / 50.0).collect(),
+//!     mass: times.iter().map(|t| 1.0 - t / 50.0).collect(),
 //!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
 //! };
-//! let oscillator = System {
-//!     grid,
-//!     method: Method::Rk4,
-//!     terms: vec![Term::Damping, Term::Stiffness],
-//! };
-//! let initial = State { displacement: 3.3, velocity: 1.0 };
-//! let motion = oscillator.forward(&truth, initial, None).expect("a motion");
+//! let terms = vec![Term::Damping, Term::Stiffness];
+//! let system = System { grid, method: Method::Rk4, terms };
+//! let response = system.forward(&truth, State { displacement: 3.3, velocity: 1.0 }, None)?;
 //!
-//! // What is sought: a line for the mass and a constant for the damping; the stiffness is known.
-//! let line = Basis::Polynomial { degree: 1 };
-//! let start = line.constant(&grid, 2.0);
-//! let list = vec![
-//!     CoefficientFunction::free(CoefficientKind::Mass, line, &grid, start),
-//!     CoefficientFunction::constant(CoefficientKind::Damping, 1.0, nodes),
-//!     CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
-//! ];
-//! let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
-//! let weighting = Weighting::Integral { spacing: grid.step() };
-//! let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
-//! let record = Experiment::free("free decay", initial, nodes).with_channel(channel);
-//! let problem = Problem::new(oscillator, functions, vec![record]).unwrap();
+//! // Estimated: a line for the mass and a constant damping; the stiffness is known.
+//! let mass = CoefficientSpec::polynomial(&[2.0, 0.0]);
+//! let coefficients = [mass, CoefficientSpec::constant(1.0), CoefficientSpec::fixed(1.0)];
+//! let record = Record::new("free decay").from_state(3.3, 1.0).displacement(&times, &response.displacement);
+//! let problem = Builder::new(coefficients).record(record).build()?;
+//! let fit = problem.fit()?;
 //!
-//! let settings = FitSettings {
-//!     solver: Solver::GaussNewton,
-//!     initial: Initial::Functions,
-//!     gradient: GradientKind::Discrete,
-//!     stopping: Stopping::default(),
-//!     interrupt: None,
-//! };
-//! let found = fit(&problem, &problem.functions.start(), &settings, &mut |_| {}).expect("a motion");
-//! assert_eq!(found.outcome.status, Status::Converged);
-//! let mass = &found.best.evaluation.device.mass;
+//! assert_eq!(fit.outcome.status, Status::Converged);
+//! let mass = problem.coefficient(CoefficientKind::Mass, &fit.best.parameters).ok_or("a mass")?;
 //! let error = mass.iter().zip(&truth.mass).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
 //! assert!(error < 1e-9, "{error}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 // Items of the public API refer to internals, which `--document-private-items` shows.
@@ -101,14 +79,14 @@ mod threads;
 // The public API, by topic. `tests/api.rs` holds it to `api.txt`: it grows only on purpose.
 
 // Problems.
-pub use builder::{BuildError, Builder, Part, Record};
-pub use constraints::{Limit, Shape, Statement};
-pub use functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
-    Variation,
+pub use builder::{
+    BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec,
+    SensorSpec, Start,
 };
-pub use problem::{Problem, ProblemError, ProblemParts};
-pub use record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+pub use constraints::{Limit, Shape, Statement};
+pub use functions::{CoefficientKind, Prior};
+pub use problem::{Problem, ProblemError};
+pub use record::{ChannelKind, Loss, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.

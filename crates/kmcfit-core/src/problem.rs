@@ -1,7 +1,7 @@
 //! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
-use crate::functions::{Design, Parameterization, Penalty, Variation};
+use crate::functions::{CoefficientKind, Design, Parameterization, Penalty, Variation};
 use crate::record::{Channel, Experiment, Weighting};
 use crate::system::System;
 use std::ops::{Deref, Range};
@@ -228,6 +228,21 @@ impl Problem {
     /// Number of parameters of functions and scalars.
     pub fn parameters(&self) -> usize {
         self.functions.parameters()
+    }
+
+    /// Values at the nodes of the shared coefficient function of a kind for the parameters `theta`, in its SI unit; `None` if the
+    /// system has no such function.
+    ///
+    /// # Panics
+    /// If `theta` has another number of parameters.
+    pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
+        let functions = &self.functions;
+        let mut shared = functions.assembly(0).iter();
+        let index = *shared.find(|&&f| functions.get(f).quantity == kind)?;
+        let mut values = vec![0.0; functions.nodes()];
+        let range = functions.ranges()[index].clone();
+        functions.get(index).values_into(&theta[range], &mut values);
+        Some(values)
     }
 
     /// The start of the search.

@@ -3,7 +3,7 @@
 mod common;
 
 use common::paper_problem;
-use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
@@ -58,7 +58,7 @@ fn with_a_sigma_and_with_penalties() {
         .unwrap();
     agree(&problem, &uneven(&problem));
 
-    let parts = [2.0, 1.0, 1.0].map(|start| Part::nodal(start).smooth(1, 0.3));
+    let parts = [2.0, 1.0, 1.0].map(|start| CoefficientSpec::nodal(start).smooth(1, 0.3));
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(&grid.times(), &readings);
@@ -88,9 +88,9 @@ fn of_everything_else() {
     agree(&problem, &uneven(&problem));
 
     let parts = [
-        Part::piecewise_linear(5, 2.0),
-        Part::constant(1.0),
-        Part::b_spline(4, 1.0),
+        CoefficientSpec::piecewise_linear(5, 2.0),
+        CoefficientSpec::constant(1.0),
+        CoefficientSpec::b_spline(4, 1.0),
     ];
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)

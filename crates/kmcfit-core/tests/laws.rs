@@ -1,6 +1,6 @@
 //! Laws that hold for every device: checked on random ones, the same in every run.
 
-use kmcfit_core::internals::builder::{Builder, Part, Record};
+use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::simulate::Trajectory;
@@ -231,7 +231,7 @@ fn record(case: Case, per_metre: f64, later: f64) -> Record {
     let read = |(i, y): (usize, &f64)| per_metre * (y + 0.01 * (1.3 * i as f64).sin());
     let readings: Vec<f64> = motion.displacement.iter().enumerate().map(read).collect();
     let times: Vec<f64> = grid.times().iter().map(|t| t + later).collect();
-    Record::new("a record")
+    Record::new(format!("from {:?}", case.start))
         .from_state(per_metre * case.start[0], per_metre * case.start[1])
         .displacement(&times, &readings)
         .sigma(0.02 * per_metre)
@@ -241,9 +241,9 @@ fn record(case: Case, per_metre: f64, later: f64) -> Record {
 fn builder(case: Case, knots: usize) -> Builder {
     let [m, c, k] = [0, 1, 2].map(|f| case.functions[f][0]);
     Builder::new([
-        Part::fixed(m),
-        Part::piecewise_linear(knots, 1.1 * c.abs() + 0.02),
-        Part::piecewise_linear(knots, 1.02 * k).min(0.1 * k),
+        CoefficientSpec::fixed(m),
+        CoefficientSpec::piecewise_linear(knots, 1.1 * c.abs() + 0.02),
+        CoefficientSpec::piecewise_linear(knots, 1.02 * k).min(0.1 * k),
     ])
 }
 

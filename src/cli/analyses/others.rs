@@ -209,7 +209,7 @@ fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::builder::{Builder, Part, Record};
+    use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
     use kmcfit_core::internals::system::Grid;
 
     /// What is listed of a ring-down of six periods by the midpoint rule, on 61 nodes.
@@ -219,7 +219,7 @@ mod tests {
         let record = Record::new("ring-down")
             .from_state(1.0, 0.0)
             .displacement(&times, &readings);
-        let problem = Builder::new([1.0, 0.1, 4.0].map(Part::constant))
+        let problem = Builder::new([1.0, 0.1, 4.0].map(CoefficientSpec::constant))
             .record(record)
             .build()
             .unwrap();

@@ -1,13 +1,11 @@
 //! How to fit.
 
-use super::Purpose;
-use super::experiments::is_held_out;
 use crate::config::spec::{FitMethod, StopSpec};
 use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Measurements, Solver, Stopping};
+use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
@@ -17,11 +15,11 @@ pub(super) const DEFAULT_MEMORY: usize = 20;
 pub(super) fn build(
     file: &ModelFile,
     problem: &Problem,
+    solver: Solver,
     searches: bool,
 ) -> Result<FitSettings, InputError> {
     let spec = file.spec.fit.as_ref();
     let gradient = gradient(file, problem)?;
-    let solver = solver(file)?;
     takes_steps(file, solver)?;
     can_constrain(file, problem, solver)?;
     can_regularise(file, problem, searches, solver)?;
@@ -39,40 +37,10 @@ pub(super) fn build(
     })
 }
 
-/// Whether the method is the equation error.
-pub(super) fn is_equation_error(file: &ModelFile) -> bool {
-    method(file) == FitMethod::EquationError
-}
-
 /// The method asked for, or the default.
-pub(super) fn method(file: &ModelFile) -> FitMethod {
+fn method(file: &ModelFile) -> FitMethod {
     let method = file.spec.fit.as_ref().and_then(|f| f.method);
     method.unwrap_or(FitMethod::GaussNewton)
-}
-
-/// The motions as the readings tell them, where the method is to use them.
-pub(super) fn measurements(
-    file: &ModelFile,
-    purpose: Purpose,
-    problem: &Problem,
-    warnings: &mut Vec<String>,
-) -> Result<Option<Measurements>, InputError> {
-    if !is_equation_error(file) || matches!(purpose, Purpose::Simulate { .. }) {
-        return Ok(None);
-    }
-    let measurements = Measurements::of(problem).map_err(|unsuited| {
-        let written = file.spec.experiments.iter().enumerate();
-        let fitted = written.filter(|(_, spec)| !is_held_out(spec));
-        let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
-        file.error_at(
-            &format!("experiments[{}]", place.unwrap_or_default()),
-            "the method `equation-error` cannot tell the motion from these readings",
-        )
-        .found(unsuited.reason.to_string())
-        .expected("readings from which displacement, velocity and acceleration follow")
-    })?;
-    warnings.extend(measurements.remarks(problem));
-    Ok(Some(measurements))
 }
 
 /// Refuses what is about the steps of a search where there are none.
@@ -96,7 +64,7 @@ fn takes_steps(file: &ModelFile, solver: Solver) -> Result<(), InputError> {
     }
 }
 
-fn solver(file: &ModelFile) -> Result<Solver, InputError> {
+pub(super) fn solver(file: &ModelFile) -> Result<Solver, InputError> {
     let memory = memory(file)?;
     let solver = match method(file) {
         FitMethod::SteepestDescent => Solver::SteepestDescent,

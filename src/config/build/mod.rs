@@ -6,22 +6,20 @@ mod fit;
 mod functions;
 mod grid;
 mod on_grid;
-mod penalties;
 mod study;
 
 pub use experiments::{ChannelNote, HoldOut};
-pub use penalties::WeightSearch;
+pub use kmcfit_core::internals::builder::WeightSearch;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
-use super::scalar::ScalarOr;
-use super::spec::InitialSpec;
+use super::locate::{key_path, locate};
 use super::{ModelFile, Source};
 use crate::error::{InputError, Place};
 use crate::memory;
-use kmcfit_core::internals::functions::Parameterization;
+use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{self, FitSettings, timed};
-use kmcfit_core::internals::system::{NodalCoefficients, State, System};
+use kmcfit_core::internals::solvers::{FitSettings, Solver, timed};
+use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -116,6 +114,80 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
     }
 }
 
+/// The specification that a model file states, with what its files have, and the notes of its channels.
+fn builder(
+    file: &ModelFile,
+    purpose: Purpose,
+    grid: &Grid,
+    solver: Solver,
+    records: Vec<Option<experiments::Record>>,
+) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
+    let shared = functions::shared(file).into_iter();
+    let shared = shared.map(|(kind, given)| {
+        let key = format!("functions.{}", kind.name());
+        Ok((kind, functions::specification(file, grid, &key, given)?))
+    });
+    let shared = shared.collect::<Result<_, _>>()?;
+    let mut builder = Builder::of(shared).grid(*grid).solver(solver);
+    builder = builder.method(grid::method(file));
+    if matches!(purpose, Purpose::Simulate { .. }) {
+        builder = builder.simulation();
+    }
+    let mut notes = Vec::new();
+    for (i, record) in records.into_iter().enumerate() {
+        let (record, of_record) = experiments::specification(file, purpose, grid, i, record)?;
+        builder = builder.record(record);
+        notes.push(of_record);
+    }
+    Ok((constraints::add(file, grid, builder)?, notes))
+}
+
+/// An error of the builder at the place of its key in the file.
+fn input_error(file: &ModelFile, error: BuildError) -> InputError {
+    let placed = match &error.contradiction {
+        Some(contradiction) => contradicted(file, contradiction, &error.problem),
+        None => InputError {
+            found: error.found,
+            ..file.error_at(&written(file, &error.key), error.problem)
+        },
+    };
+    InputError {
+        expected: error.expected,
+        hint: error.hint,
+        ..placed
+    }
+}
+
+/// The key as the file has it: what stands alone in place of a list has no number.
+fn written(file: &ModelFile, key: &str) -> String {
+    let alone = key.replace("smooth[0]", "smooth");
+    let depth = |key: &str| locate(file.effective_text(), &key_path(key)).depth;
+    match alone != key && depth(&alone) >= depth(key) {
+        true => alone,
+        false => key.to_owned(),
+    }
+}
+
+/// Constraints that contradict each other, with their lines: placed at the last of them.
+fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) -> InputError {
+    let mut last: Option<(usize, &str)> = None;
+    let mut rows = Vec::new();
+    for (name, key) in &contradiction.constraints {
+        let place = key.as_ref().map(|key| (key, file.error_at(key, "").place));
+        let Some((key, Place::Line { line, .. })) = place else {
+            rows.push(format!("`{name}`"));
+            continue;
+        };
+        rows.push(format!("`{name}` (line {line})"));
+        if last.is_none_or(|(before, _)| line >= before) {
+            last = Some((line, key));
+        }
+    }
+    let key = last.map_or("constraints", |(_, key)| key);
+    file.error_at(key, problem)
+        .found(listed(rows.iter().map(String::as_str)))
+}
+
 /// Builds the model of a file for a purpose.
 ///
 /// # Errors
@@ -124,64 +196,55 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
-    experiments::distinct_names(file)?;
     let mut warnings = Vec::new();
     let mut remarks = Vec::new();
-    let assemblies = functions::assemblies(file)?;
     let records = timed(&mut reading, || {
         experiments::read(file, purpose, &mut warnings)
     })?;
     let grid = grid::build(file, purpose, &records, &mut remarks)?;
-    let list = functions::build(file, &grid, &mut warnings)?;
-    let functions =
-        Parameterization::with_devices(list, assemblies.devices.clone(), grid.nodes(), grid.step());
-    let functions = functions.ok_or_else(|| {
-        file.error_at(
-            "functions",
-            "a basis has functions that the grid cannot tell apart",
-        )
-    })?;
-    let oscillator = System {
-        grid,
-        method: grid::method(file),
-        terms: functions::terms(file)?,
-    };
-    let built = experiments::build(file, purpose, &grid, records, &assemblies)?;
-    let functions = functions.with_scalars(built.scalars);
-    let mut problem = Problem::new(oscillator, functions, built.fitted)
-        .map_err(|why| file.error_at("functions", why.to_string()))?;
-    let measured = fit::measurements(file, purpose, &problem, &mut warnings)?;
-    let weight_rule = penalties::build(file, &mut problem, measured.as_ref(), &mut warnings)?;
-    penalties::add_variations(file, &mut problem)?;
-    let places = constraints::build(file, &mut problem, &assemblies, &mut warnings)?;
-    experiments::unidentifiable(file, &problem)?;
-    start_from_readings(file, &mut problem);
-    let settings = fit::build(file, &problem, weight_rule.is_some())?;
-    let given_start = problem.functions.start();
+    let solver = fit::solver(file)?;
+    let (builder, notes) = builder(file, purpose, &grid, solver, records)?;
+    let about = |error| input_error(file, error);
+    let mut built = builder.lower().map_err(about)?;
+    let searches = built.weight_search.is_some();
+    let settings = fit::build(file, &built.problem, solver, searches)?;
+    let given_start = built.problem.functions.start();
     // A simulation is of the functions as they are given.
     if !matches!(purpose, Purpose::Simulate { .. }) {
-        constraints::move_start(file, &mut problem, &places, &mut warnings)?;
+        built.move_start().map_err(about)?;
     }
+    warnings.extend(built.notices.iter().map(ToString::to_string));
+    let held_out = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
+    let (own, notes): (Vec<_>, Vec<_>) = notes
+        .into_iter()
+        .enumerate()
+        .partition(|(i, _)| held_out(i));
     let truth = timed(&mut reading, || functions::truth(file, &grid))?;
     let state = |s: &super::spec::StateSpec| State {
         displacement: s.displacement.0,
         velocity: s.velocity.0,
     };
     let memory = grid::memory_of(file, purpose, grid.nodes()) as u64;
-    let study = study::build(file, &problem)?;
+    let study = study::build(file, &built.problem)?;
     let source = timed(&mut reading, || Source::of(file));
     Ok(Model {
         file: file.path.clone(),
         study,
         memory,
         title: title(file),
-        problem,
+        problem: built.problem,
         given_start,
         settings,
-        weight_rule,
+        weight_rule: built.weight_search,
         truth,
-        notes: built.notes,
-        held_out: built.held_out,
+        notes: notes.into_iter().map(|(_, notes)| notes).collect(),
+        held_out: (built.validation.into_iter().zip(own))
+            .map(|((experiment, scalars), (_, notes))| HoldOut {
+                experiment,
+                scalars,
+                notes,
+            })
+            .collect(),
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         remarks,
@@ -224,46 +287,6 @@ impl Model {
     /// at least one.
     pub fn threads_within_memory(&self, wanted: usize) -> usize {
         memory::threads_within(wanted, self.memory)
-    }
-}
-
-/// Initial states that are sought without a start or a prior begin where the readings do.
-fn start_from_readings(file: &ModelFile, problem: &mut Problem) {
-    let sought = problem.experiments.iter().any(|e| e.sought != [None; 2]);
-    if !sought {
-        return;
-    }
-    let given = |i: usize, q: usize| match &file.spec.experiments[i].initial {
-        InitialSpec::Scalar(_) => false,
-        InitialSpec::Map(state) => {
-            let value = [&state.displacement, &state.velocity][q];
-            matches!(value, ScalarOr::Map(e) if e.start.is_some() || e.prior.is_some())
-        }
-    };
-    let fitted = (file.spec.experiments.iter().enumerate())
-        .filter(|(_, spec)| !experiments::is_held_out(spec))
-        .map(|(i, _)| i);
-    let mut start = problem.start();
-    let first = problem.functions.scalar_range().start;
-    let states = solvers::states_from_readings(problem);
-    for ((i, experiment), state) in fitted.zip(&problem.experiments).zip(states) {
-        let Some(state) = state else { continue };
-        for (q, value) in [state.displacement, state.velocity].into_iter().enumerate() {
-            if let (Some(index), false) = (experiment.sought[q], given(i, q)) {
-                start[first + index] = value;
-            }
-        }
-    }
-    problem.start_from(&start);
-}
-
-/// Names in a row: `a`, `a and b`, `a, b and c`.
-fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.into_iter().collect();
-    match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        Some((last, _)) => (*last).to_owned(),
-        None => String::new(),
     }
 }
 

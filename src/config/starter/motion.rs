@@ -1,11 +1,11 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
 use super::columns::{Column, Columns, Role};
-use crate::digits::clock;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, without_line};
 use kmcfit_core::internals::signal::{Spectrum, onset};
+use kmcfit_core::internals::system::round_time;
 
 /// Fewest readings of which a model can be made.
 const FEWEST: usize = 8;
@@ -97,7 +97,7 @@ impl Motion {
             missing,
             channel: (column.role, column.unit.factor()),
             far_off,
-            begins: begins.map(|_| clock(pairs[0].0, spacing)),
+            begins: begins.map(|_| round_time(pairs[0].0, spacing)),
             duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),

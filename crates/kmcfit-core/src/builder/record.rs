@@ -1,313 +1,384 @@
-//! One record: where the motion begins, what drives it, what was read.
+//! Specification of one record: initial state, input and channels.
 
-use super::BuildError;
-use crate::functions::ScalarParameter;
-use crate::objective::state_scales;
-use crate::record::{
-    BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, Waveform, Weighting, integral_over,
-};
-use crate::signal::{Interpolation, Signal};
-use crate::signal::{even_spacing, median_spacing};
-use crate::system::{Excitation, Grid, InputSample, State};
+use super::{BuildError, CoefficientSpec};
+use crate::functions::{CoefficientKind, Prior};
+use crate::record::{BaseMotion, ChannelKind, Input, Loss, Waveform, Weighting};
+use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 
-/// Readings of one kind.
+/// A number that is known, or estimated with the coefficient functions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ScalarSpec {
+    /// Known.
+    Known(f64),
+    /// Estimated.
+    Estimated {
+        /// Start of the search; chosen from the samples without.
+        start: Option<f64>,
+        /// Prior knowledge, which adds `((x - mean)/sigma)^2` to J.
+        prior: Option<Prior>,
+    },
+}
+
+impl ScalarSpec {
+    /// Estimated without a start or a prior.
+    pub const ESTIMATED: Self = Self::Estimated {
+        start: None,
+        prior: None,
+    };
+
+    /// Whether its start is to be chosen from the samples.
+    pub(super) fn is_open(self) -> bool {
+        self == Self::ESTIMATED
+    }
+}
+
+/// Specification of a sensor: `sample = gain * response + offset + drift * time`; a perfect one without.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SensorSpec {
+    /// Factor; 1 without.
+    pub gain: Option<ScalarSpec>,
+    /// Sample at rest, in the SI unit of the channel.
+    pub offset: Option<ScalarSpec>,
+    /// Change of the offset, in the SI unit of the channel per s.
+    pub drift: Option<ScalarSpec>,
+    /// Whether it measures the absolute motion and not that relative to the base; so accelerometers do without it, others do not.
+    pub absolute: Option<bool>,
+}
+
+/// Specification of one channel.
 #[derive(Debug, Clone, PartialEq)]
-struct Readings {
-    kind: ChannelKind,
-    times: Vec<f64>,
-    values: Vec<f64>,
-    sigma: Option<f64>,
-    loss: Loss,
+pub struct ChannelSpec {
+    /// What is measured.
+    pub kind: ChannelKind,
+    /// Times of the samples, s, increasing.
+    pub times: Vec<f64>,
+    /// Samples in the SI unit of the kind.
+    pub values: Vec<f64>,
+    /// Weights of the residuals; without them `J = integral r^2 dt`.
+    pub weighting: Option<Weighting>,
+    /// Loss of a residual.
+    pub loss: Loss,
+    /// Gain, offset and drift.
+    pub sensor: SensorSpec,
+    /// Sections of a filter that samples and response pass alike.
+    pub filter: Vec<SecondOrder>,
+    /// First and last time that the record covers, s: also where a sample is missing.
+    pub span: [f64; 2],
+    /// Whether the coordinate is an angle, for the names of units.
+    pub angular: bool,
 }
 
-/// One record of the device's motion, in SI units; the counterpart of one entry of `experiments` in a
-/// model file.
-///
-/// A force is linear between its samples unless [`Record::interpolation`] says otherwise, and so is the
-/// acceleration of a base, relative to which displacement and velocity count; an accelerometer then
-/// reads `y'' + b''`.
-#[derive(Debug, Clone)]
-pub struct Record {
-    name: String,
-    initial: Option<State>,
-    force: Option<[Vec<f64>; 2]>,
-    base: Option<[Vec<f64>; 2]>,
-    interpolation: Interpolation,
-    readings: Vec<Readings>,
-}
-
-impl Record {
-    /// A record of a motion whose initial state is to be found with the functions.
-    pub fn new(name: impl Into<String>) -> Self {
+impl ChannelSpec {
+    /// Samples `values` (in the SI unit of `kind`) of a perfect sensor at `times` (s).
+    pub fn new(kind: ChannelKind, times: &[f64], values: &[f64]) -> Self {
+        let end = |time: Option<&f64>| time.copied().unwrap_or_default();
         Self {
-            name: name.into(),
-            initial: None,
-            force: None,
-            base: None,
-            interpolation: Interpolation::Linear,
-            readings: Vec::new(),
+            kind,
+            times: times.to_vec(),
+            values: values.to_vec(),
+            weighting: None,
+            loss: Loss::Squares,
+            sensor: SensorSpec::default(),
+            filter: Vec::new(),
+            span: [end(times.first()), end(times.last())],
+            angular: false,
         }
     }
 
-    /// From a known state: displacement (m) and velocity (m/s) at the first time of all records, which count
-    /// time alike.
+    /// Refuses samples that are no channel; `record` is the key of its record.
+    fn check(&self, record: &str) -> Result<(), BuildError> {
+        let kind = self.kind.name();
+        let columns = || format!("{record}.columns.{kind}");
+        let increasing = self.times.windows(2).all(|pair| pair[0] < pair[1]);
+        let finite = self.times.iter().chain(&self.values).all(|x| x.is_finite());
+        if self.times.len() != self.values.len() {
+            let problem = "there is not one time for each sample";
+            return Err(BuildError::new(columns(), problem)
+                .found(format!(
+                    "{} values at {} times",
+                    self.values.len(),
+                    self.times.len()
+                ))
+                .expected("as many times as values"));
+        }
+        if self.times.len() < 2 {
+            return Err(BuildError::new(columns(), "there are too few samples")
+                .found(self.times.len())
+                .expected("at least 2"));
+        }
+        if !finite || !increasing {
+            return Err(BuildError::new(columns(), "these samples make no record")
+                .found(match finite {
+                    true => "times that do not increase",
+                    false => "a time or sample that is not a finite number",
+                })
+                .expected("finite values at increasing times"));
+        }
+        let sigmas = match &self.weighting {
+            Some(Weighting::Sigma(sigma)) => std::slice::from_ref(sigma),
+            Some(Weighting::Sigmas(sigmas)) => sigmas,
+            _ => &[],
+        };
+        if let Some(sigma) = sigmas.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+            let key = format!("{record}.sigma.{kind}");
+            return Err(
+                BuildError::new(key, "a standard deviation must be positive")
+                    .found(sigma)
+                    .expected("a number greater than 0, in SI units"),
+            );
+        }
+        if self.weighting.is_none() && self.loss != Loss::Squares {
+            let problem = "a robust loss needs to know which residuals are large";
+            return Err(BuildError::new(format!("{record}.loss.{kind}"), problem)
+                .found("no `sigma`")
+                .expected(format!("`sigma: {{{kind}: …}}`")));
+        }
+        Ok(())
+    }
+}
+
+/// One record of the response, in SI units; the counterpart of one entry of `experiments` in a model file.
+///
+/// A force is linear between its samples unless [`Record::interpolation`] says otherwise, and so is the acceleration of a base,
+/// relative to which displacement and velocity count; an accelerometer then measures `y'' + b''`.
+#[derive(Debug, Clone)]
+pub struct Record {
+    pub(super) name: String,
+    pub(super) initial: [ScalarSpec; 2],
+    pub(super) channels: Vec<ChannelSpec>,
+    pub(super) coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
+    pub(super) validation: bool,
+    input: Input,
+    force: Option<[Vec<f64>; 2]>,
+    base: Option<[Vec<f64>; 2]>,
+    interpolation: Interpolation,
+}
+
+impl Record {
+    /// A record whose initial state is estimated with the coefficient functions.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            initial: [ScalarSpec::ESTIMATED; 2],
+            channels: Vec::new(),
+            coefficients: Vec::new(),
+            validation: false,
+            input: Input::default(),
+            force: None,
+            base: None,
+            interpolation: Interpolation::Linear,
+        }
+    }
+
+    /// A known initial state: displacement (m) and velocity (m/s) at the first time of all records, which share one time axis.
     #[must_use]
-    pub fn from_state(mut self, displacement: f64, velocity: f64) -> Self {
-        self.initial = Some(State {
-            displacement,
-            velocity,
-        });
+    pub fn from_state(self, displacement: f64, velocity: f64) -> Self {
+        self.initial([displacement, velocity].map(ScalarSpec::Known))
+    }
+
+    /// Initial displacement (m) and velocity (m/s), each known or estimated.
+    #[must_use]
+    pub fn initial(mut self, state: [ScalarSpec; 2]) -> Self {
+        self.initial = state;
         self
     }
 
-    /// Under a force (N) at `times` (s).
+    /// A force (N) at `times` (s).
     #[must_use]
     pub fn force(mut self, times: &[f64], force: &[f64]) -> Self {
         self.force = Some([times.to_vec(), force.to_vec()]);
         self
     }
 
-    /// On a base with this acceleration (m/s^2) at `times` (s).
+    /// An acceleration of the base (m/s^2) at `times` (s).
     #[must_use]
     pub fn base_acceleration(mut self, times: &[f64], acceleration: &[f64]) -> Self {
         self.base = Some([times.to_vec(), acceleration.to_vec()]);
         self
     }
 
-    /// With another rule for force and base between their samples: a converter holds its output, a
-    /// sampled smooth force is nearer to a cubic spline than to lines.
+    /// Interpolation of force and base between their samples: a converter holds its output, a sampled smooth force is nearer to
+    /// a cubic spline than to lines.
     #[must_use]
     pub fn interpolation(mut self, interpolation: Interpolation) -> Self {
         self.interpolation = interpolation;
         self
     }
 
-    /// With displacements (m) at `times` (s).
+    /// Any force and motion of the base.
     #[must_use]
-    pub fn displacement(self, times: &[f64], values: &[f64]) -> Self {
-        self.readings(ChannelKind::Displacement, times, values)
-    }
-
-    /// With velocities (m/s) at `times` (s).
-    #[must_use]
-    pub fn velocity(self, times: &[f64], values: &[f64]) -> Self {
-        self.readings(ChannelKind::Velocity, times, values)
-    }
-
-    /// With accelerations (m/s^2) at `times` (s).
-    #[must_use]
-    pub fn acceleration(self, times: &[f64], values: &[f64]) -> Self {
-        self.readings(ChannelKind::Acceleration, times, values)
-    }
-
-    fn readings(mut self, kind: ChannelKind, times: &[f64], values: &[f64]) -> Self {
-        self.readings.push(Readings {
-            kind,
-            times: times.to_vec(),
-            values: values.to_vec(),
-            sigma: None,
-            loss: Loss::Squares,
-        });
+    pub fn input(mut self, input: Input) -> Self {
+        self.input = input;
         self
     }
 
-    /// The standard deviation of the readings given last: their part of J is then a chi-square. Without it
+    /// Displacements (m) at `times` (s).
+    #[must_use]
+    pub fn displacement(self, times: &[f64], values: &[f64]) -> Self {
+        self.channel(ChannelSpec::new(ChannelKind::Displacement, times, values))
+    }
+
+    /// Velocities (m/s) at `times` (s).
+    #[must_use]
+    pub fn velocity(self, times: &[f64], values: &[f64]) -> Self {
+        self.channel(ChannelSpec::new(ChannelKind::Velocity, times, values))
+    }
+
+    /// Accelerations (m/s^2) at `times` (s).
+    #[must_use]
+    pub fn acceleration(self, times: &[f64], values: &[f64]) -> Self {
+        self.channel(ChannelSpec::new(ChannelKind::Acceleration, times, values))
+    }
+
+    /// One more channel.
+    #[must_use]
+    pub fn channel(mut self, channel: ChannelSpec) -> Self {
+        self.channels.push(channel);
+        self
+    }
+
+    /// Standard deviation of the samples of the last channel, in its SI unit: its part of J is then a chi-square. Without it
     /// it is `integral r^2 dt`.
     #[must_use]
     pub fn sigma(mut self, sigma: f64) -> Self {
-        if let Some(readings) = self.readings.last_mut() {
-            readings.sigma = Some(sigma);
+        if let Some(channel) = self.channels.last_mut() {
+            channel.weighting = Some(Weighting::Sigma(sigma));
         }
         self
     }
 
-    /// What a residual of the readings given last costs; other than squares it needs a sigma.
+    /// Loss of the residuals of the last channel; other than squares it needs a sigma.
     #[must_use]
     pub fn loss(mut self, loss: Loss) -> Self {
-        if let Some(readings) = self.readings.last_mut() {
-            readings.loss = loss;
+        if let Some(channel) = self.channels.last_mut() {
+            channel.loss = loss;
         }
         self
     }
 
-    /// The times that it spans; `None` without readings.
+    /// A coefficient function that this record does not share with the others.
+    #[must_use]
+    pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
+        self.coefficients.push((kind, spec));
+        self
+    }
+
+    /// Kept out of the fit, to be predicted and scored.
+    #[must_use]
+    pub fn validation(mut self) -> Self {
+        self.validation = true;
+        self
+    }
+
+    /// First and last time of the record, s; `None` without channels.
     pub(super) fn span(&self) -> Option<[f64; 2]> {
-        let ends = |r: &Readings| Some([*r.times.first()?, *r.times.last()?]);
-        let spans = self.readings.iter().filter_map(ends);
+        let spans = self.channels.iter().map(|channel| channel.span);
         spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
-    /// The times of all readings, if they are the same for every kind.
+    /// The smallest median spacing of its channels, s.
+    pub(super) fn spacing(&self) -> f64 {
+        let spacings = self.channels.iter().map(|c| median_spacing(&c.times));
+        spacings.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The times of all samples, if they are the same for every channel.
     pub(super) fn common_times(&self) -> Option<&[f64]> {
-        let (first, rest) = self.readings.split_first()?;
-        let same = rest.iter().all(|r| r.times == first.times);
+        let (first, rest) = self.channels.split_first()?;
+        let same = rest.iter().all(|c| c.times == first.times);
         same.then_some(&first.times)
     }
 
-    fn refuse(&self, problem: impl Into<String>) -> BuildError {
-        BuildError::new(format!("record `{}`", self.name), problem)
+    /// Refuses records that cannot be used; `key` is that of the record. An equation error is no sum of misfits.
+    pub(super) fn check(&self, key: &str, is_equation_error: bool) -> Result<(), BuildError> {
+        self.channels.iter().try_for_each(|c| c.check(key))?;
+        for (scalar, name) in self.initial.iter().zip(["displacement", "velocity"]) {
+            if let ScalarSpec::Known(value) = scalar
+                && !value.is_finite()
+            {
+                let key = format!("{key}.initial.{name}");
+                return Err(BuildError::new(key, "not a finite number")
+                    .found(value)
+                    .expected("a finite number"));
+            }
+        }
+        match is_equation_error {
+            true => Ok(()),
+            false => self.check_misfit(key),
+        }
     }
 
-    /// Refuses what is no record.
-    pub(super) fn check(&self) -> Result<(), BuildError> {
-        if self.readings.is_empty() {
-            return Err(self.refuse("there are no readings"));
-        }
-        for Readings {
-            kind,
-            times,
-            values,
-            sigma,
-            loss,
-        } in &self.readings
-        {
-            let kind = kind.name();
-            let increasing = times.windows(2).all(|pair| pair[0] < pair[1]);
-            let finite = times.iter().chain(values).all(|x| x.is_finite());
-            let problem = if times.len() != values.len() {
-                format!("{} values at {} times", values.len(), times.len())
-            } else if times.len() < 2 {
-                "fewer than two readings".into()
-            } else if !finite {
-                "a time or reading is not a finite number".into()
-            } else if !increasing {
-                "the times do not increase".into()
-            } else if sigma.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
-                "sigma is not a positive number".into()
-            } else if sigma.is_none() && *loss != Loss::Squares {
-                "a robust loss needs a sigma".into()
-            } else {
-                continue;
-            };
-            return Err(self.refuse(format!("{kind}: {problem}")));
-        }
-        match self.initial {
-            Some(s) if !(s.displacement.is_finite() && s.velocity.is_finite()) => {
-                Err(self.refuse("the initial state is not finite"))
+    /// Without sigma J is the integral of the displacement's residual: other channels cannot be added to it, since metres and
+    /// metres per second cannot.
+    fn check_misfit(&self, key: &str) -> Result<(), BuildError> {
+        let without = self.channels.iter().find(|c| c.weighting.is_none());
+        let alone = self.channels.len() == 1;
+        match without {
+            Some(channel) if !(alone && channel.kind == ChannelKind::Displacement) => {
+                let name = channel.kind.name();
+                let problem = match alone {
+                    true => format!("readings of the {name} need a sigma"),
+                    false => "several channels need a sigma each, to be added up".to_owned(),
+                };
+                Err(BuildError::new(key, problem)
+                    .found(format!("no `sigma.{name}`"))
+                    .expected(format!(
+                        "`sigma: {{{name}: …}}`: a number in SI units, a column, or `estimate`"
+                    )))
             }
             _ => Ok(()),
         }
     }
 
-    /// On a grid; what is sought of the initial state is added to `scalars`.
-    pub(super) fn on(
-        &self,
-        grid: &Grid,
-        scalars: &mut Vec<ScalarParameter>,
-    ) -> Result<Experiment, BuildError> {
-        let drive = Input {
-            force: self
-                .signal("force", self.force.as_ref(), grid)?
-                .map(Waveform::Samples),
-            base: self
-                .signal("base acceleration", self.base.as_ref(), grid)?
-                .map(BaseMotion::Acceleration),
-        };
-        let nodes = grid.nodes();
-        let mut experiment = Experiment::free(&self.name, State::default(), nodes);
-        experiment.excitation = (drive != Input::default()).then(|| drive.on(grid, nodes));
-        match self.initial {
-            Some(state) => experiment.initial = state,
-            None => experiment.sought = self.seek_initial(scalars),
-        }
-        for readings in &self.readings {
-            let channel = self.channel(readings, &drive, experiment.excitation.as_ref(), grid)?;
-            experiment.channels.push(channel);
-        }
-        experiment.drive = drive;
-        Ok(experiment)
-    }
-
-    fn signal(
-        &self,
-        what: &str,
-        samples: Option<&[Vec<f64>; 2]>,
-        grid: &Grid,
-    ) -> Result<Option<Signal>, BuildError> {
-        let Some([times, values]) = samples else {
-            return Ok(None);
-        };
-        let signal = Signal::new(times.clone(), values.clone(), self.interpolation);
-        let signal = signal.ok_or_else(|| {
-            self.refuse(format!(
-                "{what}: as many finite values as increasing times are needed"
-            ))
-        })?;
-        let [from, to] = [grid.start(), grid.time(grid.nodes() - 1)];
-        match signal.covers(from, to) {
-            true => Ok(Some(signal)),
-            false => Err(self.refuse(format!("{what}: it does not cover {from} s to {to} s"))),
-        }
-    }
-
-    fn channel(
-        &self,
-        readings: &Readings,
-        drive: &Input,
-        excitation: Option<&Excitation>,
-        grid: &Grid,
-    ) -> Result<Channel, BuildError> {
-        let Readings {
-            kind,
-            times,
-            values,
-            sigma,
-            loss,
-        } = readings;
-        let weighting = match sigma {
-            Some(sigma) => Weighting::Sigma(*sigma),
-            None => integral(times),
-        };
-        let channel = Channel::new(
-            *kind,
-            times.clone(),
-            values.clone(),
-            weighting,
-            grid,
-            grid.nodes(),
-        );
-        let channel = channel
-            .ok_or_else(|| self.refuse(format!("{}: readings outside the grid", kind.name())))?;
-        let mut channel = channel.with_loss(*loss);
-        if *kind == ChannelKind::Acceleration && excitation.is_some() {
-            let around = |t: &f64| InputSample {
-                force: drive.force_at(*t),
-                base: drive.base_acceleration_at(*t),
+    /// Force and motion of the base, which must cover the span of the channels.
+    pub(super) fn inputs(&self, key: &str) -> Result<Input, BuildError> {
+        let signal = |samples: &Option<[Vec<f64>; 2]>, name: &str| {
+            let Some([times, values]) = samples else {
+                return Ok(None);
             };
-            channel = channel.with_surroundings(times.iter().map(around).collect());
+            let signal = Signal::new(times.clone(), values.clone(), self.interpolation);
+            signal.map(Some).ok_or_else(|| {
+                let key = format!("{key}.columns.{name}");
+                BuildError::new(key, "these samples make no signal")
+                    .found(format!("{} values at {} times", values.len(), times.len()))
+                    .expected("finite values at increasing times")
+            })
+        };
+        let mut input = self.input.clone();
+        if let Some(force) = signal(&self.force, "force")? {
+            input.force = Some(Waveform::Samples(force));
         }
-        if *kind == ChannelKind::Acceleration && drive.base.is_some() {
-            let base = times.iter().map(|t| drive.base_acceleration_at(*t));
-            channel = channel.with_base(base.collect());
+        if let Some(base) = signal(&self.base, "base_acceleration")? {
+            input.base = Some(BaseMotion::Acceleration(base));
         }
-        Ok(channel)
-    }
-
-    fn seek_initial(&self, scalars: &mut Vec<ScalarParameter>) -> [Option<usize>; 2] {
-        let nearest = self.readings.iter().min_by_key(|r| r.kind);
-        let sizes = nearest.map_or([1.0; 2], |r| {
-            state_scales(r.kind, &r.values, median_spacing(&r.times))
-        });
-        let parts = [("displacement", "m"), ("velocity", "m/s")];
-        let mut sought = [None; 2];
-        for (((name, unit), size), sought) in parts.into_iter().zip(sizes).zip(&mut sought) {
-            *sought = Some(scalars.len());
-            scalars.push(ScalarParameter {
-                name: format!("initial {name} of {}", self.name),
-                unit: unit.into(),
-                start: 0.0,
-                size,
-                prior: None,
-            });
+        if let Some(span) = self.span() {
+            check_cover(&input, key, span)?;
         }
-        sought
+        Ok(input)
     }
 }
 
-/// The integral cost: the paper's where the times are equally spaced.
-fn integral(times: &[f64]) -> Weighting {
-    match even_spacing(times) {
-        Some(spacing) => Weighting::Integral { spacing },
-        None => integral_over(times),
+/// Refuses a force or a motion of the base that does not cover the record.
+fn check_cover(input: &Input, key: &str, [start, end]: [f64; 2]) -> Result<(), BuildError> {
+    let force = match &input.force {
+        Some(Waveform::Samples(signal)) => Some(("force", signal)),
+        _ => None,
+    };
+    let base = input.base.as_ref().map(|base| match base {
+        BaseMotion::Acceleration(signal) => ("base_acceleration", signal),
+        BaseMotion::Displacement(signal) => ("base_displacement", signal),
+    });
+    let short = |(_, signal): &(&str, &Signal)| !signal.covers(start, end);
+    match force.into_iter().chain(base).find(short) {
+        Some((name, signal)) => {
+            let problem = format!("the {} is shorter than the record", name.replace('_', " "));
+            let times = signal.times();
+            Err(BuildError::new(format!("{key}.columns.{name}"), problem)
+                .found(format!("{} s to {} s", times[0], times[times.len() - 1]))
+                .expected(format!(
+                    "at least {start} s to {end} s: outside its samples nothing is known of it"
+                )))
+        }
+        None => Ok(()),
     }
 }

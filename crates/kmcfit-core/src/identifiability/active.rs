@@ -77,7 +77,7 @@ fn cone_row(cone: &Cone, theta: &[f64]) -> Option<Vec<(usize, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::constraints::Statement;
 
     fn problem(statement: Statement) -> Problem {
@@ -87,11 +87,11 @@ mod tests {
             .from_state(1.0, 0.0)
             .displacement(&times, &readings);
         let parts = [
-            Part::constant(1.0),
-            Part::constant(0.4),
-            Part::constant(4.0).max(5.0),
+            CoefficientSpec::constant(1.0),
+            CoefficientSpec::constant(0.4),
+            CoefficientSpec::constant(4.0).max(5.0),
         ];
-        let builder = Builder::new(parts).record(record).demand(statement);
+        let builder = Builder::new(parts).record(record).constrain(statement);
         builder.build().unwrap()
     }
 

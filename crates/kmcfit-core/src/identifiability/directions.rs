@@ -167,14 +167,18 @@ fn hats(parameters: usize, count: usize) -> Vec<Vec<(usize, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
 
     /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is sought.
     fn coarse() -> (Problem, Directions) {
         let times: Vec<f64> = (0..=200).map(|i| 0.05 * f64::from(i)).collect();
         let readings: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
         let record = Record::new("decay").displacement(&times, &readings);
-        let parts = [Part::nodal(1.0), Part::constant(0.1), Part::nodal(1.2)];
+        let parts = [
+            CoefficientSpec::nodal(1.0),
+            CoefficientSpec::constant(0.1),
+            CoefficientSpec::nodal(1.2),
+        ];
         let problem = Builder::new(parts).record(record).build().unwrap();
         let evaluation = problem.evaluate(&problem.start()).unwrap();
         let directions = Directions::new(&problem, &evaluation, 100, 33);

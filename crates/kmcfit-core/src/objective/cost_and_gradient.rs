@@ -93,7 +93,7 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::functions::Parameterization;
     use crate::system::{Grid, Method};
 
@@ -105,7 +105,7 @@ mod tests {
         let record = Record::new("free decay")
             .from_state(3.3, 1.0)
             .displacement(&times, &readings);
-        Builder::new([2.0, 0.5, 1.0].map(Part::nodal))
+        Builder::new([2.0, 0.5, 1.0].map(CoefficientSpec::nodal))
             .record(record)
             .method(Method::Midpoint)
             .build()

@@ -135,7 +135,7 @@ pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::system::Grid;
 
     /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it, by a sensor with
@@ -171,21 +171,21 @@ mod tests {
     /// another such motion of three times the size, read or not.
     fn swinging(size: f64, other_is_read: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let record = |size: f64| {
+        let record = |name: &str, size: f64| {
             let readings: Vec<f64> = times
                 .iter()
                 .map(|t| size * (TAU * t / 10.0).cos())
                 .collect();
-            Record::new("swinging")
+            Record::new(name)
                 .from_state(size, 0.0)
                 .displacement(&times, &readings)
         };
         let stiffness = (TAU / 10.0).powi(2);
-        let parts = [1.0, 0.0, stiffness].map(Part::fixed);
+        let parts = [1.0, 0.0, stiffness].map(CoefficientSpec::fixed);
         let mut problem = Builder::new(parts)
-            .cubic_stiffness(Part::constant(1e-9))
-            .record(record(size))
-            .record(record(3.0 * size))
+            .cubic_stiffness(CoefficientSpec::constant(1e-9))
+            .record(record("small", size))
+            .record(record("large", 3.0 * size))
             .build()
             .unwrap();
         if !other_is_read {

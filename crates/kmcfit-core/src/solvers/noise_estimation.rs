@@ -137,7 +137,7 @@ fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::solvers::{Solver, Stopping, fit_from};
     use crate::system::Grid;
     use std::time::Duration;
@@ -151,7 +151,11 @@ mod tests {
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
             .displacement(&times, &readings);
-        let parts = [Part::fixed(1.0), Part::constant(0.5), Part::constant(2.0)];
+        let parts = [
+            CoefficientSpec::fixed(1.0),
+            CoefficientSpec::constant(0.5),
+            CoefficientSpec::constant(2.0),
+        ];
         let problem = Builder::new(parts).record(record).build().unwrap();
         let settings = FitSettings {
             solver: Solver::SteepestDescent,

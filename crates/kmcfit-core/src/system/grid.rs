@@ -58,10 +58,23 @@ impl Grid {
         (0..self.nodes).map(|i| self.time(i)).collect()
     }
 
+    /// A time without the rounding in its digits beyond a tenth of a step.
+    pub fn round_time(&self, time: f64) -> f64 {
+        round_time(time, self.step())
+    }
+
     /// The same interval with another number of nodes; `None` as in [`Grid::new`].
     pub fn with_nodes(&self, nodes: usize) -> Option<Self> {
         Self::new(self.start, self.duration, nodes)
     }
+}
+
+/// A time without the rounding in its digits beyond a tenth of `spacing`, both in s: a sample that is written so is still the one
+/// at that time, however late it is.
+pub fn round_time(time: f64, spacing: f64) -> f64 {
+    let decimals = (1.0 - spacing.log10().floor()).clamp(0.0, 12.0);
+    let written = format!("{time:.*}", decimals as usize);
+    written.parse().unwrap_or(time)
 }
 
 /// A time on a grid: `fraction` of a step after the left node of step `step`.
@@ -117,5 +130,25 @@ impl TimePoint {
             1.0 => Some(self.step + 1),
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::round_time;
+
+    #[test]
+    fn rounded_times_keep_their_samples() {
+        let given = [
+            (1_700_006_005.02, 0.02),
+            (100_005.2 + 1e-11, 0.02),
+            (0.1 + 0.2, 0.1),
+            (1234.0, 500.0),
+        ];
+        let expected = [1_700_006_005.02, 100_005.2, 0.3, 1234.0];
+        assert_eq!(
+            given.map(|(time, spacing)| round_time(time, spacing)),
+            expected
+        );
     }
 }

@@ -15,7 +15,7 @@ pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};
-pub use grid::{Grid, TimePoint};
+pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputSample, StageSamples};
 pub use integrator::Method;
 

@@ -1,10 +1,9 @@
 //! From one map of `constraints` to what it demands.
 
 use crate::config::ModelFile;
-use crate::config::build::functions::values;
+use crate::config::build::functions::history;
 use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, RangeSpec};
-use crate::digits::clock;
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -103,48 +102,6 @@ pub(super) fn read(
     Ok(vec![(key.to_owned(), reader.statement(kind)?)])
 }
 
-/// Smallest and largest values of a function, whose keys are `min` and `max` below `key`.
-pub(super) fn bounds(
-    file: &ModelFile,
-    grid: &Grid,
-    key: &str,
-    of: CoefficientKind,
-    (min, max): (&Option<NumberOrColumn>, &Option<NumberOrColumn>),
-) -> Result<Statement, InputError> {
-    let limit = |name: &str, given: &Option<NumberOrColumn>| match given {
-        None => Ok(None),
-        Some(NumberOrColumn::Number(value)) => Ok(Some(Limit::Number(value.0))),
-        Some(column @ NumberOrColumn::Column(c)) => {
-            let values = values(file, grid, &format!("{key}.{name}"), column)?;
-            let name = format!("{} of {}", c.column, c.data);
-            Ok(Some(Limit::Nodal { name, values }))
-        }
-    };
-    let (min, max) = (limit("min", min)?, limit("max", max)?);
-    if let (Some(low), Some(high)) = (&min, &max) {
-        let at = |limit: &Limit, i: usize| match limit {
-            Limit::Number(value) => *value,
-            Limit::Nodal { values, .. } => values[i],
-        };
-        let crossed = (0..grid.nodes()).find(|&i| at(low, i) > at(high, i));
-        if let Some(i) = crossed {
-            return Err(file
-                .error_at(
-                    &format!("{key}.min"),
-                    "the smallest value is above the largest",
-                )
-                .found(format!(
-                    "min {} and max {} at {} s",
-                    at(low, i),
-                    at(high, i),
-                    grid.time(i)
-                ))
-                .expected("min at most max at all times"));
-        }
-    }
-    Ok(Statement::Bounds { of, min, max })
-}
-
 impl Reader<'_> {
     fn error(&self, below: &str, problem: impl Into<String>) -> InputError {
         self.file.error_at(&self.below(below), problem)
@@ -216,7 +173,11 @@ impl Reader<'_> {
         let of = self.of();
         let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
         Ok(match kind {
-            Kind::Bounds => bounds(self.file, self.grid, self.key, of, (&spec.min, &spec.max))?,
+            Kind::Bounds => Statement::Bounds {
+                of,
+                min: self.bound("min", spec.min.as_ref())?,
+                max: self.bound("max", spec.max.as_ref())?,
+            },
             Kind::Slope => {
                 let (min, max) = self.range("slope", spec.slope.as_ref())?;
                 Statement::Slope { of, min, max }
@@ -247,6 +208,15 @@ impl Reader<'_> {
                 Statement::Passive
             }
         })
+    }
+
+    fn bound(
+        &self,
+        name: &str,
+        given: Option<&NumberOrColumn>,
+    ) -> Result<Option<Limit>, InputError> {
+        let read = |given| history(self.file, self.grid, &self.below(name), given);
+        given.map(read).transpose()
     }
 
     fn shapes(&self) -> Result<Vec<(String, Statement)>, InputError> {
@@ -295,7 +265,7 @@ impl Reader<'_> {
                     .found(time.0)
                     .expected(format!(
                         "a time from {start} s to {} s",
-                        clock(end, self.grid.step())
+                        self.grid.round_time(end)
                     )));
             }
             let held = Statement::Value {

@@ -1,17 +1,14 @@
-//! What looks wrong in a record, and what no record can tell.
+//! Data checks of a record.
 
 use super::{RawChannel, Record, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::digits::{clock, significant};
-use crate::error::InputError;
+use crate::digits::significant;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment};
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
-use kmcfit_core::internals::system::Term;
+use kmcfit_core::internals::system::round_time;
 use std::f64::consts::TAU;
 
 /// Factors between channels, or between a reading and a known state, that look like a wrong unit.
@@ -184,7 +181,7 @@ fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<String> {
 /// The time of a reading, s, as its file counts.
 fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
     let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
-    clock(channel.times[reading] + zero, channel.median_spacing)
+    round_time(channel.times[reading] + zero, channel.median_spacing)
 }
 
 /// Single readings that lie far off the others, where their squares count in full.
@@ -225,106 +222,4 @@ fn range(channel: &RawChannel) -> Option<String> {
         level / channel.unit.factor(),
         channel.unit.symbol(),
     ))
-}
-
-/// Refuses a force offset beside sensor offsets: a motion that is shifted by `d`, a sensor that reads `d`
-/// less and a force that is `k d` larger look the same.
-fn offsets(
-    file: &ModelFile,
-    problem: &Problem,
-    open: &dyn Fn(Option<usize>) -> bool,
-) -> Result<(), InputError> {
-    let mut functions = problem.functions.iter();
-    let sought = functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
-    let shifted = |e: &Experiment| {
-        let sees =
-            |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());
-        open(e.sought[0]) && e.channels.iter().all(sees)
-    };
-    if !(sought && problem.experiments.iter().all(shifted)) {
-        return Ok(());
-    }
-    Err(file
-        .error_at(
-            "functions.offset",
-            "the offset of the force and those of the sensors cannot both be estimated: a shifted \
-             motion looks the same",
-        )
-        .found("no known offset, initial displacement or prior")
-        .expected("a number for one of them, or a `prior`"))
-}
-
-/// Refuses gains that stand for the same freedom as something else: in a linear device a free motion
-/// and its initial state, or a forced motion and the scale of mass, damping and stiffness, can be
-/// multiplied by what the gain is divided by.
-pub fn unidentifiable(file: &ModelFile, problem: &Problem) -> Result<(), InputError> {
-    let scalars = problem.functions.scalars();
-    let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
-    let shift_is_free = |t: &Term| t.is_linear() || *t == Term::Offset;
-    if problem.oscillator.terms.iter().all(shift_is_free) {
-        offsets(file, problem, &open)?;
-    }
-    if !problem.oscillator.terms.iter().all(|term| term.is_linear()) {
-        return Ok(());
-    }
-    let gains_open = |e: &Experiment| {
-        let gain = |c: &Channel| {
-            // A base that is added to the motion is a scale of its own.
-            open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
-        };
-        !e.channels.is_empty() && e.channels.iter().all(gain)
-    };
-    let starts_open = |e: &Experiment| {
-        let rest = [e.initial.displacement, e.initial.velocity];
-        (0..2).all(|q| match e.sought[q] {
-            Some(index) => open(Some(index)),
-            None => rest[q] == 0.0,
-        })
-    };
-    let is_free = |e: &Experiment| e.is_free();
-    for (place, e) in problem.experiments.iter().enumerate() {
-        if is_free(e) && gains_open(e) && starts_open(e) {
-            return Err(file
-                .error_at(
-                    "experiments",
-                    format!(
-                        "the gain and the initial state of {} cannot both be estimated: a larger \
-                         motion seen by a weaker sensor looks the same",
-                        e.name
-                    ),
-                )
-                .found(format!(
-                    "no known gain, state or prior in record {}",
-                    place + 1
-                ))
-                .expected("a number for one of them, or a `prior`"));
-        }
-    }
-    let forced: Vec<_> = problem.experiments.iter().filter(|e| !is_free(e)).collect();
-    let by_force = |e: &&Experiment| e.excitation.as_ref().is_some_and(|x| x.base.is_none());
-    let mut functions = problem.functions.iter();
-    let scale_is_open = functions.all(|f| f.offset.iter().all(|p| *p == 0.0));
-    let held = problem.constraints.groups.iter().any(|group| {
-        (0..group.rows.len()).any(|r| {
-            let [low, high] = group.bounds(r);
-            low == high && low != 0.0
-        })
-    });
-    let all = !forced.is_empty()
-        && forced.iter().all(by_force)
-        && forced.iter().all(|e| gains_open(e) && starts_open(e));
-    if all && scale_is_open && !held {
-        return Err(file
-            .error_at(
-                "experiments",
-                "the gains and the scale of mass, damping and stiffness cannot both be \
-                 estimated: a heavier device seen by a stronger sensor looks the same",
-            )
-            .found("no known gain, no fixed function and no value that holds the scale")
-            .expected(
-                "a known gain or a `prior` in one forced experiment, a fixed function, or a \
-                 constraint such as {function: mass, mean: 1.0}",
-            ));
-    }
-    Ok(())
 }

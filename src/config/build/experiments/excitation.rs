@@ -6,9 +6,8 @@ use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
 use crate::units::Kind;
-use kmcfit_core::internals::record::{BaseMotion, Experiment, Input, Waveform};
+use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
-use kmcfit_core::internals::system::Grid;
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]
@@ -20,6 +19,11 @@ impl RawExcitation {
     /// Whether nothing drives it.
     pub fn is_empty(&self) -> bool {
         self.drive.force.is_none() && self.drive.base.is_none()
+    }
+
+    /// Force and motion of the base.
+    pub fn into_input(self) -> Input {
+        self.drive
     }
 
     /// Spacing of the samples, where they are equally spaced, s.
@@ -182,46 +186,6 @@ fn signal(
             .found(format!("{samples} samples"))
             .expected("finite values at increasing times")
     })
-}
-
-/// Refuses a force or a motion of the base that does not reach over the record.
-pub fn covers(
-    file: &ModelFile,
-    i: usize,
-    excitation: &RawExcitation,
-    [start, end]: [f64; 2],
-) -> Result<(), InputError> {
-    let short = |name: &str, signal: &Signal| {
-        let times = signal.times();
-        match signal.covers(start, end) {
-            true => Ok(()),
-            false => Err(file
-                .error_at(
-                    &format!("experiments[{i}].columns.{name}"),
-                    format!("the {} is shorter than the record", name.replace('_', " ")),
-                )
-                .found(format!("{} s to {} s", times[0], times[times.len() - 1]))
-                .expected(format!(
-                    "at least {start} s to {end} s: outside its samples nothing is known of it"
-                ))),
-        }
-    };
-    if let Some(Waveform::Samples(signal)) = &excitation.drive.force {
-        short("force", signal)?;
-    }
-    match &excitation.drive.base {
-        Some(BaseMotion::Acceleration(signal)) => short("base_acceleration", signal),
-        Some(BaseMotion::Displacement(signal)) => short("base_displacement", signal),
-        None => Ok(()),
-    }
-}
-
-/// Gives an experiment its excitation.
-pub fn place(raw: &RawExcitation, grid: &Grid, nodes: usize, experiment: &mut Experiment) {
-    if !raw.is_empty() {
-        experiment.excitation = Some(raw.drive.on(grid, nodes));
-        experiment.drive = raw.drive.clone();
-    }
 }
 
 /// A force without samples.

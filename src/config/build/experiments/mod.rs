@@ -3,25 +3,23 @@
 mod channel;
 mod doubts;
 mod excitation;
-mod initial;
 mod source;
 mod unit;
-mod value;
 
-use super::functions::Assemblies;
-use super::{Purpose, listed};
+use super::{Purpose, functions};
 use crate::config::ModelFile;
-use crate::config::spec::{ExperimentSpec, FitMethod};
+use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
+use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
 use crate::error::InputError;
 use crate::observations::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
-use kmcfit_core::internals::functions::ScalarParameter;
+use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
+use kmcfit_core::internals::functions::{Prior, ScalarParameter};
 use kmcfit_core::internals::record::{ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::system::Grid;
 
-pub(super) use doubts::unidentifiable;
 pub(super) use excitation::shape;
 
 /// What stands in the files of one experiment, at the times of its readings.
@@ -68,14 +66,6 @@ pub struct ChannelNote {
     pub format: String,
 }
 
-/// What was made of the experiments of a model.
-pub(super) struct Built {
-    pub fitted: Vec<Experiment>,
-    pub notes: Vec<Vec<ChannelNote>>,
-    pub scalars: Vec<ScalarParameter>,
-    pub held_out: Vec<HoldOut>,
-}
-
 /// An experiment that is kept out of the fit.
 #[derive(Debug, Clone)]
 pub struct HoldOut {
@@ -85,25 +75,6 @@ pub struct HoldOut {
     pub scalars: Vec<ScalarParameter>,
     /// What a report says about its channels.
     pub notes: Vec<ChannelNote>,
-}
-
-/// Two experiments of one name could not be told apart.
-pub(super) fn distinct_names(file: &ModelFile) -> Result<(), InputError> {
-    let mut names: Vec<&str> = Vec::new();
-    for (i, spec) in file.spec.experiments.iter().enumerate() {
-        let Some(name) = &spec.name else { continue };
-        if names.contains(&name.0.as_str()) {
-            return Err(file
-                .error_at(
-                    &format!("experiments[{i}].name"),
-                    "two experiments have the same name",
-                )
-                .found(format!("`{}`", name.0))
-                .expected("a name of its own for every experiment"));
-        }
-        names.push(&name.0);
-    }
-    Ok(())
 }
 
 /// Whether the fit compares the equation of motion, and not a motion, with the readings.
@@ -146,11 +117,10 @@ pub(super) fn read(
             return records.collect();
         }
     }
-    let records: Vec<Option<Record>> = (specs.iter().enumerate())
+    let records = specs.iter().enumerate();
+    records
         .map(|(i, spec)| read_one(file, i, spec, warnings).map(Some))
-        .collect::<Result<_, _>>()?;
-    same_start(file, &records)?;
-    Ok(records)
+        .collect()
 }
 
 fn read_one(
@@ -164,140 +134,81 @@ fn read_one(
         channels,
         excitation: excitation::read(file, i, spec, warnings)?,
     };
-    one_misfit(file, i, &record)?;
-    excitation::covers(file, i, &record.excitation, [record.start(), record.end()])?;
     warnings.extend(doubts::of(file, i, spec, &record));
     Ok(record)
 }
 
-/// Without sigma J is the integral of the displacement's residual: other channels cannot be added
-/// to it, since metres and metres per second cannot.
-fn one_misfit(file: &ModelFile, i: usize, record: &Record) -> Result<(), InputError> {
-    if is_equation_error(file) {
-        return Ok(());
-    }
-    let without = record.channels.iter().find(|c| c.weighting.is_none());
-    let alone = record.channels.len() == 1;
-    match without {
-        Some(channel) if !(alone && channel.kind == ChannelKind::Displacement) => {
-            let name = channel.kind.name();
-            let key = format!("experiments[{i}]");
-            let problem = match alone {
-                true => format!("readings of the {name} need a sigma"),
-                false => "several channels need a sigma each, to be added up".to_owned(),
-            };
-            Err(file
-                .error_at(&key, problem)
-                .found(format!("no `sigma.{name}`"))
-                .expected(format!(
-                    "`sigma: {{{name}: …}}`: a number in SI units, a column, or `estimate`"
-                )))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The functions are functions of one time, and an initial state is that at its beginning.
-fn same_start(file: &ModelFile, records: &[Option<Record>]) -> Result<(), InputError> {
-    let Some(first) = records.iter().flatten().next() else {
-        return Ok(());
-    };
-    for (i, record) in records.iter().enumerate() {
-        let Some(record) = record else { continue };
-        if (record.start() - first.start()).abs() > 1e-6 * first.spacing() {
-            return Err(file
-                .error_at(
-                    &format!("experiments[{i}]"),
-                    "this record begins at another time than the first one",
-                )
-                .found(format!("{} s", record.start()))
-                .expected(format!("{} s, as the functions are shared", first.start()))
-                .hint(format!(
-                    "`time_zero: {}` counts its times from its beginning",
-                    record.start() - first.start()
-                )));
-        }
-    }
-    Ok(())
-}
-
-/// Puts the records on the grid.
-pub(super) fn build(
+/// The specification of experiment `i` with what its files have, and what a report says of its channels.
+pub(super) fn specification(
     file: &ModelFile,
     purpose: Purpose,
     grid: &Grid,
-    records: Vec<Option<Record>>,
-    assemblies: &Assemblies,
-) -> Result<Built, InputError> {
-    let mut built = Built {
-        fitted: Vec::new(),
-        notes: Vec::new(),
-        scalars: Vec::new(),
-        held_out: Vec::new(),
-    };
-    for (i, (spec, record)) in file.spec.experiments.iter().zip(records).enumerate() {
-        let device = assemblies.of_experiment[i];
-        if is_held_out(spec) {
-            let mut scalars = Vec::new();
-            let (experiment, notes) =
-                place(file, purpose, grid, (i, device), record, &mut scalars)?;
-            built.held_out.push(HoldOut {
-                experiment,
-                scalars,
-                notes,
-            });
-        } else {
-            let scalars = &mut built.scalars;
-            let (experiment, notes) = place(file, purpose, grid, (i, device), record, scalars)?;
-            built.fitted.push(experiment);
-            built.notes.push(notes);
-        }
-    }
-    Ok(built)
-}
-
-/// One experiment on the grid; numbers that it leaves open are added to `scalars`.
-fn place(
-    file: &ModelFile,
-    purpose: Purpose,
-    grid: &Grid,
-    (i, device): (usize, usize),
+    i: usize,
     record: Option<Record>,
-    scalars: &mut Vec<ScalarParameter>,
-) -> Result<(Experiment, Vec<ChannelNote>), InputError> {
+) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
-    let nodes = match &record {
-        Some(record) if !record.channels.is_empty() => nodes_until(grid, record.end()),
-        _ => grid.nodes(),
+    let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
+    let initial = match &spec.initial {
+        InitialSpec::Scalar(Estimate) => [&estimate, &estimate],
+        InitialSpec::Map(state) => [&state.displacement, &state.velocity],
     };
-    let (initial, sought) = initial::build(file, i, record.as_ref(), scalars)?;
-    let mut experiment = Experiment::free(file.experiment_name(i), initial, nodes);
-    experiment.sought = sought;
-    experiment.device = device;
+    let mut found = builder::Record::new(file.experiment_name(i)).initial(initial.map(scalar));
+    if is_held_out(spec) {
+        found = found.validation();
+    }
+    for (kind, given) in functions::own(file, i) {
+        let key = format!("experiments[{i}].functions.{}", kind.name());
+        let own = functions::specification(file, grid, &key, given)?;
+        found = found.coefficient(kind, own);
+    }
     let mut notes = Vec::new();
     if let Some(mut record) = record {
-        excitation::place(&record.excitation, grid, nodes, &mut experiment);
+        found = found.input(record.excitation.into_input());
         if let (Purpose::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
             reading_per_node(only, grid);
         }
-        if !matches!(purpose, Purpose::Simulate { .. }) {
-            for raw in record.channels {
-                notes.push(raw.note());
-                let channel = channel::place(file, (i, spec), raw, grid, &experiment, scalars)?;
-                experiment.channels.push(channel);
-            }
+        for raw in record.channels {
+            notes.push(raw.note());
+            found = found.channel(channel(spec, raw));
         }
     }
-    Ok((experiment, notes))
+    Ok((found, notes))
 }
 
-/// The nodes that a motion needs to reach `end`.
-fn nodes_until(grid: &Grid, end: f64) -> usize {
-    let steps = (end - grid.start()) / grid.step();
-    let steps = (steps - kmcfit_core::internals::system::TimePoint::SAME_TIME)
-        .ceil()
-        .max(0.0);
-    (steps as usize + 1).clamp(Grid::FEWEST_NODES, grid.nodes())
+/// A number of the model that is known or estimated.
+fn scalar(given: &EstimateValue) -> ScalarSpec {
+    match given {
+        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => ScalarSpec::Known(number.0),
+        ScalarOr::Scalar(NumberOrEstimate::Estimate) => ScalarSpec::ESTIMATED,
+        ScalarOr::Map(spec) => ScalarSpec::Estimated {
+            start: spec.start.map(|start| start.0),
+            prior: spec.prior.as_ref().map(|prior| Prior {
+                mean: prior.mean.0,
+                sigma: prior.sigma.0,
+            }),
+        },
+    }
+}
+
+fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
+    let sensor = |given: &SensorSpec| builder::SensorSpec {
+        gain: given.gain.as_ref().map(scalar),
+        offset: given.offset.as_ref().map(scalar),
+        drift: given.drift.as_ref().map(scalar),
+        absolute: given.absolute,
+    };
+    let given = channel::sensor_of(spec, raw.kind);
+    ChannelSpec {
+        kind: raw.kind,
+        sensor: given.map(sensor).unwrap_or_default(),
+        weighting: raw.weighting,
+        loss: raw.loss,
+        filter: raw.filter,
+        span: raw.span,
+        angular: raw.unit.is_angular(),
+        times: raw.times,
+        values: raw.values,
+    }
 }
 
 /// A check is about the gradient: readings of the plain integral cost are taken at every node, so

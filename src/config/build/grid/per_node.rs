@@ -6,7 +6,7 @@
 use crate::config::ModelFile;
 use crate::config::build::Purpose;
 use crate::config::build::fit::DEFAULT_MEMORY;
-use crate::config::build::functions::{Slot, slots};
+use crate::config::build::functions::{self, Given};
 use crate::config::scalar::Knots;
 use crate::config::spec::{Basis, FitMethod};
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
@@ -35,7 +35,7 @@ const PROGRAMS: usize = 2;
 /// Bytes per node that a run of the model may need.
 pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
     let spec = &file.spec;
-    let (records, functions) = (spec.experiments.len(), slots(file));
+    let (records, functions) = (spec.experiments.len(), functions::all(file));
     if let Purpose::Simulate { .. } = purpose {
         return SIMULATION * (1 + records + functions.len());
     }
@@ -80,8 +80,7 @@ enum FreeValues {
     PerNode,
 }
 
-fn free_values(slot: &Slot) -> FreeValues {
-    let spec = slot.spec;
+fn free_values((_, spec): &Given) -> FreeValues {
     let knots = match &spec.knots {
         Some(Knots::Count(count)) => count.0,
         Some(Knots::Times(times)) => times.len(),
@@ -104,11 +103,9 @@ fn free_values(slot: &Slot) -> FreeValues {
 }
 
 /// Whether inequalities or total variation may take a quadratic program.
-fn has_programs(file: &ModelFile, functions: &[Slot]) -> bool {
-    let limited = |slot: &Slot| {
-        let spec = slot.spec;
-        spec.min.is_some() || spec.max.is_some() || spec.variation.is_some()
-    };
+fn has_programs(file: &ModelFile, functions: &[Given]) -> bool {
+    let limited =
+        |(_, spec): &Given| spec.min.is_some() || spec.max.is_some() || spec.variation.is_some();
     file.spec.constraints.is_some() || functions.iter().any(limited)
 }
 

@@ -42,6 +42,14 @@ pub enum Limit {
 }
 
 impl Limit {
+    /// Its value at node `i`.
+    pub fn at(&self, i: usize) -> f64 {
+        match self {
+            Limit::Number(value) => *value,
+            Limit::Nodal { values, .. } => values[i],
+        }
+    }
+
     /// Its smallest value.
     pub fn least(&self) -> f64 {
         match self {

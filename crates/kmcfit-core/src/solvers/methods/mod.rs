@@ -97,7 +97,7 @@ pub(super) fn no_step(problem: &Problem, point: &Iterate, status: ConicStatus) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::objective::GradientKind;
     use crate::solvers::checkpoint::ExactF64s;
 
@@ -106,7 +106,11 @@ mod tests {
     fn states_of_another_length_are_refused() {
         let times: Vec<f64> = (0..21).map(|i| 0.1 * f64::from(i)).collect();
         let motion: Vec<f64> = times.iter().map(|t| t.cos()).collect();
-        let system = [Part::constant(2.0), Part::constant(0.1), Part::fixed(1.0)];
+        let system = [
+            CoefficientSpec::constant(2.0),
+            CoefficientSpec::constant(0.1),
+            CoefficientSpec::fixed(1.0),
+        ];
         let record = Record::new("r")
             .from_state(1.0, 0.0)
             .displacement(&times, &motion);

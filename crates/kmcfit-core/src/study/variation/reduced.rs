@@ -159,7 +159,7 @@ impl Reduced {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, Part, Record};
+    use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::constraints::Statement;
     use crate::functions::CoefficientKind;
 
@@ -168,22 +168,26 @@ mod tests {
         let readings: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
         let record = Record::new("decay").displacement(&times, &readings);
         let parts = [
-            Part::piecewise_linear(5, 1.0).smooth(1, 0.3).min(0.1),
-            Part::piecewise_linear(4, 0.2).smooth(0, 0.7).smooth(2, 0.2),
-            Part::piecewise_constant(6, 1.7).variation(0.4),
+            CoefficientSpec::piecewise_linear(5, 1.0)
+                .smooth(1, 0.3)
+                .min(0.1),
+            CoefficientSpec::piecewise_linear(4, 0.2)
+                .smooth(0, 0.7)
+                .smooth(2, 0.2),
+            CoefficientSpec::piecewise_constant(6, 1.7).variation(0.4),
         ];
         let value = |of, value| Statement::Mean { of, value };
         Builder::new(parts)
             .record(record)
-            .demand(value(CoefficientKind::Mass, 1.1))
-            .demand(Statement::DampingRatio { max: 0.8 })
-            .demand(Statement::Slope {
+            .constrain(value(CoefficientKind::Mass, 1.1))
+            .constrain(Statement::DampingRatio { max: 0.8 })
+            .constrain(Statement::Slope {
                 of: CoefficientKind::Damping,
                 min: Some(-0.5),
                 max: None,
             })
-            .prefer(value(CoefficientKind::Stiffness, 1.5), 2.0)
-            .prefer(value(CoefficientKind::Damping, 0.3), 3.0)
+            .penalize(value(CoefficientKind::Stiffness, 1.5), 2.0)
+            .penalize(value(CoefficientKind::Damping, 0.3), 3.0)
             .build()
             .unwrap()
     }

@@ -1,6 +1,6 @@
 //! A fit of the linear mass decay, arrays in, arrays out: for WebAssembly, and natively for comparison.
 
-use kmcfit_core::{Builder, Method, Part, Record};
+use kmcfit_core::{Builder, CoefficientSpec, Method, Record};
 use std::cell::RefCell;
 
 thread_local! {
@@ -12,9 +12,9 @@ thread_local! {
 /// in time, a constant damping. `None` where the fit does not converge.
 pub fn estimates(times: &[f64], displacement: &[f64]) -> Option<[f64; 3]> {
     let system = [
-        Part::polynomial(&[2.0, 0.0]).min(0.05),
-        Part::constant(1.0),
-        Part::fixed(1.0),
+        CoefficientSpec::polynomial(&[2.0, 0.0]).min(0.05),
+        CoefficientSpec::constant(1.0),
+        CoefficientSpec::fixed(1.0),
     ];
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)

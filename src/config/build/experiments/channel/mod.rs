@@ -1,10 +1,7 @@
 //! Channels: readings from columns, with their noise, loss, sensor and filter.
 
 mod noise;
-mod on_grid;
 mod sampling;
-
-pub use on_grid::place;
 
 use super::source::{self, Wanted};
 use super::{ChannelNote, names};
@@ -43,7 +40,7 @@ pub struct RawChannel {
     pub weighting: Option<Weighting>,
     /// Sections of the band's filter.
     pub filter: Vec<SecondOrder>,
-    loss: Loss,
+    pub loss: Loss,
     pub unit: Unit,
     ignored: Vec<(usize, String)>,
     format: String,
@@ -94,6 +91,11 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
         loss: pick!(spec.loss),
         sensor: pick!(spec.sensors),
     }
+}
+
+/// What the model says of the sensor of a channel.
+pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
+    spec_of(spec, kind).sensor
 }
 
 /// Reads all channels of experiment `i`.
@@ -226,7 +228,7 @@ fn read_one(
     }
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
-    let loss = loss(file, &key, of_kind, weighting.as_ref())?;
+    let loss = loss(file, &key, of_kind)?;
     Ok(RawChannel {
         kind,
         span,

@@ -21,13 +21,8 @@ pub(super) fn weighting(
     sigmas: Option<Vec<f64>>,
     values: &[f64],
 ) -> Result<Option<Weighting>, InputError> {
-    let expected = "a number greater than 0, in SI units";
     match (sigma, sigmas) {
         (None, _) => Ok(None),
-        (Some(Sigma::Number(sigma)), _) if sigma.0 <= 0.0 => Err(file
-            .error_at(key, "a standard deviation must be positive")
-            .found(sigma.0)
-            .expected(expected)),
         (Some(Sigma::Number(sigma)), _) => Ok(Some(Weighting::Sigma(sigma.0))),
         (Some(Sigma::Estimate), _) => {
             let size = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
@@ -50,12 +45,7 @@ pub(super) fn weighting(
     }
 }
 
-pub(super) fn loss(
-    file: &ModelFile,
-    key: &str,
-    of_kind: &Spec,
-    weighting: Option<&Weighting>,
-) -> Result<Loss, InputError> {
+pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, InputError> {
     let key = format!("{key}.loss.{}", of_kind.kind.name());
     let (name, threshold, degrees) = match of_kind.loss {
         None => return Ok(Loss::Squares),
@@ -87,15 +77,6 @@ pub(super) fn loss(
             }
             _ => {}
         }
-    }
-    if name != LossName::Squares && weighting.is_none() {
-        return Err(file
-            .error_at(
-                &key,
-                "a robust loss needs to know which residuals are large",
-            )
-            .found("no `sigma`")
-            .expected(format!("`sigma: {{{}: …}}`", of_kind.kind.name())));
     }
     Ok(match name {
         LossName::Squares => Loss::Squares,

@@ -1,0 +1,150 @@
+//! Which coefficient functions apply to which record.
+
+use super::{BuildError, Builder, CoefficientSpec};
+use crate::functions::CoefficientKind;
+
+/// A coefficient function of a builder, and its key.
+pub(super) struct Slot<'a> {
+    /// Such as `functions.mass` or `experiments[1].functions.damping`.
+    pub key: String,
+    pub kind: CoefficientKind,
+    pub spec: &'a CoefficientSpec,
+    /// The record that has it for itself.
+    pub owner: Option<usize>,
+}
+
+impl Slot<'_> {
+    /// Speed over which the sign of the velocity is smoothed, m/s: of Coulomb friction only, 0 for others.
+    pub fn width(&self) -> Result<f64, BuildError> {
+        let key = format!("{}.width", self.key);
+        let advice = "well below those of the motion";
+        match (self.kind, self.spec.width) {
+            (CoefficientKind::CoulombFriction, Some(width)) if width > 0.0 && width.is_finite() => {
+                Ok(width)
+            }
+            (CoefficientKind::CoulombFriction, Some(width)) => {
+                Err(BuildError::new(key, "the width must be positive")
+                    .found(width)
+                    .expected(format!("a speed in m/s, greater than 0, {advice}")))
+            }
+            (CoefficientKind::CoulombFriction, None) => {
+                Err(
+                    BuildError::new(&self.key, "Coulomb friction needs a width").expected(format!(
+                        "`width`: the speed in m/s over which the sign of v is smoothed, {advice}"
+                    )),
+                )
+            }
+            (_, Some(width)) => Err(BuildError::new(key, "only Coulomb friction has a width")
+                .found(width)
+                .expected("no `width`")),
+            (_, None) => Ok(0.0),
+        }
+    }
+}
+
+/// The sets of functions that make up a system, and the set of each record.
+pub(super) struct Assemblies {
+    /// Indices into the list of [`Builder::slots`], mass first; the shared set comes first.
+    pub sets: Vec<Vec<usize>>,
+    pub of_record: Vec<usize>,
+}
+
+impl Builder {
+    /// All functions in the order of the problem: the shared ones, mass first, then those of single records.
+    pub(super) fn slots(&self) -> Vec<Slot<'_>> {
+        let shared = (self.coefficients.iter()).map(|(kind, spec)| Slot {
+            key: format!("functions.{}", kind.name()),
+            kind: *kind,
+            spec,
+            owner: None,
+        });
+        let own = self.records.iter().enumerate().flat_map(|(i, record)| {
+            record.coefficients.iter().map(move |(kind, spec)| Slot {
+                key: format!("experiments[{i}].functions.{}", kind.name()),
+                kind: *kind,
+                spec,
+                owner: Some(i),
+            })
+        });
+        shared.chain(own).collect()
+    }
+
+    /// Which functions apply to which record.
+    pub(super) fn assemblies(&self) -> Result<Assemblies, BuildError> {
+        let slots = self.slots();
+        let shared: Vec<usize> = (0..self.coefficients.len()).collect();
+        let mut found = Assemblies {
+            sets: vec![shared.clone()],
+            of_record: Vec::new(),
+        };
+        for (i, record) in self.records.iter().enumerate() {
+            let mut set = shared.clone();
+            if record.validation && !record.coefficients.is_empty() {
+                let problem = "an experiment that is held out cannot have functions of its own";
+                return Err(
+                    BuildError::new(format!("experiments[{i}].functions"), problem)
+                        .found("`functions` beside `hold_out: true`")
+                        .expected("the shared functions: they are what is to be tested"),
+                );
+            }
+            for (f, slot) in slots.iter().enumerate().filter(|(_, s)| s.owner == Some(i)) {
+                set[self.shared_place(slot)?] = f;
+            }
+            let known = found.sets.iter().position(|s| *s == set);
+            found.of_record.push(known.unwrap_or(found.sets.len()));
+            if known.is_none() {
+                found.sets.push(set);
+            }
+        }
+        check_shared(&slots, &found)?;
+        Ok(found)
+    }
+
+    /// The place of the shared function that a record replaces by one of its own.
+    fn shared_place(&self, slot: &Slot) -> Result<usize, BuildError> {
+        let mut kinds = self.coefficients.iter().map(|(kind, _)| *kind);
+        let Some(place) = kinds.position(|kind| kind == slot.kind) else {
+            let name = slot.kind.name();
+            return Err(
+                BuildError::new(&slot.key, "the device has no such function")
+                    .found(format!("`{name}` in one experiment only"))
+                    .expected(format!(
+                        "`functions.{name}` as well, which the other experiments share; `fixed: 0` where they have none"
+                    )),
+            );
+        };
+        match slot.kind {
+            CoefficientKind::CoulombFriction => {
+                let problem = "Coulomb friction is shared by all experiments";
+                Err(BuildError::new(&slot.key, problem).expected("it under `functions` alone"))
+            }
+            _ => Ok(place),
+        }
+    }
+}
+
+/// Refuses records that share no estimated function, and functions that apply to no record.
+fn check_shared(slots: &[Slot], found: &Assemblies) -> Result<(), BuildError> {
+    let users = |f: usize| {
+        let uses = |set: &&usize| found.sets[**set].contains(&f);
+        found.of_record.iter().filter(uses).count()
+    };
+    let own = (slots.iter()).any(|s| s.owner.is_some() && s.spec.is_estimated());
+    let shared = |(f, slot): (usize, &Slot)| slot.spec.is_estimated() && users(f) > 1;
+    if found.of_record.len() > 1 && own && !slots.iter().enumerate().any(shared) {
+        let problem = "the experiments share no function that is fitted";
+        return Err(BuildError::new("experiments", problem)
+            .found("functions of its own in every experiment")
+            .expected(
+                "a function of the device that several experiments show, or a model for each",
+            ));
+    }
+    match (slots.iter().enumerate()).find(|(f, _)| users(*f) == 0 && !found.of_record.is_empty()) {
+        Some((_, slot)) => Err(
+            BuildError::new(&slot.key, "no experiment uses this function")
+                .found("one of its own in every experiment")
+                .expected("at least one experiment without, or `fixed` here"),
+        ),
+        None => Ok(()),
+    }
+}

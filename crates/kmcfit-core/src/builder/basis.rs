@@ -1,0 +1,177 @@
+//! Specification of a basis, and the basis that it becomes on a grid.
+
+use super::BuildError;
+use crate::functions::basis::uniform_knots;
+use crate::functions::{Basis, Design, Gram};
+use crate::system::Grid;
+use crate::system::quadrature::trapezoid_weights;
+
+/// Distance, in steps, within which the first and last knot are taken for the ends of the record.
+const SAME_TIME: f64 = 1e-6;
+
+/// Knots of a basis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Knots {
+    /// Their number: equally spaced over the record, both ends included.
+    Count(usize),
+    /// Their times, s: increasing, both ends of the record included.
+    Times(Vec<f64>),
+}
+
+/// Basis of a coefficient function, before the grid is known.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BasisSpec {
+    /// One value per node.
+    Nodal,
+    /// One value for all times.
+    Constant,
+    /// One value per cell between knots.
+    PiecewiseConstant(Knots),
+    /// One value per knot, linear in between.
+    PiecewiseLinear(Knots),
+    /// A cubic spline.
+    BSpline(Knots),
+    /// A polynomial over the whole record.
+    Polynomial {
+        /// Its degree.
+        degree: usize,
+    },
+}
+
+impl BasisSpec {
+    /// The basis on a grid; errors are about keys below `key`.
+    pub(super) fn on(&self, key: &str, grid: &Grid) -> Result<Basis, BuildError> {
+        let nodes = grid.nodes();
+        let at = |given: &Knots, most: usize| given.on(&format!("{key}.knots"), grid, most);
+        let basis = match self {
+            BasisSpec::Nodal => Basis::Nodal,
+            BasisSpec::Constant => Basis::Constant,
+            BasisSpec::PiecewiseConstant(knots) => {
+                let knots = at(knots, nodes + 1)?;
+                Basis::PiecewiseConstant { knots }
+            }
+            BasisSpec::PiecewiseLinear(knots) => {
+                let knots = at(knots, nodes)?;
+                Basis::PiecewiseLinear { knots }
+            }
+            BasisSpec::BSpline(knots) => {
+                let knots = at(knots, nodes.saturating_sub(2))?;
+                Basis::BSpline { knots }
+            }
+            BasisSpec::Polynomial { degree } => {
+                let (degree, most) = (*degree, Basis::highest_degree(grid));
+                if degree > most {
+                    let problem = "the degree is too high for the grid";
+                    return Err(BuildError::new(format!("{key}.degree"), problem)
+                        .found(format!("{degree} on {nodes} nodes"))
+                        .expected(format!("at most {most}")));
+                }
+                Basis::Polynomial { degree }
+            }
+        };
+        check_independent(key, &basis, grid)?;
+        Ok(basis)
+    }
+}
+
+impl Knots {
+    /// The times of the knots, the ends exactly those of the record.
+    fn on(&self, key: &str, grid: &Grid, most: usize) -> Result<Vec<f64>, BuildError> {
+        let count = match self {
+            Knots::Count(count) => *count,
+            Knots::Times(times) => times.len(),
+        };
+        if count < 2 {
+            return Err(BuildError::new(key, "there are fewer than two knots")
+                .found(count)
+                .expected("2 or more, both ends of the record included"));
+        }
+        if count > most {
+            return Err(BuildError::new(key, "there are more parameters than nodes")
+                .found(format!("{count} knots on {} nodes", grid.nodes()))
+                .expected(format!("at most {most} knots")));
+        }
+        match self {
+            Knots::Count(_) => Ok(uniform_knots(grid, count)),
+            Knots::Times(times) => listed(key, times, grid),
+        }
+    }
+}
+
+fn listed(key: &str, given: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError> {
+    let (start, end) = (grid.start(), grid.time(grid.nodes() - 1));
+    let slack = SAME_TIME * grid.step();
+    let at =
+        |i: usize, problem: &str| BuildError::new(format!("{key}[{i}]"), problem).found(given[i]);
+    for (i, &t) in given.iter().enumerate() {
+        // A NaN is not inside, either.
+        if !(t >= start - slack && t <= end + slack) {
+            return Err(at(i, "this knot lies outside the record").expected(format!(
+                "a time from {start} s to {} s",
+                grid.round_time(end)
+            )));
+        }
+        if i > 0 && t <= given[i - 1] {
+            let before = given[i - 1];
+            return Err(at(i, "the knots do not increase")
+                .found(format!("{t} after {before}"))
+                .expected(format!("a time greater than {before} s")));
+        }
+    }
+    let mut times = given.to_vec();
+    let last = times.len() - 1;
+    for (i, bound, problem) in [
+        (0, start, "the first knot is not at the start of the record"),
+        (last, end, "the last knot is not at the end of the record"),
+    ] {
+        if (times[i] - bound).abs() > slack {
+            return Err(at(i, problem)
+                .expected(format!("{bound} s"))
+                .hint("a list of knots includes both ends of the record"));
+        }
+        times[i] = bound;
+    }
+    Ok(times)
+}
+
+/// Refuses a basis function that is zero at all nodes, and dependent basis functions.
+fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildError> {
+    let design = basis.design(grid);
+    let Design::Sparse(matrix) = &design else {
+        return Ok(());
+    };
+    let mut at_nodes = vec![false; matrix.ncols()];
+    (matrix.col_indices().iter()).for_each(|&j| at_nodes[j] = true);
+    if let Some(absent) = at_nodes.iter().position(|there| !there) {
+        // Function j is not zero between the knots j - reach and j + 1.
+        let knots = basis.knot_times(grid);
+        let reach = (at_nodes.len() + 1).saturating_sub(knots.len());
+        let from = knots[absent.saturating_sub(reach)];
+        let to = knots[(absent + 1).min(knots.len() - 1)];
+        let problem = "the knots are closer than the nodes";
+        return Err(BuildError::new(format!("{key}.knots"), problem)
+            .found(format!(
+                "no node for a parameter between {from} s and {to} s"
+            ))
+            .expected(format!(
+                "knots further apart than the step of {} s",
+                grid.step()
+            )));
+    }
+    let weights = trapezoid_weights(grid.nodes(), grid.step());
+    if Gram::new(&design, &weights).is_some() {
+        return Ok(());
+    }
+    let (own, fewer) = match basis {
+        Basis::Polynomial { .. } => ("degree", "a lower degree, or more nodes"),
+        _ => ("knots", "fewer knots, or more nodes"),
+    };
+    let problem = "the nodes cannot tell the functions of this basis apart";
+    Err(BuildError::new(format!("{key}.{own}"), problem)
+        .found(format!(
+            "{} parameters on {} nodes",
+            at_nodes.len(),
+            grid.nodes()
+        ))
+        .expected(fewer))
+}

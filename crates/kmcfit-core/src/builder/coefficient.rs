@@ -1,0 +1,399 @@
+//! Specification of one coefficient function: basis, start, bounds and penalties.
+
+use super::BuildError;
+use super::basis::{BasisSpec, Knots};
+use crate::constraints::Limit;
+use crate::functions::basis::from_physical_powers;
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
+use crate::solvers::WeightRule;
+use crate::system::Grid;
+
+/// Highest derivative that can be penalised.
+const HIGHEST_ORDER: usize = 2;
+
+/// Start of the search for a coefficient function, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Start {
+    /// The same value at all times.
+    Constant(f64),
+    /// One value per parameter: per node, cell or knot; of a polynomial the factors of `t^0, t^1, …` (t in s).
+    Parameters(Vec<f64>),
+    /// The function of the basis nearest to these values at the nodes.
+    Nodal(Vec<f64>),
+}
+
+/// Weight of a penalty in J.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PenaltyWeight {
+    /// Given.
+    Given(f64),
+    /// Chosen by a rule.
+    Rule(WeightRule),
+    /// Such that the function follows the samples within a dominant period (equation error only).
+    Period,
+}
+
+/// Penalty `weight * integral (d^order (p - reference)/dt^order)^2 dt`; a reference is for order 0 only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Smoothness {
+    /// Order of the derivative: 0, 1 or 2.
+    pub order: usize,
+    /// Weight.
+    pub weight: PenaltyWeight,
+    /// Values that a penalty of order 0 pulls towards; zero without.
+    pub reference: Option<Limit>,
+}
+
+/// Known, or estimated in a basis.
+#[derive(Debug, Clone, PartialEq)]
+enum Form {
+    Fixed(Limit),
+    Estimated(BasisSpec, Start),
+}
+
+/// A coefficient function: mass (kg), damping (N s/m), stiffness (N/m) or the factor of a further term; known or estimated in a
+/// basis. The counterpart of one entry of `functions` in a model file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoefficientSpec {
+    form: Form,
+    pub(super) min: Option<Limit>,
+    pub(super) max: Option<Limit>,
+    pub(super) smooth: Vec<Smoothness>,
+    pub(super) variation: Option<f64>,
+    pub(super) width: Option<f64>,
+}
+
+impl CoefficientSpec {
+    fn new(form: Form) -> Self {
+        Self {
+            form,
+            min: None,
+            max: None,
+            smooth: Vec::new(),
+            variation: None,
+            width: None,
+        }
+    }
+
+    /// Known values.
+    pub fn known(values: Limit) -> Self {
+        Self::new(Form::Fixed(values))
+    }
+
+    /// Known, and the same at all times.
+    pub fn fixed(value: f64) -> Self {
+        Self::known(Limit::Number(value))
+    }
+
+    /// Known, one value per node.
+    pub fn fixed_at_nodes(values: Vec<f64>) -> Self {
+        let name = "values at the nodes".to_owned();
+        Self::known(Limit::Nodal { name, values })
+    }
+
+    /// Estimated in a basis.
+    pub fn estimated(basis: BasisSpec, start: Start) -> Self {
+        Self::new(Form::Estimated(basis, start))
+    }
+
+    /// One estimated value for all times.
+    pub fn constant(start: f64) -> Self {
+        Self::estimated(BasisSpec::Constant, Start::Constant(start))
+    }
+
+    /// An estimated value at every node: the paper's choice.
+    pub fn nodal(start: f64) -> Self {
+        Self::estimated(BasisSpec::Nodal, Start::Constant(start))
+    }
+
+    /// Constant between equally spaced `knots`, both ends of the record included.
+    pub fn piecewise_constant(knots: usize, start: f64) -> Self {
+        let basis = BasisSpec::PiecewiseConstant(Knots::Count(knots));
+        Self::estimated(basis, Start::Constant(start))
+    }
+
+    /// Linear between equally spaced `knots`, both ends of the record included.
+    pub fn piecewise_linear(knots: usize, start: f64) -> Self {
+        let basis = BasisSpec::PiecewiseLinear(Knots::Count(knots));
+        Self::estimated(basis, Start::Constant(start))
+    }
+
+    /// A cubic spline with equally spaced `knots`, both ends of the record included.
+    pub fn b_spline(knots: usize, start: f64) -> Self {
+        Self::estimated(
+            BasisSpec::BSpline(Knots::Count(knots)),
+            Start::Constant(start),
+        )
+    }
+
+    /// A polynomial that starts from these factors of `t^0, t^1, …` (t in s): one number for a constant, two for a line.
+    pub fn polynomial(start: &[f64]) -> Self {
+        let degree = start.len().saturating_sub(1);
+        Self::estimated(
+            BasisSpec::Polynomial { degree },
+            Start::Parameters(start.to_vec()),
+        )
+    }
+
+    /// Bounded below, in the unit of the function.
+    #[must_use]
+    pub fn min(self, min: f64) -> Self {
+        self.bounds(Some(Limit::Number(min)), None)
+    }
+
+    /// Bounded above, in the unit of the function.
+    #[must_use]
+    pub fn max(self, max: f64) -> Self {
+        self.bounds(None, Some(Limit::Number(max)))
+    }
+
+    /// Bounds that may change with time; `None` keeps the present one.
+    #[must_use]
+    pub fn bounds(mut self, min: Option<Limit>, max: Option<Limit>) -> Self {
+        self.min = min.or(self.min);
+        self.max = max.or(self.max);
+        self
+    }
+
+    /// Penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2; several add up.
+    #[must_use]
+    pub fn smooth(self, order: usize, weight: f64) -> Self {
+        self.smoothness(Smoothness {
+            order,
+            weight: PenaltyWeight::Given(weight),
+            reference: None,
+        })
+    }
+
+    /// A penalty on a derivative; several add up.
+    #[must_use]
+    pub fn smoothness(mut self, penalty: Smoothness) -> Self {
+        self.smooth.push(penalty);
+        self
+    }
+
+    /// Penalty `weight * total variation`: a jump costs no more than a slow change.
+    #[must_use]
+    pub fn variation(mut self, weight: f64) -> Self {
+        self.variation = Some(weight);
+        self
+    }
+
+    /// Speed (m/s) over which the sign of the velocity is smoothed: of Coulomb friction only.
+    #[must_use]
+    pub fn width(mut self, width: f64) -> Self {
+        self.width = Some(width);
+        self
+    }
+
+    /// Whether it is estimated.
+    pub(super) fn is_estimated(&self) -> bool {
+        matches!(self.form, Form::Estimated(..))
+    }
+
+    /// The function on a grid; errors are about keys below `key`.
+    pub(super) fn on(
+        &self,
+        kind: CoefficientKind,
+        key: &str,
+        grid: &Grid,
+    ) -> Result<CoefficientFunction, BuildError> {
+        self.check(key, grid)?;
+        let nodes = grid.nodes();
+        let (key, function) = match &self.form {
+            Form::Fixed(values) => {
+                let key = format!("{key}.fixed");
+                let values = values_at_nodes(values, &key, nodes)?;
+                (key, CoefficientFunction::fixed(kind, values))
+            }
+            Form::Estimated(basis, start) => {
+                let basis = basis.on(key, grid)?;
+                let key = format!("{key}.start");
+                let start = parameters(&key, &basis, start, grid)?;
+                let function = CoefficientFunction::free(kind, basis, grid, start);
+                (key, function)
+            }
+        };
+        let mut values = vec![0.0; nodes];
+        function.values_into(&function.start, &mut values);
+        check_values(kind, &key, &values)?;
+        Ok(function)
+    }
+
+    /// Refuses bounds that leave no values, penalties without meaning, and either on a fixed function.
+    fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
+        let given = [
+            ("min", self.min.is_some()),
+            ("max", self.max.is_some()),
+            ("smooth", !self.smooth.is_empty()),
+            ("variation", self.variation.is_some()),
+        ];
+        if let Some((name, _)) = given.iter().find(|(_, given)| *given)
+            && !self.is_estimated()
+        {
+            let problem = "a fixed function cannot be limited or smoothed";
+            return Err(BuildError::new(format!("{key}.{name}"), problem)
+                .found(format!("`fixed` and `{name}`"))
+                .expected("one of the two"));
+        }
+        let bound = |name: &str, bound: &Option<Limit>| match bound {
+            Some(values) => {
+                values_at_nodes(values, &format!("{key}.{name}"), grid.nodes()).map(drop)
+            }
+            None => Ok(()),
+        };
+        bound("min", &self.min)?;
+        bound("max", &self.max)?;
+        uncrossed(key, self.min.as_ref(), self.max.as_ref(), grid)?;
+        for (i, penalty) in self.smooth.iter().enumerate() {
+            penalty.check(&format!("{key}.smooth[{i}]"), grid)?;
+        }
+        match self.variation {
+            Some(weight) => check_weight(&format!("{key}.variation.weight"), weight),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Smoothness {
+    fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
+        if self.order > HIGHEST_ORDER {
+            let problem = "this derivative cannot be penalised";
+            return Err(BuildError::new(format!("{key}.order"), problem)
+                .found(self.order)
+                .expected("0 (the value), 1 (the slope) or 2 (the curvature)"));
+        }
+        if let PenaltyWeight::Given(weight) = self.weight {
+            check_weight(&format!("{key}.weight"), weight)?;
+        }
+        let at = format!("{key}.reference");
+        match &self.reference {
+            Some(_) if self.order > 0 => Err(BuildError::new(
+                &at,
+                "only a penalty of order 0 has a reference",
+            )
+            .found(format!("a reference with order {}", self.order))
+            .expected("no `reference`, or `order: 0`")),
+            Some(reference) => values_at_nodes(reference, &at, grid.nodes()).map(drop),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Refuses bounds of which the lower one is above the upper one; their keys are `min` and `max` below `key`.
+pub(super) fn uncrossed(
+    key: &str,
+    min: Option<&Limit>,
+    max: Option<&Limit>,
+    grid: &Grid,
+) -> Result<(), BuildError> {
+    let (Some(min), Some(max)) = (min, max) else {
+        return Ok(());
+    };
+    match (0..grid.nodes()).find(|&i| min.at(i) > max.at(i)) {
+        Some(i) => {
+            let problem = "the smallest value is above the largest";
+            let (min, max, time) = (min.at(i), max.at(i), grid.time(i));
+            Err(BuildError::new(format!("{key}.min"), problem)
+                .found(format!("min {min} and max {max} at {time} s"))
+                .expected("min at most max at all times"))
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_weight(key: &str, weight: f64) -> Result<(), BuildError> {
+    match weight.is_finite() && weight >= 0.0 {
+        true => Ok(()),
+        false => Err(BuildError::new(key, "a weight cannot be negative")
+            .found(weight)
+            .expected("a number, 0 or more")),
+    }
+}
+
+/// Finite values at all nodes.
+pub(super) fn values_at_nodes(
+    values: &Limit,
+    key: &str,
+    nodes: usize,
+) -> Result<Vec<f64>, BuildError> {
+    let values = match values {
+        Limit::Number(value) => vec![*value; nodes],
+        Limit::Nodal { values, .. } => values.clone(),
+    };
+    if values.len() != nodes {
+        return Err(BuildError::new(key, "there is not one value per node")
+            .found(format!("{} values", values.len()))
+            .expected(format!("{nodes} values")));
+    }
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(BuildError::new(key, "not a finite number")
+            .found(value)
+            .expected("finite numbers")),
+        None => Ok(values),
+    }
+}
+
+/// Refuses values that are not finite, and a mass that is not positive: the equation of motion divides by it.
+fn check_values(kind: CoefficientKind, key: &str, values: &[f64]) -> Result<(), BuildError> {
+    if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+        return Err(BuildError::new(key, "not a finite number")
+            .found(value)
+            .expected("finite numbers"));
+    }
+    match values.iter().position(|m| *m <= 0.0) {
+        Some(i) if kind == CoefficientKind::Mass => Err(BuildError::new(
+            key,
+            "the mass must be positive at all times",
+        )
+        .found(match values.iter().all(|m| m == &values[i]) {
+            true => values[i].to_string(),
+            false => format!("{} at node {i}", values[i]),
+        })
+        .expected("a number greater than 0, in kg")),
+        _ => Ok(()),
+    }
+}
+
+/// The parameters of a start.
+fn parameters(
+    key: &str,
+    basis: &Basis,
+    start: &Start,
+    grid: &Grid,
+) -> Result<Vec<f64>, BuildError> {
+    match start {
+        Start::Constant(value) => Ok(basis.constant(grid, *value)),
+        Start::Parameters(values) => listed(key, basis, values, grid),
+        Start::Nodal(values) => basis.project(grid, values).ok_or_else(|| {
+            BuildError::new(key, "the column cannot be turned into this basis")
+                .found(format!("`{}`", basis.name()))
+                .expected("a basis whose functions the nodes can tell apart")
+        }),
+    }
+}
+
+fn listed(key: &str, basis: &Basis, values: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError> {
+    let one_per = match basis {
+        Basis::Nodal => "one per node",
+        Basis::Constant => "the value at all times",
+        Basis::PiecewiseConstant { .. } => "one per cell between knots",
+        Basis::PiecewiseLinear { .. } => "one per knot",
+        Basis::BSpline { .. } => "one per basis function",
+        Basis::Polynomial { .. } => "the factors of t^0, t^1, … with t in s",
+    };
+    let count = |numbers: usize| match numbers {
+        1 => "1 number".to_owned(),
+        n => format!("{n} numbers"),
+    };
+    let wanted = basis.parameters(grid);
+    if values.len() != wanted {
+        return Err(BuildError::new(key, "the list does not fit the basis")
+            .found(format!("{} for `{}`", count(values.len()), basis.name()))
+            .expected(format!("{}, {one_per}", count(wanted))));
+    }
+    Ok(match basis {
+        Basis::Polynomial { .. } => from_physical_powers(grid, values),
+        _ => values.to_vec(),
+    })
+}

@@ -1,0 +1,298 @@
+//! Constraints of a builder: rows of its statements, and a start inside them.
+
+use super::coefficient::uncrossed;
+use super::{BuildError, BuildNotice, Builder, Contradiction, Slot};
+use crate::constraints::{Constraints, Impossible, Limit, Shape, Statement, TOLERANCE};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
+use crate::problem::Problem;
+use crate::solvers::StartProjection;
+
+/// A statement that must hold, or whose violation is penalised.
+#[derive(Debug, Clone)]
+pub(super) struct Constraint {
+    /// Key that states it.
+    pub key: String,
+    pub statement: Statement,
+    /// Weight of its violation in J; it must hold without.
+    pub soft: Option<f64>,
+    /// Index of the set of coefficient functions that it is about.
+    pub assembly: usize,
+}
+
+/// The name of a group of rows, and the key that states it.
+#[derive(Debug, Clone)]
+pub(super) struct RowKey {
+    name: String,
+    key: String,
+}
+
+/// The constraints of the bounds of a function.
+pub(super) fn of_bounds(slot: &Slot, assembly: usize) -> Vec<Constraint> {
+    let (of, key) = (slot.kind, slot.key.as_str());
+    let (min, max) = (slot.spec.min.clone(), slot.spec.max.clone());
+    let constraint = |name: &str, min, max| Constraint {
+        key: format!("{key}.{name}"),
+        statement: Statement::Bounds { of, min, max },
+        soft: None,
+        assembly,
+    };
+    match (min, max) {
+        (None, None) => Vec::new(),
+        // Both at once, so that equal ones become an equality.
+        (min, max) if min == max => vec![constraint("min", min, max)],
+        (min, max) => {
+            let min = min.map(|min| constraint("min", Some(min), None));
+            let max = max.map(|max| constraint("max", None, Some(max)));
+            min.into_iter().chain(max).collect()
+        }
+    }
+}
+
+impl Builder {
+    /// Adds the rows of a constraint to the problem.
+    pub(super) fn add(
+        &self,
+        constraint: &Constraint,
+        problem: &mut Problem,
+        keys: &mut Vec<RowKey>,
+        notices: &mut Vec<BuildNotice>,
+    ) -> Result<(), BuildError> {
+        let key = &constraint.key;
+        let grid = problem.oscillator.grid;
+        constraint.check()?;
+        if let Statement::Bounds { min, max, .. } = &constraint.statement {
+            uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
+        }
+        let statement = &constraint.statement;
+        let rows = statement.build_for(&grid, &problem.functions, constraint.assembly);
+        let mut rows = rows.map_err(|why| impossible(key, why))?;
+        if rows.is_empty() {
+            notices.push(BuildNotice::AlwaysHolds { key: key.clone() });
+        }
+        notices.extend(self.unfelt(constraint, problem));
+        let soft = constraint.soft;
+        rows.groups.iter_mut().for_each(|group| group.soft = soft);
+        keys.extend(names(&rows).map(|name| RowKey {
+            name: name.clone(),
+            key: key.clone(),
+        }));
+        let added = problem.constrain(rows);
+        added.map_err(|why| BuildError::new(key, why.to_string()))
+    }
+
+    /// A notice where a constraint cannot be felt by free records. Without a force, `(m, c, k)` and `s(t) (m, c, k)` have the same
+    /// response for every positive `s(t)`. Passivity and a monotone mass or stiffness do not survive that change: unless something
+    /// else holds `s(t)`, they can be met by choosing it and say nothing about the system.
+    fn unfelt(&self, constraint: &Constraint, problem: &Problem) -> Option<BuildNotice> {
+        let what = match &constraint.statement {
+            Statement::Passive => "passivity",
+            Statement::Shape {
+                of: CoefficientKind::Mass,
+                shape: Shape::NonIncreasing | Shape::NonDecreasing,
+            } => "a monotone mass",
+            Statement::Shape {
+                of: CoefficientKind::Stiffness,
+                shape: Shape::NonIncreasing | Shape::NonDecreasing,
+            } => "a monotone stiffness",
+            Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
+                CoefficientKind::Mass => "a slope of the mass in one direction",
+                CoefficientKind::Stiffness => "a slope of the stiffness in one direction",
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let forced = problem.experiments.iter().any(|e| !e.is_free());
+        let held = problem.functions.iter().any(holds_scale);
+        let smoothed = problem.penalties.iter().any(|p| p.weight > 0.0)
+            || problem.variations.iter().any(|v| v.weight > 0.0);
+        let key = constraint.key.clone();
+        let notice = BuildNotice::Unfelt { key, what };
+        (!(forced || held || smoothed || self.bounded_on_both_sides())).then_some(notice)
+    }
+
+    /// Whether bounds keep the common scale from falling and from rising.
+    fn bounded_on_both_sides(&self) -> bool {
+        let positive = |limit: &&Limit| match limit {
+            Limit::Number(value) => *value > 0.0,
+            Limit::Nodal { .. } => true,
+        };
+        let slots = self.slots();
+        let own = slots.iter().map(|slot| (&slot.spec.min, &slot.spec.max));
+        let listed = self.constraints.iter().filter_map(|c| match &c.statement {
+            Statement::Bounds { min, max, .. } => Some((min, max)),
+            _ => None,
+        });
+        let all: Vec<_> = own.chain(listed).collect();
+        let below = all.iter().filter_map(|(min, _)| min.as_ref());
+        let above = all.iter().filter_map(|(_, max)| max.as_ref());
+        below.filter(positive).count() > 0 && above.filter(positive).count() > 0
+    }
+}
+
+impl Constraint {
+    /// Refuses a weight that is none, and a constraint that leaves no mass: the equation of motion divides by it.
+    fn check(&self) -> Result<(), BuildError> {
+        if let Some(weight) = self.soft {
+            let key = format!("{}.soft", self.key);
+            if !(weight.is_finite() && weight > 0.0) {
+                let problem = "the weight of a soft constraint must be positive";
+                return Err(BuildError::new(key, problem)
+                    .found(weight)
+                    .expected("a number greater than 0"));
+            }
+            return match self.statement {
+                Statement::DampingRatio { .. } => Err(BuildError::new(
+                    key,
+                    "a cap on the damping ratio cannot be soft",
+                )
+                .found("`soft` beside `damping_ratio`")
+                .expected("no `soft`")),
+                _ => Ok(()),
+            };
+        }
+        let held = match &self.statement {
+            Statement::Bounds {
+                of: CoefficientKind::Mass,
+                max: Some(max),
+                ..
+            } => max.least(),
+            Statement::Value {
+                of: CoefficientKind::Mass,
+                value,
+                ..
+            }
+            | Statement::Mean {
+                of: CoefficientKind::Mass,
+                value,
+            }
+            | Statement::Integral {
+                of: CoefficientKind::Mass,
+                value,
+            } => *value,
+            _ => return Ok(()),
+        };
+        if held > 0.0 {
+            return Ok(());
+        }
+        let problem = "this leaves no mass: it must be positive at all times";
+        Err(BuildError::new(&self.key, problem)
+            .found(held)
+            .expected("a number greater than 0"))
+    }
+}
+
+/// Whether limits of a slope leave one sign to it and no size.
+fn one_way(min: Option<f64>, max: Option<f64>) -> bool {
+    matches!((min, max), (None, Some(0.0)) | (Some(0.0), None))
+}
+
+/// Whether a function cannot follow a change of the common scale `s(t)`: it is known and not zero, or of a basis that is not
+/// closed under it.
+fn holds_scale(function: &CoefficientFunction) -> bool {
+    match &function.basis {
+        None => function.offset.iter().any(|p| *p != 0.0),
+        Some(basis) => matches!(basis, Basis::Constant | Basis::Polynomial { .. }),
+    }
+}
+
+fn names(constraints: &Constraints) -> impl Iterator<Item = &String> {
+    let rows = constraints.groups.iter().map(|group| &group.name);
+    rows.chain(constraints.cones.iter().map(|group| &group.name))
+}
+
+fn impossible(key: &str, why: Impossible) -> BuildError {
+    match why {
+        Impossible::Absent(kind) => {
+            BuildError::new(key, format!("the device has no {}", kind.name()))
+        }
+        Impossible::Fixed(list) => {
+            let names = listed(list.iter().map(|kind| kind.name()));
+            let problem = match list.len() {
+                1 => format!("{names} is fixed, so it cannot be constrained"),
+                _ => format!("{names} are fixed, so they cannot be constrained"),
+            };
+            BuildError::new(key, problem)
+                .found("a constraint on fixed functions only")
+                .expected("`basis` and `start` instead of `fixed`, or no such constraint")
+        }
+        Impossible::Broken { name, time } => {
+            BuildError::new(key, "no fit can satisfy this constraint")
+                .found(format!("`{name}` is broken at {time} s by what is given"))
+                .expected("functions with more freedom, or another constraint")
+        }
+    }
+}
+
+/// Moves the start of the search into the constraints; a notice unless it only was off by rounding.
+///
+/// # Errors
+/// Where the constraints contradict each other, or no start inside them was found.
+pub(super) fn move_start(
+    problem: &mut Problem,
+    keys: &[RowKey],
+) -> Result<Option<BuildNotice>, BuildError> {
+    if problem.constraints.is_empty() {
+        return Ok(None);
+    }
+    let start = problem.functions.start();
+    let was_inside = problem.constraints.hold(&start, TOLERANCE);
+    match problem.feasible_start(&start) {
+        StartProjection::Kept(_) => Ok(None),
+        StartProjection::Moved {
+            parameters,
+            constraint,
+        } => {
+            problem.start_from(&parameters);
+            Ok((!was_inside).then_some(BuildNotice::StartMoved { constraint }))
+        }
+        StartProjection::Contradiction(names) => Err(contradiction(keys, &names, true)),
+        StartProjection::ContradictionAmong(names) => Err(contradiction(keys, &names, false)),
+        StartProjection::Unsolved(status) => {
+            let problem = "no start inside the constraints was found";
+            Err(BuildError::new("constraints", problem)
+                .found(status.sentence())
+                .expected("constraints of moderate sizes that some functions satisfy"))
+        }
+    }
+}
+
+fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError {
+    let mut left: Vec<&RowKey> = keys.iter().collect();
+    let key_of = |name: &String| {
+        let place = left.iter().position(|row| row.name == *name);
+        (
+            name.clone(),
+            place.map(|place| left.remove(place).key.clone()),
+        )
+    };
+    let constraints: Vec<_> = names.iter().map(key_of).collect();
+    let error = match names.len() {
+        1 => BuildError::new("constraints", "this constraint contradicts itself"),
+        _ => BuildError::new("constraints", "these constraints contradict each other").hint(
+            match minimal {
+                true => "leaving out any one of them resolves it",
+                false => "some of them may have no part in it",
+            },
+        ),
+    };
+    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    BuildError {
+        contradiction: Some(Contradiction {
+            constraints,
+            minimal,
+        }),
+        ..error
+            .found(listed(names.iter().map(String::as_str)))
+            .expected("constraints that some functions satisfy together")
+    }
+}
+
+/// Names in a row: `a`, `a and b`, `a, b and c`.
+pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        Some((last, _)) => (*last).to_owned(),
+        None => String::new(),
+    }
+}

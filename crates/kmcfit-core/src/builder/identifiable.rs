@@ -1,0 +1,103 @@
+//! Scalars of records that no data can determine: gains and offsets that stand for the same freedom as something else.
+
+use super::BuildError;
+use crate::functions::CoefficientKind;
+use crate::problem::Problem;
+use crate::record::{Channel, ChannelKind, Experiment};
+use crate::system::Term;
+
+/// Refuses gains that stand for the same freedom as something else: in a linear system a free response and its initial state, or a
+/// forced response and the scale of mass, damping and stiffness, can be multiplied by what the gain is divided by.
+pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
+    let scalars = problem.functions.scalars();
+    let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
+    let terms = &problem.oscillator.terms;
+    let shift_is_free = |t: &Term| t.is_linear() || *t == Term::Offset;
+    if terms.iter().all(shift_is_free) {
+        check_offsets(problem, &open)?;
+    }
+    if !terms.iter().all(|term| term.is_linear()) {
+        return Ok(());
+    }
+    let open_scale = |e: &Experiment| gains_open(e, &open) && starts_open(e, &open);
+    let free_and_open = |e: &Experiment| e.is_free() && open_scale(e);
+    if let Some(place) = problem.experiments.iter().position(free_and_open) {
+        let name = &problem.experiments[place].name;
+        let problem = format!(
+            "the gain and the initial state of {name} cannot both be estimated: a larger motion seen by a weaker sensor looks \
+             the same"
+        );
+        return Err(BuildError::new("experiments", problem)
+            .found(format!(
+                "no known gain, state or prior in record {}",
+                place + 1
+            ))
+            .expected("a number for one of them, or a `prior`"));
+    }
+    let mut forced = problem.experiments.iter().filter(|e| !e.is_free());
+    let by_force = |e: &Experiment| e.excitation.as_ref().is_some_and(|x| x.base.is_none());
+    let all = forced.clone().count() > 0 && forced.all(|e| by_force(e) && open_scale(e));
+    match all && scale_is_open(problem) {
+        true => Err(BuildError::new(
+            "experiments",
+            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier device seen by a \
+             stronger sensor looks the same",
+        )
+        .found("no known gain, no fixed function and no value that holds the scale")
+        .expected(
+            "a known gain or a `prior` in one forced experiment, a fixed function, or a constraint such as {function: mass, \
+             mean: 1.0}",
+        )),
+        false => Ok(()),
+    }
+}
+
+fn gains_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
+    let gain = |c: &Channel| {
+        // A base that is added to the response is a scale of its own.
+        open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
+    };
+    !e.channels.is_empty() && e.channels.iter().all(gain)
+}
+
+fn starts_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
+    let rest = [e.initial.displacement, e.initial.velocity];
+    (0..2).all(|q| match e.sought[q] {
+        Some(index) => open(Some(index)),
+        None => rest[q] == 0.0,
+    })
+}
+
+/// Whether neither a known function nor an equality holds the common scale of the functions.
+fn scale_is_open(problem: &Problem) -> bool {
+    let held = problem.constraints.groups.iter().any(|group| {
+        (0..group.rows.len()).any(|r| {
+            let [low, high] = group.bounds(r);
+            low == high && low != 0.0
+        })
+    });
+    let mut functions = problem.functions.iter();
+    !held && functions.all(|f| f.offset.iter().all(|p| *p == 0.0))
+}
+
+/// Refuses a force offset beside sensor offsets: a response that is shifted by `d`, a sensor that measures `d` less and a force
+/// that is `k d` larger look the same.
+fn check_offsets(
+    problem: &Problem,
+    open: &dyn Fn(Option<usize>) -> bool,
+) -> Result<(), BuildError> {
+    let mut functions = problem.functions.iter();
+    let estimated = functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
+    let shifted = |e: &Experiment| {
+        let sees =
+            |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());
+        open(e.sought[0]) && e.channels.iter().all(sees)
+    };
+    if !(estimated && problem.experiments.iter().all(shifted)) {
+        return Ok(());
+    }
+    let problem = "the offset of the force and those of the sensors cannot both be estimated: a shifted motion looks the same";
+    Err(BuildError::new("functions.offset", problem)
+        .found("no known offset, initial displacement or prior")
+        .expected("a number for one of them, or a `prior`"))
+}

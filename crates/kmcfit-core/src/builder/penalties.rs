@@ -1,0 +1,168 @@
+//! Penalties of a builder: roughness and total variation of its functions.
+
+use super::coefficient::{PenaltyWeight, Smoothness, values_at_nodes};
+use super::{BuildError, BuildNotice, Builder};
+use crate::functions::{Basis, Design, Penalty, Variation};
+use crate::problem::Problem;
+use crate::record::Weighting;
+use crate::solvers::{Measurements, WeightRule};
+
+/// Weights that are to be chosen from the samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightSearch {
+    /// Rule of the choice.
+    pub rule: WeightRule,
+    /// Indices of the penalties of the problem that the weight multiplies; their weight in the problem is 1.
+    pub penalties: Vec<usize>,
+}
+
+impl Builder {
+    /// Adds the penalties on roughness to the problem; those whose weight is to be chosen have weight 1.
+    pub(super) fn penalize_roughness(
+        &self,
+        problem: &mut Problem,
+        measured: Option<&Measurements>,
+        notices: &mut Vec<BuildNotice>,
+    ) -> Result<Option<WeightSearch>, BuildError> {
+        let mut search: Option<WeightSearch> = None;
+        for (j, slot) in self.slots().iter().enumerate() {
+            let Some(basis) = problem.functions.get(j).basis.clone() else {
+                continue;
+            };
+            for (i, spec) in slot.spec.smooth.iter().enumerate() {
+                let key = format!("{}.smooth[{i}]", slot.key);
+                let weight = match spec.weight {
+                    PenaltyWeight::Given(weight) => weight,
+                    PenaltyWeight::Period => {
+                        self.check_period(&key, spec)?;
+                        measured.map_or(0.0, |m| m.period_weight(problem, j, spec.order))
+                    }
+                    PenaltyWeight::Rule(rule) => {
+                        self.check_rule(&key, rule, search.as_ref())?;
+                        1.0
+                    }
+                };
+                let penalty = penalty(problem, (j, &basis), &key, spec, weight)?;
+                if penalty.target.is_empty() {
+                    let basis = basis.name();
+                    notices.push(BuildNotice::NoRoughness { key, basis });
+                    continue;
+                }
+                if let PenaltyWeight::Rule(rule) = spec.weight {
+                    let search = search.get_or_insert_with(|| WeightSearch {
+                        rule,
+                        penalties: Vec::new(),
+                    });
+                    search.penalties.push(problem.penalties.len());
+                }
+                if weight > 0.0 {
+                    let added = problem.penalize(penalty);
+                    added.map_err(|why| BuildError::new(&key, why.to_string()))?;
+                }
+            }
+        }
+        Ok(search)
+    }
+
+    /// Adds the penalties on total variation to the problem.
+    pub(super) fn penalize_variation(&self, problem: &mut Problem) -> Result<(), BuildError> {
+        let grid = problem.oscillator.grid;
+        for (function, slot) in self.slots().iter().enumerate() {
+            let weight = slot.spec.variation.filter(|weight| *weight > 0.0);
+            let basis = problem.functions.get(function).basis.as_ref();
+            if let (Some(basis), Some(weight)) = (basis, weight) {
+                let added = problem.penalize_variation(Variation {
+                    function,
+                    weight,
+                    rows: Design::Sparse(basis.changes(&grid)),
+                });
+                added.map_err(|why| BuildError::new(&slot.key, why.to_string()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses the rule `period` where it has no meaning.
+    fn check_period(&self, key: &str, spec: &Smoothness) -> Result<(), BuildError> {
+        if !self.is_equation_error() {
+            let problem = "the rule `period` is a rule of the method `equation-error` alone";
+            return Err(BuildError::new(format!("{key}.weight"), problem)
+                .found(format!("`{}`", self.solver.name()))
+                .expected(
+                    "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
+                ));
+        }
+        if spec.order == 0 {
+            let problem = "the rule `period` is about a derivative";
+            return Err(BuildError::new(format!("{key}.order"), problem)
+                .found(0)
+                .expected("order 1 or 2, or a number for the weight"));
+        }
+        Ok(())
+    }
+
+    /// Refuses a second rule, and a rule for which the samples have no noise level.
+    fn check_rule(
+        &self,
+        key: &str,
+        rule: WeightRule,
+        search: Option<&WeightSearch>,
+    ) -> Result<(), BuildError> {
+        let key = format!("{key}.weight");
+        if self.is_equation_error() {
+            let problem = "the method `equation-error` knows no search for the weight";
+            return Err(BuildError::new(key, problem)
+                .found(format!("`{}`", rule.name()))
+                .expected("`period`, which follows from the motion, or a number"));
+        }
+        if let Some(first) = search.filter(|first| first.rule != rule) {
+            let problem = "there is one rule for all weights that are chosen";
+            return Err(BuildError::new(key, problem)
+                .found(format!("`{}` beside `{}`", rule.name(), first.rule.name()))
+                .expected("the same rule, or a number"));
+        }
+        let mut records = self.records.iter().enumerate();
+        let without = records.find(|(_, record)| {
+            let mut weightings = record.channels.iter().map(|c| c.weighting.as_ref());
+            !record.validation && weightings.any(|w| w.is_none_or(is_unknown))
+        });
+        match without {
+            Some((i, _)) if rule == WeightRule::Discrepancy => Err(BuildError::new(
+                key,
+                "the rule `discrepancy` needs the noise of the readings",
+            )
+            .found(format!("no `sigma` in experiments[{i}]"))
+            .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether the standard deviation of the noise is not given.
+fn is_unknown(weighting: &Weighting) -> bool {
+    !matches!(weighting, Weighting::Sigma(_) | Weighting::Sigmas(_))
+}
+
+fn penalty(
+    problem: &Problem,
+    (function, basis): (usize, &Basis),
+    key: &str,
+    spec: &Smoothness,
+    weight: f64,
+) -> Result<Penalty, BuildError> {
+    let grid = &problem.oscillator.grid;
+    let rows = basis.roughness(grid, spec.order);
+    let mut penalty = Penalty::new(function, spec.order, weight, rows);
+    if let Some(reference) = &spec.reference {
+        let key = format!("{key}.reference");
+        let values = values_at_nodes(reference, &key, grid.nodes())?;
+        // The part of the reference outside the basis adds a constant to the cost and nothing else.
+        let nearest = basis.project(grid, &values).ok_or_else(|| {
+            BuildError::new(&key, "the reference cannot be turned into this basis")
+                .found(format!("`{}`", basis.name()))
+                .expected("a basis whose functions the nodes can tell apart")
+        })?;
+        penalty.target = penalty.residuals(&nearest);
+    }
+    Ok(penalty)
+}

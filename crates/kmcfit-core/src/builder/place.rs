@@ -1,0 +1,260 @@
+//! Records on the grid: experiments of the problem, with the scalars that they estimate.
+
+use super::BuildError;
+use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
+use crate::functions::{ScalarParameter, Value};
+use crate::objective::state_scales;
+use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over};
+use crate::signal::{even_spacing, median_spacing};
+use crate::system::{Grid, InputSample, State, TimePoint};
+
+/// One record to be put on a grid.
+pub(super) struct Placement<'a> {
+    /// Its key.
+    pub key: String,
+    pub record: &'a Record,
+    pub grid: &'a Grid,
+    /// Index of its set of coefficient functions.
+    pub assembly: usize,
+    /// Whether the fit compares the equation of motion, and no response, with the samples.
+    pub is_equation_error: bool,
+    /// Whether the channels are left out of the experiment.
+    pub simulation: bool,
+}
+
+/// A scalar in the making.
+struct Scalar<'a> {
+    key: String,
+    name: String,
+    unit: &'a str,
+    start: f64,
+    size: f64,
+}
+
+impl Scalar<'_> {
+    /// Its value: known, or one more of `scalars`.
+    fn value(
+        self,
+        spec: ScalarSpec,
+        scalars: &mut Vec<ScalarParameter>,
+    ) -> Result<Value, BuildError> {
+        let (start, prior) = match spec {
+            ScalarSpec::Known(number) => return Ok(Value::Known(number)),
+            ScalarSpec::Estimated { start, prior } => (start, prior),
+        };
+        if let Some(prior) = prior.filter(|prior| prior.sigma <= 0.0 || !prior.sigma.is_finite()) {
+            let key = format!("{}.prior.sigma", self.key);
+            return Err(
+                BuildError::new(key, "a standard deviation must be positive")
+                    .found(prior.sigma)
+                    .expected("a number greater than 0"),
+            );
+        }
+        scalars.push(ScalarParameter {
+            name: self.name,
+            unit: self.unit.to_owned(),
+            start: start.or(prior.map(|p| p.mean)).unwrap_or(self.start),
+            size: if self.size > 0.0 { self.size } else { 1.0 },
+            prior,
+        });
+        Ok(Value::Sought(scalars.len() - 1))
+    }
+}
+
+impl Placement<'_> {
+    /// The experiment; numbers that it estimates are added to `scalars`.
+    pub fn experiment(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
+        let record = self.record;
+        let input = record.inputs(&self.key)?;
+        let nodes = match record.span() {
+            Some([_, end]) => nodes_until(self.grid, end),
+            None => self.grid.nodes(),
+        };
+        let (initial, sought) = self.initial(scalars)?;
+        let mut experiment = Experiment::free(&record.name, initial, nodes);
+        experiment.sought = sought;
+        experiment.device = self.assembly;
+        experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
+        experiment.drive = input;
+        let compared = match self.simulation {
+            true => &[][..],
+            false => &record.channels,
+        };
+        for channel in compared {
+            let channel = self.channel(channel, &experiment, scalars)?;
+            experiment.channels.push(channel);
+        }
+        Ok(experiment)
+    }
+
+    /// The initial state, and which scalars it is where it is estimated.
+    fn initial(
+        &self,
+        scalars: &mut Vec<ScalarParameter>,
+    ) -> Result<(State, [Option<usize>; 2]), BuildError> {
+        let channels = &self.record.channels;
+        // The channel nearest to a displacement tells the sizes.
+        let nearest = channels.iter().min_by_key(|c| c.kind);
+        let sizes = nearest.map_or([1.0; 2], |c| {
+            state_scales(c.kind, &c.values, median_spacing(&c.times))
+        });
+        let displacement = nearest.filter(|c| c.kind == ChannelKind::Displacement);
+        let starts = [displacement.map_or(0.0, |c| c.values[0]), 0.0];
+        let angular = channels.iter().any(|c| c.angular);
+        let kinds = [ChannelKind::Displacement, ChannelKind::Velocity];
+        let mut state = [0.0; 2];
+        let mut sought = [None; 2];
+        for (q, kind) in kinds.into_iter().enumerate() {
+            let scalar = Scalar {
+                key: format!("{}.initial.{}", self.key, kind.name()),
+                name: format!("initial {} of {}", kind.name(), self.record.name),
+                unit: kind.unit_of(angular),
+                start: starts[q],
+                size: sizes[q],
+            };
+            match scalar.value(self.record.initial[q], scalars)? {
+                Value::Known(number) => state[q] = number,
+                Value::Sought(index) => {
+                    sought[q] = Some(index);
+                    state[q] = scalars[index].start;
+                }
+            }
+        }
+        let [displacement, velocity] = state;
+        let state = State {
+            displacement,
+            velocity,
+        };
+        Ok((state, sought))
+    }
+
+    fn channel(
+        &self,
+        spec: &ChannelSpec,
+        experiment: &Experiment,
+        scalars: &mut Vec<ScalarParameter>,
+    ) -> Result<Channel, BuildError> {
+        let (grid, times) = (self.grid, &spec.times);
+        // The paper's integral where the times are equally spaced.
+        let weighting = match (&spec.weighting, even_spacing(times)) {
+            (Some(weighting), _) => weighting.clone(),
+            (None, Some(spacing)) => Weighting::Integral { spacing },
+            (None, None) => integral_over(times),
+        };
+        let sensor = self.sensor(spec, scalars)?;
+        let values = spec.values.clone();
+        let nodes = experiment.nodes;
+        let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
+        let channel = channel.ok_or_else(|| {
+            BuildError::new("grid", "the readings do not lie on the grid")
+                .found(format!("readings until {} s", times[times.len() - 1]))
+                .expected(format!(
+                    "a grid from {} s to {} s",
+                    grid.start(),
+                    grid.start() + grid.duration()
+                ))
+        })?;
+        let mut channel = channel.with_loss(spec.loss).with_sensor(sensor);
+        let input = &experiment.drive;
+        if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
+            let around = |t: &f64| InputSample {
+                force: input.force_at(*t),
+                base: input.base_acceleration_at(*t),
+            };
+            channel = channel.with_surroundings(times.iter().map(around).collect());
+        }
+        if let Some(base) = self.base_motion(spec, input)? {
+            channel = channel.with_base(base);
+        }
+        if !spec.filter.is_empty() {
+            channel = channel.with_filter(spec.filter.clone());
+        }
+        Ok(channel)
+    }
+
+    /// The motion of the base at the times of a sensor of absolute motion.
+    fn base_motion(
+        &self,
+        spec: &ChannelSpec,
+        input: &Input,
+    ) -> Result<Option<Vec<f64>>, BuildError> {
+        let (kind, asked) = (spec.kind, spec.sensor.absolute);
+        let key = format!("{}.sensors.{}.absolute", self.key, kind.name());
+        if input.base.is_none() {
+            let problem = "the base does not move, so there is only one motion to measure";
+            return match asked {
+                None => Ok(None),
+                Some(_) => Err(BuildError::new(key, problem)
+                    .found("`absolute` without a motion of the base")
+                    .expected("no `absolute`")),
+            };
+        }
+        if !asked.unwrap_or(kind == ChannelKind::Acceleration) {
+            return Ok(None);
+        }
+        let motion = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
+        let motion: Option<Vec<f64>> = motion.collect();
+        motion.map(Some).ok_or_else(|| {
+            BuildError::new(key, format!("the {} of the base is not known", kind.name()))
+                .found("the acceleration of the base only")
+                .expected("`columns: {base_displacement: …}`, or no `absolute: true`")
+        })
+    }
+
+    fn sensor(
+        &self,
+        channel: &ChannelSpec,
+        scalars: &mut Vec<ScalarParameter>,
+    ) -> Result<Sensor, BuildError> {
+        let SensorSpec {
+            gain,
+            offset,
+            drift,
+            ..
+        } = channel.sensor;
+        let (kind, values) = (channel.kind.name(), &channel.values);
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares = values.iter().map(|v| (v - mean) * (v - mean));
+        let size = (squares.sum::<f64>() / count).sqrt();
+        let unit = channel.kind.unit_of(channel.angular);
+        let per_second = format!("{unit}/s");
+        let key = format!("{}.sensors.{kind}", self.key);
+        let mut value =
+            |part: &str, spec: Option<ScalarSpec>, unit, [usual, start, size]: [f64; 3]| {
+                let scalar = Scalar {
+                    key: format!("{key}.{part}"),
+                    name: format!("{part} of the {kind} of {}", self.record.name),
+                    unit,
+                    start,
+                    size,
+                };
+                scalar.value(spec.unwrap_or(ScalarSpec::Known(usual)), scalars)
+            };
+        let sensor = Sensor {
+            gain: value("gain", gain, "", [1.0; 3])?,
+            offset: value("offset", offset, unit, [0.0, mean, size])?,
+            drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
+        };
+        if sensor.gain == Value::Known(0.0) {
+            let problem = "a sensor with gain 0 sees nothing";
+            return Err(BuildError::new(format!("{key}.gain"), problem)
+                .found("0")
+                .expected("another number, or `estimate`"));
+        }
+        if self.is_equation_error && sensor.indices().iter().any(Option::is_some) {
+            let problem = "the method `equation-error` needs sensors that are known";
+            return Err(BuildError::new(key, problem)
+                .found("`estimate`")
+                .expected("numbers, or another method"));
+        }
+        Ok(sensor)
+    }
+}
+
+/// The nodes that a response needs to reach `end`.
+fn nodes_until(grid: &Grid, end: f64) -> usize {
+    let steps = (end - grid.start()) / grid.step();
+    let steps = (steps - TimePoint::SAME_TIME).ceil().max(0.0);
+    (steps as usize + 1).clamp(Grid::FEWEST_NODES, grid.nodes())
+}
