@@ -15,8 +15,8 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
         .displacement(table.column("t_s")?, table.column("y_m")?);
     let device = [
         // Positive, and bent as little as the record lets it be.
-        CoefficientSpec::nodal(2.0).min(0.05).smooth(2, 1e-3),
-        CoefficientSpec::nodal(1.0).min(0.0).smooth(2, 1e-3),
+        CoefficientSpec::nodal(2.0).min(0.05).tikhonov(2, 1e-3),
+        CoefficientSpec::nodal(1.0).min(0.0).tikhonov(2, 1e-3),
         // Free motion shows ratios alone: one function must be known.
         CoefficientSpec::fixed(1.0),
     ];

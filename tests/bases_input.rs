@@ -129,9 +129,9 @@ fn limits_and_penalties_are_accepted() {
     for text in [
         "min: 0.1, max: {data: m.csv, column: m_kg}",
         "min: 1, max: 1",
-        "smooth: {order: 2, weight: l-curve}",
-        "smooth: [{order: 0, weight: 1, reference: {data: m.csv, column: m_kg}}, {order: 1, weight: 0}]",
-        "variation: {weight: 0.5}",
+        "penalty: {kind: tikhonov, order: 2, weight: l-curve}",
+        "penalty: [{kind: tikhonov, order: 0, weight: 1, reference: {data: m.csv, column: m_kg}}, {kind: tikhonov, order: 1, weight: 0}]",
+        "penalty: {kind: tv, weight: 0.5}",
     ] {
         assert_eq!(
             message(&format!("{{basis: nodal, start: 1, {text}}}")),
@@ -297,7 +297,7 @@ fn keys_that_a_basis_does_not_use() {
     assert_snapshot!(with("basis: b-spline, knot: 5"), @"
     m.yaml:5:37: functions.mass: unknown key
       found: `knot`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
       hint: did you mean `knots`?
     ");
 }
@@ -419,13 +419,13 @@ fn limits() {
       hint: did you mean `m.csv`?
     ");
     assert_snapshot!(message("{fixed: 1, min: 0.5}"), @"
-    m.yaml:5:25: functions.mass.min: a fixed function cannot be limited or smoothed
+    m.yaml:5:25: functions.mass.min: a fixed function has neither bounds nor penalties
       found: `fixed` and `min`
       expected: one of the two
     ");
-    assert_snapshot!(message("{fixed: 1, smooth: {order: 2, weight: 1}}"), @"
-    m.yaml:5:28: functions.mass.smooth: a fixed function cannot be limited or smoothed
-      found: `fixed` and `smooth`
+    assert_snapshot!(message("{fixed: 1, penalty: {kind: tikhonov, order: 2, weight: 1}}"), @"
+    m.yaml:5:29: functions.mass.penalty: a fixed function has neither bounds nor penalties
+      found: `fixed` and `penalty`
       expected: one of the two
     ");
 }
@@ -434,80 +434,79 @@ fn limits() {
 fn penalties() {
     let smooth = |text: &str| message(&format!("{{basis: nodal, start: 1, smooth: {text}}}"));
     assert_snapshot!(smooth("{order: 3, weight: 1}"), @"
-    m.yaml:5:50: functions.mass.smooth.order: this derivative cannot be penalised
-      found: 3
-      expected: 0 (the value), 1 (the slope) or 2 (the curvature)
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: -1}"), @"
-    m.yaml:5:61: functions.mass.smooth.weight: a weight cannot be negative
-      found: -1
-      expected: a number, 0 or more
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("[{order: 2, weight: 1}, {order: 1, weight: -0.5}]"), @"
-    m.yaml:5:85: functions.mass.smooth[1].weight: a weight cannot be negative
-      found: -0.5
-      expected: a number, 0 or more
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: discrepency}"), @"
-    m.yaml:5:61: functions.mass.smooth.weight: unknown choice
-      found: `discrepency`
-      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
-      hint: did you mean `discrepancy`?
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: 1e-3 s}"), @"
-    m.yaml:5:61: functions.mass.smooth.weight: not a number
-      found: text `1e-3 s`
-      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
-      hint: write 0.001 alone, without a unit
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: [1]}"), @"
-    m.yaml:5:61: functions.mass.smooth.weight: not a number
-      found: a list
-      expected: a finite number, or one of: discrepancy, l-curve, gcv, period
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{weight: 1}"), @"
-    m.yaml:5:34: functions.mass.smooth: the key `order` is missing
-      expected: the key `order`
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2}"), @"
-    m.yaml:5:34: functions.mass.smooth: the key `weight` is missing
-      expected: the key `weight`
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weigth: 1}"), @"
-    m.yaml:5:53: functions.mass.smooth: unknown key
-      found: `weigth`
-      expected: one of: order, weight, reference
-      hint: did you mean `weight`?
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("2"), @"
-    m.yaml:5:42: functions.mass.smooth: this is the wrong kind of value
-      found: the integer 2
-      expected: a map, or a list of maps
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("[{order: 2, weight: 1}, 3]"), @"
-    m.yaml:5:66: functions.mass.smooth[1]: this is the wrong kind of value
-      found: the number 3
-      expected: a map such as {order: 2, weight: 0.1}
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 1, weight: 1, reference: 2}"), @"
-    m.yaml:5:75: functions.mass.smooth.reference: only a penalty of order 0 has a reference
-      found: a reference with order 1
-      expected: no `reference`, or `order: 0`
+    m.yaml:5:34: functions.mass: unknown key
+      found: `smooth`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
     let with = |text: &str| message(&format!("{{basis: nodal, start: 1, {text}}}"));
-    assert_snapshot!(with("variation: {weight: -1}"), @"
-    m.yaml:5:54: functions.mass.variation.weight: a weight cannot be negative
+    assert_snapshot!(with("penalty: {kind: tv, weight: -1}"), @"
+    m.yaml:5:62: functions.mass.penalty.weight: a weight cannot be negative
       found: -1
       expected: a number, 0 or more
     ");
-    assert_snapshot!(with("variation: {weight: gcv}"), @"
-    m.yaml:5:54: functions.mass.variation.weight: not a number
-      found: text `gcv`
+    assert_snapshot!(with("penalty: {kind: tv, weight: gcv}"), @"
+    m.yaml:5:62: functions.mass.penalty.weight: total variation has no rule for its weight
+      found: `gcv`
       expected: a finite number
     ");
     assert_snapshot!(with("variation: 1"), @"
-    m.yaml:5:45: functions.mass.variation: this is the wrong kind of value
-      found: the number 1
-      expected: a map such as {weight: 0.1}
+    m.yaml:5:34: functions.mass: unknown key
+      found: `variation`
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
     ");
 }

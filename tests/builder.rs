@@ -52,8 +52,8 @@ experiments:
   - {name: free decay, data: ../data/paper.csv, initial: {displacement: 3.3, velocity: 1.0}}
 grid: {method: midpoint}
 functions:
-  mass:      {basis: piecewise-linear, knots: 11, start: 2.0, min: 0.05, smooth: {order: 2, weight: 0.1}}
-  damping:   {basis: b-spline, knots: 6, start: 1.0, min: 0.0, smooth: [{order: 0, weight: 0.01}, {order: 1, weight: 0.1}]}
+  mass:      {basis: piecewise-linear, knots: 11, start: 2.0, min: 0.05, penalty: {kind: tikhonov, order: 2, weight: 0.1}}
+  damping:   {basis: b-spline, knots: 6, start: 1.0, min: 0.0, penalty: [{kind: tikhonov, order: 0, weight: 0.01}, {kind: tikhonov, order: 1, weight: 0.1}]}
   stiffness: {basis: polynomial, degree: 1, start: [1.5, -0.01], max: 4.0}
 constraints:
   - {function: stiffness, at: 0.0, value: 1.0}
@@ -64,11 +64,11 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
     );
     let mass = CoefficientSpec::piecewise_linear(11, 2.0)
         .min(0.05)
-        .smooth(2, 0.1);
+        .tikhonov(2, 0.1);
     let damping = CoefficientSpec::b_spline(6, 1.0)
         .min(0.0)
-        .smooth(0, 0.01)
-        .smooth(1, 0.1);
+        .tikhonov(0, 0.01)
+        .tikhonov(1, 0.1);
     let stiffness = CoefficientSpec::polynomial(&[1.5, -0.01]).max(4.0);
     let of = CoefficientKind::Mass;
     let built = Builder::new([mass, damping, stiffness])
@@ -103,8 +103,8 @@ experiments:
 grid: {nodes: 4801}
 functions:
   mass:      {basis: constant, start: 3.0}
-  damping:   {basis: constant, start: 0.5, variation: {weight: 0.1}}
-  stiffness: {basis: piecewise-constant, knots: 3, start: 2000.0, variation: {weight: 1e-6}}
+  damping:   {basis: constant, start: 0.5, penalty: {kind: tv, weight: 0.1}}
+  stiffness: {basis: piecewise-constant, knots: 3, start: 2000.0, penalty: {kind: tv, weight: 1e-6}}
   cubic_stiffness: {fixed: 0.0}
 fit: {stop: {iterations: 20, tolerance: 1e-10}}
 ",
@@ -117,8 +117,8 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
         .loss(written.0.experiments[0].channels[0].loss());
     let device = [
         CoefficientSpec::constant(3.0),
-        CoefficientSpec::constant(0.5).variation(0.1),
-        CoefficientSpec::piecewise_constant(3, 2000.0).variation(1e-6),
+        CoefficientSpec::constant(0.5).total_variation(0.1),
+        CoefficientSpec::piecewise_constant(3, 2000.0).total_variation(1e-6),
     ];
     let built = Builder::new(device)
         .cubic_stiffness(CoefficientSpec::fixed(0.0))
@@ -268,14 +268,14 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(CoefficientSpec::fixed(1.0).min(0.0)),
-            "functions.mass.min: a fixed function cannot be limited or smoothed",
+            "functions.mass.min: a fixed function has neither bounds nor penalties",
         ),
         (
-            mass(one().smooth(3, 1.0)),
+            mass(one().tikhonov(3, 1.0)),
             "functions.mass.smooth[0].order: this derivative cannot be penalised\n  found: 3",
         ),
         (
-            mass(one().variation(-1.0)),
+            mass(one().total_variation(-1.0)),
             "functions.mass.variation.weight: a weight cannot be negative\n  found: -1",
         ),
         (

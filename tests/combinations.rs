@@ -23,7 +23,7 @@ const TERMS: [&str; 5] = [
     "cubic_stiffness: {basis: constant, start: 0.1}",
     "quadratic_damping: {basis: constant, start: 0.1}",
     "coulomb_friction: {basis: constant, start: 0.05, width: 0.1}",
-    "offset: {basis: constant, start: 0.1}",
+    "static_force: {basis: constant, start: 0.1}",
 ];
 const CHANNELS: [&str; 3] = ["displacement", "velocity", "acceleration"];
 const METHODS: [&str; 6] = [
@@ -138,7 +138,7 @@ fn every_basis_of_every_function_ends_by_name() {
         ("cubic_stiffness", "0.1", ""),
         ("quadratic_damping", "0.1", ""),
         ("coulomb_friction", "0.05", ", width: 0.1"),
-        ("offset", "0.1", ""),
+        ("static_force", "0.1", ""),
     ];
     let all = BASES.into_iter().flat_map(|basis| {
         functions.map(|(changing, start, more)| {

@@ -282,8 +282,8 @@ experiments:
     initial: {{displacement: 0, velocity: 0}}
 functions:
   mass: {{fixed: 1}}
-  damping: {{basis: nodal, start: 0, smooth: {{order: 1, weight: period}}}}
-  stiffness: {{basis: nodal, start: 1, smooth: {{order: 1, weight: period}}}}
+  damping: {{basis: nodal, start: 0, penalty: {{kind: tikhonov, order: 1, weight: period}}}}
+  stiffness: {{basis: nodal, start: 1, penalty: {{kind: tikhonov, order: 1, weight: period}}}}
 fit: {{method: equation-error}}
 ",
         path.canonicalize().unwrap().display()
@@ -551,7 +551,7 @@ experiments:
 functions:
   mass: {{fixed: 1}}
   damping: {{basis: constant, start: 0}}
-  stiffness: {{basis: nodal, start: 1, smooth: {damping}}}
+  stiffness: {{basis: nodal, start: 1, penalty: {damping}}}
 fit: {fit}
 "
     )
@@ -559,7 +559,7 @@ fit: {fit}
 
 #[test]
 fn model_files() {
-    let period = "{order: 1, weight: period}";
+    let period = "{kind: tikhonov, order: 1, weight: period}";
     let text = model(period, "{method: equation-error}");
     let built = read(&text, f64::cos, 401).unwrap();
     assert_eq!(built.settings.solver, Solver::EquationError);
@@ -590,16 +590,16 @@ fn model_files() {
       found: `gauss-newton`
       expected: `l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`
     ");
-    let number = "{order: 1, weight: 1}";
+    let number = "{kind: tikhonov, order: 1, weight: 1}";
     let equation_error = |smooth: &str, more: &str| {
         said(&model(smooth, &format!("{{method: equation-error{more}}}")))
     };
-    assert_snapshot!(equation_error("{order: 0, weight: period}", ""), @"
+    assert_snapshot!(equation_error("{kind: tikhonov, order: 0, weight: period}", ""), @"
     m.yaml:8:55: functions.stiffness.smooth.order: the rule `period` is about a derivative
       found: 0
       expected: order 1 or 2, or a number for the weight
     ");
-    assert_snapshot!(equation_error("{order: 1, weight: gcv}", ""), @"
+    assert_snapshot!(equation_error("{kind: tikhonov, order: 1, weight: gcv}", ""), @"
     m.yaml:8:66: functions.stiffness.smooth.weight: the method `equation-error` knows no search for the weight
       found: `gcv`
       expected: `period`, which follows from the motion, or a number

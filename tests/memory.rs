@@ -40,7 +40,7 @@ impl Bench {
         bench.write("study.yaml", &(text + study));
         bench.write(
             "sequence.yaml",
-            "format: 1\nstory: [small.yaml, large.yaml]\n",
+            "format: 1\nsequence: [small.yaml, large.yaml]\n",
         );
         let (code, said) = bench.run(None, &["fit", "small.yaml", "--out", "run"]);
         assert!([0, 3].contains(&code), "{said}");

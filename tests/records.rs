@@ -321,7 +321,7 @@ functions:
   cubic_stiffness: {basis: constant, start: 10.0}
   quadratic_damping: {basis: constant, start: 0.2}
   coulomb_friction: {basis: constant, start: 0.3, width: 0.5}
-  offset: {basis: constant, start: 0.4}
+  static_force: {basis: constant, start: 0.4}
 fit: {method: lbfgs, gradient: continuous}
 ";
         let file = ModelFile::parse(folder.path().join("model.yaml"), yaml).unwrap();

@@ -7,7 +7,7 @@ use super::{
     Failure, NOT_CONVERGED, OK, Overrides, analyses, inputs, interrupt, print, say, stem,
     unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
+use crate::config::{Model, ModelFile, Override, Purpose, Sequence, build};
 use crate::error::{InputError, Place};
 use crate::report::study::{FitPiece, StudyDocument};
 use crate::report::{Run, json};
@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let file = ModelFile::read_with(&run.document.model.file, &overrides)?;
         return study(&file, &out, arguments.json, threads, false);
     }
-    match Story::read(&arguments.model)? {
+    match Sequence::read(&arguments.model)? {
         Some(story) => {
             arguments
                 .set
@@ -78,7 +78,7 @@ pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Resul
         inputs, overrides, ..
     } = AnalysisJournal::heading(folder, STUDY_JOURNAL)?;
     let model = inputs.into_iter().next().unwrap_or_default();
-    match Story::read(&model)? {
+    match Sequence::read(&model)? {
         Some(story) => tell(&model, &story, folder, as_json, true),
         None => {
             let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
@@ -101,7 +101,13 @@ fn threads(asked: Option<usize>) -> Result<usize, InputError> {
 }
 
 /// Runs the models of a story and tells them on one page.
-fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> Result<u8, Failure> {
+fn tell(
+    path: &Path,
+    story: &Sequence,
+    out: &Path,
+    as_json: bool,
+    go_on: bool,
+) -> Result<u8, Failure> {
     let entries = entries(&story.models, out)?;
     let mut heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
     for model in &story.models {

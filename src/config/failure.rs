@@ -103,8 +103,8 @@ impl Failure<'_> {
             .expected(one_of(known.iter().copied()));
         match key {
             "<<" => error.hint("merging maps by `<<` is not supported: write the keys out"),
-            "story" if self.key.is_empty() => {
-                error.hint("a file with a `story` is for `kmcfit study`")
+            "sequence" if self.key.is_empty() => {
+                error.hint("a file with a `sequence` is for `kmcfit study`")
             }
             "dt" if self.key == "grid" => {
                 error.hint("the step follows from the others: dt = duration/(nodes - 1)")

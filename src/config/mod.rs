@@ -17,10 +17,10 @@ mod map;
 mod model_file;
 mod overrides;
 pub mod scalar;
+mod sequence;
 mod source;
 pub mod spec;
 mod starter;
-mod story;
 mod syntax;
 mod value;
 
@@ -31,6 +31,6 @@ pub use build::{
 pub use model_file::ModelFile;
 pub use overrides::Override;
 pub use scalar::{Number, NumberOrColumn, Text};
+pub use sequence::Sequence;
 pub use source::{DataFile, Source};
 pub use starter::{Starter, starter};
-pub use story::Story;

@@ -41,7 +41,7 @@ keys! {
         /// Other initial states to predict the motion from.
         predict: Option<Vec<StateSpec>>, example "[{displacement: -3.3, velocity: 1.0}]", default "none";
         /// What `kmcfit study` looks into besides what it always does.
-        study: Option<StudySpec>, example "{starts: 20, varies: true}";
+        study: Option<StudySpec>, example "{starts: 20, constancy_test: true}";
     }
 }
 
@@ -101,8 +101,8 @@ keys! {
             example "{basis: constant, start: 0.5, width: 0.01}",
             unit "N",
             default "no such force";
-        /// A constant push against the direction of y.
-        offset: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "no such force";
+        /// Static force against the direction of y.
+        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "no such force";
     }
 }
 
@@ -121,8 +121,8 @@ keys! {
         quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
         /// Coulomb friction: a force on v/sqrt(v^2 + width^2).
         coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
-        /// A constant push against the direction of y.
-        offset: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
+        /// Static force against the direction of y.
+        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
     }
 }
 
@@ -144,10 +144,10 @@ keys! {
         min: Option<NumberOrColumn>, example "0.05", unit "that of the function", default "none";
         /// Largest value allowed.
         max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
-        /// Penalty on squared derivatives, added to J; or a list of such.
-        smooth: Option<OneOrList<SmoothSpec>>, example "{order: 2, weight: 0.1}", default "none";
-        /// Penalty on the total variation: a jump costs no more than a slow change.
-        variation: Option<VariationSpec>, example "{weight: 0.01}", default "none";
+        /// Penalty on roughness, added to J; or a list of such.
+        penalty: Option<OneOrList<PenaltySpec>>,
+            example "{kind: tikhonov, order: 2, weight: 0.1}",
+            default "none";
         /// Of Coulomb friction: speed over which the sign of the velocity is smoothed, well below the speeds of the
         /// motion.
         width: Option<Number>, example "0.01", unit "m/s";
@@ -173,22 +173,35 @@ choice! {
 }
 
 keys! {
-    /// A penalty: weight times the integral of the squared derivative.
-    pub struct SmoothSpec = "smooth", expecting "a map such as {order: 2, weight: 0.1}" {
-        /// Which derivative: 0 (distance from `reference`), 1 (slope) or 2 (curvature).
-        order: Count, example "2";
-        /// Factor of the penalty in J, or the rule that chooses it from the data.
-        weight: Weight, example "0.1", unit "of J per unit of the integral";
-        /// What a penalty of order 0 pulls towards.
+    /// A penalty on the roughness of a coefficient function p: `tikhonov`, weight times the integral of the squared derivative, or
+    /// `tv`, weight times the total variation, for which a jump costs no more than a slow change.
+    pub struct PenaltySpec = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
+        /// Which measure of roughness.
+        kind: PenaltyKind, example "tikhonov";
+        /// Of `tikhonov`: which derivative, 0 (distance from `reference`), 1 (slope) or 2 (curvature).
+        order: Option<Count>, example "2";
+        /// Factor of the penalty in J, or for `tikhonov` the rule that chooses it from the data.
+        weight: Weight, example "0.1", unit "of J per unit of the measure";
+        /// Of `tikhonov` with order 0: what the penalty pulls towards.
         reference: Option<NumberOrColumn>, example "1.0", unit "that of the function", default "0";
     }
 }
 
-keys! {
-    /// A penalty: weight times the total variation.
-    pub struct VariationSpec = "variation", expecting "a map such as {weight: 0.1}" {
-        /// Factor of the penalty in J.
-        weight: Number, example "0.01", unit "of J per unit of the function";
+choice! {
+    /// Measure of roughness.
+    pub enum PenaltyKind {
+        /// Integral of the squared derivative of some order.
+        Tikhonov = "tikhonov",
+        /// Total variation.
+        TotalVariation = "tv",
+    }
+}
+
+impl FunctionSpec {
+    /// Whether its total variation is penalised.
+    pub fn has_total_variation(&self) -> bool {
+        let mut penalties = self.penalty.iter().flat_map(|list| list.values());
+        penalties.any(|penalty| penalty.kind == PenaltyKind::TotalVariation)
     }
 }
 
@@ -207,8 +220,8 @@ choice! {
         QuadraticDamping = "quadratic_damping",
         /// Coulomb friction.
         CoulombFriction = "coulomb_friction",
-        /// Constant offset of the force.
-        Offset = "offset",
+        /// Static force.
+        Offset = "static_force",
     }
 }
 
@@ -371,7 +384,7 @@ keys! {
         quadratic_damping: Option<Text>, example "my_column", unit "N s^2/m^2";
         /// Column of the Coulomb friction.
         coulomb_friction: Option<Text>, example "my_column", unit "N";
-        /// Column of the offset.
-        offset: Option<Text>, example "my_column", unit "N";
+        /// Column of the static force.
+        static_force: Option<Text>, example "my_column", unit "N";
     }
 }

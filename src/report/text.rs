@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn what_is_quoted_is_code() {
         assert_eq!(
-            prose("add `smooth`; a<b"),
+            prose("add a `penalty`; a<b"),
             "add <code>smooth</code>; a&lt;b"
         );
         assert_eq!(prose("a ` by itself"), "a ` by itself");

@@ -63,7 +63,7 @@ fn keys() {
     10 |   mass:      {basis: nodal, strat: 2.0}
        |                             ^^^^^
       found: `strat`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
       hint: did you mean `start`?
     ");
     assert_snapshot!(changed("method: midpoint", "method: midpoint, dt: 0.1"), @"
@@ -81,7 +81,7 @@ fn keys() {
     4 |   - colour: red
       |     ^^^^^^
       found: `colour`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, hold_out
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, validation
     ");
     assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
     error: model.yaml:4:5: experiments[0]: the key `initial` is missing

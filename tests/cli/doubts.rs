@@ -693,7 +693,7 @@ fn what_is_wrong_is_said_at_once() {
         .collect();
     bench.write("other.csv", &format!("t_s,y_m\n{rows}"));
     let held = "    sigma: {displacement: estimate}\n  - name: other\n    data: other.csv\n    \
-                initial: {displacement: 1, velocity: 0}\n    sigma: {displacement: 0.01}\n    hold_out: true\n";
+                initial: {displacement: 1, velocity: 0}\n    sigma: {displacement: 0.01}\n    validation: true\n";
     let model = starter("{nodes: 801}", held).replace("start: 39", "start: 3.8");
     bench.write("model.yaml", &model);
     let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);

@@ -167,11 +167,11 @@ fn a_study_whose_fit_is_ended() {
     }
 }
 
-/// A story that is killed goes on in the middle of a fit; what was finished is kept, and what an older
+/// A sequence that is killed goes on in the middle of a fit; what was finished is kept, and what an older
 /// run left in its folders is none of it.
 #[test]
 #[cfg(unix)]
-fn a_story_whose_fit_is_ended() {
+fn a_sequence_whose_fit_is_ended() {
     let bench = paper(60);
     let slow = bench
         .read("models/knots.yaml")
@@ -180,9 +180,9 @@ fn a_story_whose_fit_is_ended() {
     bench.write("models/slow.yaml", &slow);
     bench.run_to(0, &["fit", "models/slow.yaml", "--out", "whole"]);
     bench.run_to(0, &["fit", "models/knots.yaml", "--out", "run/slow"]);
-    let story = "format: 1\ntitle: Two\nstory: [paper.yaml, slow.yaml]\n";
-    bench.write("models/story.yaml", story);
-    let mut child = started(&bench, &["study", "models/story.yaml", "--out", "run"]);
+    let sequence = "format: 1\ntitle: Two\nsequence: [paper.yaml, slow.yaml]\n";
+    bench.write("models/sequence.yaml", sequence);
+    let mut child = started(&bench, &["study", "models/sequence.yaml", "--out", "run"]);
     wait_for_line(&bench, "run/slow/fit.journal", 20);
     child.kill().expect("a child");
     child.wait().expect("it ends");

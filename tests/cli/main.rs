@@ -15,7 +15,7 @@ mod predict;
 mod reading_back;
 mod regressions;
 mod results;
+mod sequence;
 mod simulate;
-mod story;
 mod study;
 mod workbench;

@@ -230,16 +230,16 @@ fn several() {
         ]),
         changed(&[(
             "    initial: {displacement: 1.0, velocity: 0.0}",
-            "    functions: {offset: {basis: constant, start: 0.0}}\n    initial: estimate",
+            "    functions: {static_force: {basis: constant, start: 0.0}}\n    initial: estimate",
         )]),
         changed(&[
             (
                 "    initial: {displacement: 1.0, velocity: estimate}",
-                "    hold_out: true\n    initial: estimate",
+                "    validation: true\n    initial: estimate",
             ),
             (
                 "    initial: {displacement: 1.0, velocity: 0.0}",
-                "    hold_out: true\n    initial: estimate",
+                "    validation: true\n    initial: estimate",
             ),
         ]),
         refused(&late),
@@ -258,7 +258,7 @@ fn several() {
             ),
             (
                 "    initial: {displacement: 1.0, velocity: 0.0}",
-                "    hold_out: true\n    initial: estimate",
+                "    validation: true\n    initial: estimate",
             ),
         ]),
         changed(&[(

@@ -81,7 +81,7 @@ fn every_shipped_model_is_run_here() {
         "paper-experiments.yaml",
         "paper-two-records.yaml",
         "paper-forced.yaml",
-        "paper-story.yaml",
+        "paper-sequence.yaml",
         "accelerometer.yaml",
         "hammer-and-shaker.yaml",
         "duffing.yaml",
@@ -92,11 +92,11 @@ fn every_shipped_model_is_run_here() {
         "camera.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
-    // All but those that are simulated and the story, which is of other models.
+    // All but those that are simulated and the sequence, which is of other models.
     let without_fit = [
         "paper-device.yaml",
         "paper-experiments.yaml",
-        "paper-story.yaml",
+        "paper-sequence.yaml",
     ];
     for file in run_here.iter().filter(|file| !without_fit.contains(file)) {
         let name = file.strip_suffix(".yaml").expect("YAML");

@@ -15,17 +15,17 @@ functions:
     basis: polynomial
     degree: 2
     start: [1.0, 0.01, 0.001]
-    smooth: {order: 1, weight: 0.3}
+    penalty: {kind: tikhonov, order: 1, weight: 0.3}
   damping:
     basis: b-spline
     knots: 5
     start: 0.2
-    smooth: [{order: 0, weight: 0.02, reference: 0.05}, {order: 2, weight: 0.004}]
+    penalty: [{kind: tikhonov, order: 0, weight: 0.02, reference: 0.05}, {kind: tikhonov, order: 2, weight: 0.004}]
   stiffness:
     basis: piecewise-linear
     knots: 6
     start: 1.1
-    variation: {weight: 0.01}
+    penalty: {kind: tv, weight: 0.01}
 constraints:
   - {function: stiffness, at: [0.0, 10.0], value: 1.2, soft: 0.5}
 fit: {stop: {iterations: 4}}
@@ -230,7 +230,7 @@ experiments:
     initial: {{displacement: 1.0, velocity: 0.5}}
 grid: {{method: rk4}}
 functions:
-  mass: {{basis: piecewise-linear, knots: {knots}, start: {mass}, smooth: {{order: 1, weight: 0.001}}}}
+  mass: {{basis: piecewise-linear, knots: {knots}, start: {mass}, penalty: {{kind: tikhonov, order: 1, weight: 0.001}}}}
   damping: {{basis: b-spline, knots: {knots}, start: {damping}}}
   stiffness: {{basis: piecewise-constant, knots: {knots}, start: {stiffness}}}
 constraints:

@@ -28,7 +28,7 @@ study:
   starts: 4
   spread: 1.5
   bootstrap: 40
-  varies: true
+  constancy_test: true
   candidates:
     - {name: the same again, initial: {displacement: 1.0, velocity: 0.0}}
     - {name: a blow, initial: {displacement: 0.0, velocity: 3.0}, channel: acceleration, sigma: 0.1}
@@ -150,14 +150,14 @@ fn mistakes() {
         changed("starts: 4", "starts: 0"),
         changed("starts: 4", "starts: 9000000000000000000"),
         changed("bootstrap: 40", "bootstrap: 2"),
-        changed("seed: 3", "tubes: []"),
+        changed("seed: 3", "extremes: []"),
         changed("at: 5.0", "at: 50.0"),
         changed("{function: damping}", "{function: mass}"),
         changed("{function: damping}", "{function: offset}"),
         changed("{function: damping}", "{function: stiffness}"),
         changed("{scalar: initial velocity", "{scalar: initial velocty"),
         changed("sigma: 0.1", "sigma: 0"),
-        changed("seed: 3", "level: -1"),
+        changed("seed: 3", "misfit_limit: -1"),
         other_model,
         other_format,
         refused(&bench, &["resume", "nowhere"]),
@@ -167,13 +167,13 @@ fn mistakes() {
     assert_snapshot!(all.join("\n"));
 }
 
-/// A story is told from the numbers of its runs.
+/// A sequence is told from the numbers of its runs.
 #[test]
-fn a_story() {
+fn a_sequence() {
     let bench = Workbench::with_shipped_models();
     bench.write(
         "models/short.yaml",
-        "format: 1\ntitle: Two runs\nstory: [paper-positive.yaml, linear-mass.yaml]\n",
+        "format: 1\ntitle: Two runs\nsequence: [paper-positive.yaml, linear-mass.yaml]\n",
     );
     let stdout = bench.run_to(0, &["study", "models/short.yaml"]);
     assert!(stdout.contains("paper-positive leaves J/J0"), "{stdout}");
@@ -197,7 +197,7 @@ fn a_story() {
     assert!(second == bench.read("runs/short-study/linear-mass/functions.csv"));
     bench.write(
         "models/short.yaml",
-        "format: 1\nstory: [linear-mass.yaml, nowhere.yaml]\n",
+        "format: 1\nsequence: [linear-mass.yaml, nowhere.yaml]\n",
     );
     let missing = refused(
         &bench,
@@ -207,9 +207,9 @@ fn a_story() {
         missing.contains("nowhere.yaml: there is no such file"),
         "{missing}"
     );
-    bench.write("models/short.yaml", "format: 1\nstory: []\n");
+    bench.write("models/short.yaml", "format: 1\nsequence: []\n");
     let before = refused(&bench, &["study", "models/short.yaml"]);
-    assert!(before.contains("the story has no model"), "{before}");
+    assert!(before.contains("the sequence has no model"), "{before}");
 }
 
 /// A record without motion: nothing is seen, and a study says so and ends.

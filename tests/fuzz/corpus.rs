@@ -139,7 +139,7 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
                 model.replace(
                     "start: 1}}",
                     &format!(
-                        "start: 1, smooth: [{}]}}}}",
+                        "start: 1, penalty: [{}]}}}}",
                         repeat("{order: 1, weight: 1},", 10_000)
                     ),
                 ) + &format!("experiments: [{{{record}}}]\n"),
@@ -208,7 +208,7 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
         "yaml" | "override" | "sequence" => vec![(
             "aliases of a long list",
             format!(
-                "title=\nstory: &a [{}]\nb: [{}]\n",
+                "title=\nsequence: &a [{}]\nb: [{}]\n",
                 repeat("1,", 20_000),
                 repeat("*a,", 900)
             ),

@@ -4,7 +4,7 @@
 
 use kmcfit::Run;
 use kmcfit::config::scalar::{Count, Nodes};
-use kmcfit::config::{Model, ModelFile, Override, Purpose, Story, build};
+use kmcfit::config::{Model, ModelFile, Override, Purpose, Sequence, build};
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
@@ -263,7 +263,7 @@ pub fn overrides(bytes: &[u8]) -> Verdict {
 pub fn sequence(bytes: &[u8]) -> Verdict {
     let path = workshop().path("models/sequence.yaml");
     fs::write(&path, bytes).expect("room");
-    match Story::read(&path) {
+    match Sequence::read(&path) {
         Err(error) => told(&error),
         Ok(_) => Verdict::Accepted,
     }

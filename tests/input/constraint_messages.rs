@@ -193,7 +193,7 @@ fn penalties_and_rules() {
     };
     let model = |damping: &str| read(&with(damping)).unwrap_or_else(|error| panic!("{error}"));
     let found = model(
-        "smooth: [{order: 0, weight: 2, reference: {data: c.csv, column: c}}, {order: 1, weight: 3}]",
+        "penalty: [{kind: tikhonov, order: 0, weight: 2, reference: {data: c.csv, column: c}}, {kind: tikhonov, order: 1, weight: 3}]",
     );
     let [value, slope] = found.problem.penalties.as_slice() else {
         panic!("two penalties")
@@ -209,8 +209,9 @@ fn penalties_and_rules() {
     assert!(value.roughness(&reference) < 1e-25);
     assert_eq!(found.weight_rule, None);
 
-    let found =
-        model("smooth: [{order: 1, weight: 2}, {order: 2, weight: gcv}], variation: {weight: 0.5}");
+    let found = model(
+        "penalty: [{kind: tikhonov, order: 1, weight: 2}, {kind: tikhonov, order: 2, weight: gcv}, {kind: tv, weight: 0.5}]",
+    );
     let search = found.weight_rule.unwrap();
     assert_eq!((search.rule.name(), search.penalties), ("gcv", vec![1]));
     assert_eq!(found.problem.penalties[1].weight, 1.0);
@@ -219,13 +220,13 @@ fn penalties_and_rules() {
     };
     assert_eq!((variation.function, variation.weight), (1, 0.5));
 
-    assert_snapshot!(said(&with("smooth: {order: 2, weight: discrepancy}")), @"
-    m.yaml:9:64: functions.damping.smooth.weight: the rule `discrepancy` needs the noise of the readings
+    assert_snapshot!(said(&with("penalty: {kind: tikhonov, order: 2, weight: discrepancy}")), @"
+    m.yaml:9:81: functions.damping.penalty.weight: the rule `discrepancy` needs the noise of the readings
       found: no `sigma` in experiments[0]
       expected: `sigma` in every experiment, or `l-curve` or `gcv`, which do without
     ");
-    assert_snapshot!(said(&with("smooth: [{order: 2, weight: gcv}, {order: 1, weight: l-curve}]")), @"
-    m.yaml:9:90: functions.damping.smooth[1].weight: there is one rule for all weights that are chosen
+    assert_snapshot!(said(&with("penalty: [{kind: tikhonov, order: 2, weight: gcv}, {kind: tikhonov, order: 1, weight: l-curve}]")), @"
+    m.yaml:9:123: functions.damping.penalty[1].weight: there is one rule for all weights that are chosen
       found: `l-curve` beside `gcv`
       expected: the same rule, or a number
     ");
@@ -333,7 +334,7 @@ fn kinds() {
     assert_snapshot!(message("[{function: mas, min: 0}]"), @"
     m.yaml:11:26: constraints[0].function: unknown choice
       found: `mas`
-      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, offset
+      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, static_force
       hint: did you mean `mass`?
     ");
     assert_snapshot!(message("[{function: mass, minimum: 0}]"), @"
@@ -498,7 +499,7 @@ fn equalities() {
     assert_snapshot!(message("[{equal: [mass, dampin]}]"), @"
     m.yaml:11:30: constraints[0].equal[1]: unknown choice
       found: `dampin`
-      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, offset
+      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, static_force
       hint: did you mean `damping`?
     ");
     assert_snapshot!(message("[{equal: [mass, damping], ratio: 0}]"), @"

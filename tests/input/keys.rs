@@ -4,7 +4,7 @@
     reason = "the texts are those of the project"
 )]
 
-use kmcfit::config::keys::{self, Group, Kind, MODEL, STORY};
+use kmcfit::config::keys::{self, Group, Kind, MODEL, SEQUENCE};
 use kmcfit::config::{ModelFile, Override};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -100,9 +100,9 @@ fn reader_and_registry_know_the_same_keys_and_examples_are_read() {
     visit(MODEL, "", &base(), &mut seen);
     assert!(seen.len() > 120, "{}", seen.len());
     let all = keys::all();
-    let story = STORY.keys.len();
+    let sequence = SEQUENCE.keys.len();
     assert!(
-        all.len() <= seen.len() + story,
+        all.len() <= seen.len() + sequence,
         "{} {}",
         all.len(),
         seen.len()
@@ -137,7 +137,7 @@ fn required_keys_are_those_of_the_reader() {
         ("functions", "functions"),
         ("initial", "experiments.0.initial"),
         ("truth", "truth"),
-        ("smooth", "functions.mass.smooth"),
+        ("penalty", "functions.mass.penalty"),
         ("column", "functions.mass.start"),
         ("variation", "functions.mass.variation"),
     ] {

@@ -8,7 +8,7 @@ use kmcfit::config::scalar::{
     Start, Weight,
 };
 use kmcfit::config::spec::{
-    Basis, FitMethod, Gradient, InitialSpec, SmoothSpec, StepMethod, WeightRule,
+    Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
 };
 
 pub const FULL: &str = "\
@@ -118,8 +118,8 @@ fn every_key_is_read() {
 fn shapes_limits_and_penalties_are_read() {
     let text = SHORT
         .replace("mass: {basis: nodal}", "mass: {basis: piecewise-linear, knots: 11, start: [1, 2.5], min: 0.1, max: {data: m.csv, column: m}}")
-        .replace("damping: {basis: nodal}", "damping: {basis: b-spline, knots: [0, 1.5, 3], smooth: {order: 1, weight: l-curve}, variation: {weight: 2}}")
-        .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, smooth: [{order: 0, weight: 1e-3, reference: 1}, {order: 2, weight: gcv}]}");
+        .replace("damping: {basis: nodal}", "damping: {basis: b-spline, knots: [0, 1.5, 3], penalty: [{kind: tikhonov, order: 1, weight: l-curve}, {kind: tv, weight: 2}]}")
+        .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, penalty: [{kind: tikhonov, order: 0, weight: 1e-3, reference: 1}, {kind: tikhonov, order: 2, weight: gcv}]}");
     let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
 
     let mass = functions.mass;
@@ -137,28 +137,29 @@ fn shapes_limits_and_penalties_are_read() {
     assert_eq!(damping.basis, Some(Basis::BSpline));
     let times = [0.0, 1.5, 3.0].map(Number).to_vec();
     assert_eq!(damping.knots, Some(Knots::Times(times)));
-    assert_eq!(damping.variation.map(|v| v.weight), Some(Number(2.0)));
-    let one: Vec<_> = damping.smooth.iter().flat_map(|s| s.iter()).collect();
-    let slope = SmoothSpec {
-        order: Count(1),
-        weight: Weight::Rule(WeightRule::LCurve),
+    let tikhonov = |order, weight, reference| PenaltySpec {
+        kind: PenaltyKind::Tikhonov,
+        order: Some(Count(order)),
+        weight,
+        reference,
+    };
+    let two: Vec<_> = damping.penalty.iter().flat_map(|s| s.iter()).collect();
+    let slope = tikhonov(1, Weight::Rule(WeightRule::LCurve), None);
+    let variation = PenaltySpec {
+        kind: PenaltyKind::TotalVariation,
+        order: None,
+        weight: Weight::Number(Number(2.0)),
         reference: None,
     };
-    assert_eq!(one, [(String::new(), &slope)]);
+    let expected = [("[0]".to_owned(), &slope), ("[1]".to_owned(), &variation)];
+    assert_eq!(two, expected);
 
     let stiffness = functions.stiffness;
     assert_eq!(stiffness.degree, Some(Count(3)));
-    let many: Vec<_> = stiffness.smooth.iter().flat_map(|s| s.iter()).collect();
-    let value = SmoothSpec {
-        order: Count(0),
-        weight: Weight::Number(Number(1e-3)),
-        reference: Some(NumberOrColumn::Number(Number(1.0))),
-    };
-    let curvature = SmoothSpec {
-        order: Count(2),
-        weight: Weight::Rule(WeightRule::Gcv),
-        reference: None,
-    };
+    let many: Vec<_> = stiffness.penalty.iter().flat_map(|s| s.iter()).collect();
+    let reference = NumberOrColumn::Number(Number(1.0));
+    let value = tikhonov(0, Weight::Number(Number(1e-3)), Some(reference));
+    let curvature = tikhonov(2, Weight::Rule(WeightRule::Gcv), None);
     let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
     assert_eq!(many, expected);
 }

@@ -84,7 +84,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("fixed: 1", "Fixed: 1"), @"
     m.yaml:18:32: functions.stiffness: unknown key
       found: `Fixed`
-      expected: one of: basis, knots, degree, start, fixed, min, max, smooth, variation, width
+      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
       hint: did you mean `fixed`?
     ");
     assert_snapshot!(changed("cost_ratio", "cost-ratio"), @"
@@ -96,7 +96,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("  mass: {", "  friction: {"), @"
     m.yaml:14:3: functions: unknown key
       found: `friction`
-      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, offset
+      expected: one of: mass, damping, stiffness, cubic_stiffness, quadratic_damping, coulomb_friction, static_force
     ");
     assert_snapshot!(changed("column: damping", "colunm: damping"), @"
     m.yaml:17:30: functions.damping.start: unknown key
@@ -686,7 +686,7 @@ fn repeated_aliases_are_limited() {
     assert_snapshot!(message(&bomb), @"
     m.yaml:2:8: experiments[0]: unknown key
       found: `b`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, hold_out
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, validation
     ");
 }
 

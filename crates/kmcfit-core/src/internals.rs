@@ -11,7 +11,7 @@ pub mod assessment {
 pub mod builder {
     pub use crate::builder::{
         BasisSpec, BuildError, BuildNotice, Builder, Built, ChannelSpec, CoefficientSpec,
-        Contradiction, Knots, PenaltyWeight, Record, ScalarSpec, SensorSpec, Smoothness, Start,
+        Contradiction, Knots, PenaltySpec, PenaltyWeight, Record, ScalarSpec, SensorSpec, Start,
         WeightSearch, listed,
     };
 }

@@ -58,7 +58,7 @@ fn with_a_sigma_and_with_penalties() {
         .unwrap();
     agree(&problem, &uneven(&problem));
 
-    let parts = [2.0, 1.0, 1.0].map(|start| CoefficientSpec::nodal(start).smooth(1, 0.3));
+    let parts = [2.0, 1.0, 1.0].map(|start| CoefficientSpec::nodal(start).tikhonov(1, 0.3));
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(&grid.times(), &readings);

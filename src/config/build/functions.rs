@@ -3,10 +3,12 @@
 use super::on_grid::{Wanted, column_on_grid};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Knots, Number, NumberOrColumn, Start, Text, Weight};
-use crate::config::spec::{Basis, ColumnSpec, FunctionSpec, SmoothSpec, WeightRule};
+use crate::config::spec::{
+    self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
+};
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
-    self, BasisSpec, CoefficientSpec, PenaltyWeight, Smoothness,
+    self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
 };
 use kmcfit_core::internals::constraints::Limit;
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -23,7 +25,7 @@ macro_rules! by_kind {
             CoefficientKind::CubicStiffness => $map.cubic_stiffness.as_ref(),
             CoefficientKind::QuadraticDamping => $map.quadratic_damping.as_ref(),
             CoefficientKind::CoulombFriction => $map.coulomb_friction.as_ref(),
-            CoefficientKind::Offset => $map.offset.as_ref(),
+            CoefficientKind::Offset => $map.static_force.as_ref(),
         }
     };
 }
@@ -91,12 +93,13 @@ pub(super) fn specification(
         }
     };
     spec = spec.bounds(bound("min", &given.min)?, bound("max", &given.max)?);
-    for (place, smooth) in given.smooth.iter().flat_map(|list| list.iter()) {
-        let key = format!("{key}.smooth{place}");
-        spec = spec.smoothness(smoothness(file, grid, &key, smooth)?);
-    }
-    if let Some(variation) = &given.variation {
-        spec = spec.variation(variation.weight.0);
+    for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
+        spec = spec.penalty(penalty(
+            file,
+            grid,
+            &format!("{key}.penalty{place}"),
+            given,
+        )?);
     }
     Ok(match given.width {
         Some(width) => spec.width(width.0),
@@ -202,16 +205,25 @@ fn start(
     }
 }
 
-fn smoothness(
+fn penalty(
     file: &ModelFile,
     grid: &Grid,
     key: &str,
-    given: &SmoothSpec,
-) -> Result<Smoothness, InputError> {
+    given: &config::PenaltySpec,
+) -> Result<PenaltySpec, InputError> {
+    if given.kind == PenaltyKind::TotalVariation {
+        return total_variation(file, key, given);
+    }
+    let Some(Count(order)) = given.order else {
+        return Err(file
+            .error_at(key, "the key `order` is missing")
+            .found("a penalty of the kind `tikhonov` alone")
+            .expected("for instance `order: 2`"));
+    };
     let reference = given.reference.as_ref();
     let reference = reference.map(|r| history(file, grid, &format!("{key}.reference"), r));
-    Ok(Smoothness {
-        order: given.order.0,
+    Ok(PenaltySpec::Tikhonov {
+        order,
         weight: match given.weight {
             Weight::Number(weight) => PenaltyWeight::Given(weight.0),
             Weight::Rule(WeightRule::Period) => PenaltyWeight::Period,
@@ -223,6 +235,37 @@ fn smoothness(
         },
         reference: reference.transpose()?,
     })
+}
+
+/// A penalty on total variation, which has a weight and nothing else.
+fn total_variation(
+    file: &ModelFile,
+    key: &str,
+    given: &config::PenaltySpec,
+) -> Result<PenaltySpec, InputError> {
+    let others = [
+        ("order", given.order.is_some()),
+        ("reference", given.reference.is_some()),
+    ];
+    if let Some((other, _)) = others.iter().find(|(_, given)| *given) {
+        return Err(file
+            .error_at(
+                &format!("{key}.{other}"),
+                "total variation has a weight alone",
+            )
+            .found(format!("`{other}` beside `kind: tv`"))
+            .expected(format!("no `{other}`, or `kind: tikhonov`")));
+    }
+    match given.weight {
+        Weight::Number(Number(weight)) => Ok(PenaltySpec::TotalVariation { weight }),
+        Weight::Rule(rule) => Err(file
+            .error_at(
+                &format!("{key}.weight"),
+                "total variation has no rule for its weight",
+            )
+            .found(format!("`{rule}`"))
+            .expected("a finite number")),
+    }
 }
 
 /// A number at all times, or a column that `key` names, read at the nodes.

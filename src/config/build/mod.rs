@@ -160,7 +160,7 @@ fn input_error(file: &ModelFile, error: BuildError) -> InputError {
 
 /// The key as the file has it: what stands alone in place of a list has no number.
 fn written(file: &ModelFile, key: &str) -> String {
-    let alone = key.replace("smooth[0]", "smooth");
+    let alone = key.replace("penalty[0]", "penalty");
     let depth = |key: &str| locate(file.effective_text(), &key_path(key)).depth;
     match alone != key && depth(&alone) >= depth(key) {
         true => alone,

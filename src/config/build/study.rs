@@ -115,10 +115,16 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let spread = within(file, "study.spread", spec.spread, SPREAD, |x| {
         x > 1.0 && x <= WIDEST_SPREAD
     })?;
-    let same = within(file, "study.same", spec.same, SAME, |x| x > 0.0)?;
-    if let Some(level) = spec.level.filter(|l| l.0 <= 0.0) {
+    let same = within(
+        file,
+        "study.merge_tolerance",
+        spec.merge_tolerance,
+        SAME,
+        |x| x > 0.0,
+    )?;
+    if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
         return Err(file
-            .error_at("study.level", "the largest J of a tube must be positive")
+            .error_at("study.misfit_limit", "the largest J must be positive")
             .found(level.0)
             .expected("a number greater than 0, in the unit of J"));
     }
@@ -140,14 +146,14 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         }
     }
     if spec
-        .tubes
+        .extremes
         .as_ref()
         .is_some_and(|tubes| tubes.values().is_empty())
     {
         return Err(file
-            .error_at("study.tubes", "there is no time")
+            .error_at("study.extremes", "there is no time")
             .found("an empty list")
-            .expected("times in s, or no `tubes` for five over the record"));
+            .expected("times in s, or no `extremes` for five over the record"));
     }
     let profiles = spec.profiles.iter().flatten().enumerate();
     let profiles = profiles
@@ -157,9 +163,16 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let candidates = candidates
         .map(|(i, spec)| candidate(file, problem, &format!("study.candidates[{i}]"), spec))
         .collect::<Result<_, _>>()?;
-    let equivalents = spec.equivalents.iter().flatten().enumerate();
+    let equivalents = spec.equivalent_systems.iter().flatten().enumerate();
     let equivalents = equivalents
-        .map(|(i, spec)| equivalent(file, problem, &format!("study.equivalents[{i}]"), spec))
+        .map(|(i, spec)| {
+            equivalent(
+                file,
+                problem,
+                &format!("study.equivalent_systems[{i}]"),
+                spec,
+            )
+        })
         .collect::<Result<_, _>>()?;
     Ok(StudyPlan {
         equivalents,
@@ -168,12 +181,12 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
         profiles,
         tubes: tubes(file, problem, spec)?,
-        level: spec.level.map(|level| level.0),
+        level: spec.misfit_limit.map(|level| level.0),
         starts: spec.starts.map_or(0, |count| count.0),
         spread,
         same,
         replicates: spec.bootstrap.map_or(0, |count| count.0),
-        varies: spec.varies == Some(true),
+        varies: spec.constancy_test == Some(true),
         candidates,
         limit: None,
     })
@@ -226,7 +239,7 @@ fn within(
 /// Times on the grid; evenly spread where none are given.
 fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
     let grid = &problem.oscillator.grid;
-    let Some(given) = &spec.tubes else {
+    let Some(given) = &spec.extremes else {
         let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
         return Ok((0..TUBES).map(time).collect());
     };
@@ -234,7 +247,7 @@ fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f6
         on_grid(
             file,
             problem,
-            &format!("study.tubes{}", given.place(i)),
+            &format!("study.extremes{}", given.place(i)),
             time.0,
         )?;
     }

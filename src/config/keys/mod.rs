@@ -7,13 +7,13 @@ pub use super::key::{Group, Key, Kind};
 pub use explain::explain;
 pub use schema::schema;
 
+use super::sequence::SequenceSpec;
 use super::spec::ModelSpec;
-use super::story::StorySpec;
 
 /// The keys of a model.
 pub static MODEL: &Group = ModelSpec::GROUP;
-/// The keys of a story.
-pub static STORY: &Group = StorySpec::GROUP;
+/// The keys of a sequence.
+pub static SEQUENCE: &Group = SequenceSpec::GROUP;
 
 /// A key and where it may stand.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ pub struct Found {
 pub fn all() -> Vec<Found> {
     let mut found = Vec::new();
     collect(MODEL, "", &mut found);
-    collect(STORY, "", &mut found);
+    collect(SEQUENCE, "", &mut found);
     found
 }
 

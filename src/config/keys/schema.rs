@@ -1,21 +1,21 @@
 //! The JSON schema (draft 07) of a model file, for editors that complete and check YAML by one.
 
-use super::{Group, Key, Kind, MODEL, STORY};
+use super::{Group, Key, Kind, MODEL, SEQUENCE};
 use serde_json::{Map, Value, json};
 
-/// The schema of a model file or a story.
+/// The schema of a model file or a sequence.
 ///
 /// It knows keys, kinds and words; what they mean together is checked by the program alone.
 pub fn schema() -> Value {
     let mut definitions = Map::new();
     define(MODEL, &mut definitions);
-    define(STORY, &mut definitions);
+    define(SEQUENCE, &mut definitions);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "kmcfit model file",
-        "description": "A model of an oscillator and its records, or a story of several models.",
-        "if": {"type": "object", "required": ["story"]},
-        "then": reference(STORY),
+        "description": "A model of an oscillator and its records, or a sequence of several models.",
+        "if": {"type": "object", "required": ["sequence"]},
+        "then": reference(SEQUENCE),
         "else": reference(MODEL),
         "definitions": definitions,
     })

@@ -50,8 +50,8 @@ keys! {
         functions: Option<OwnFunctionsSpec>,
             example "{damping: {basis: constant, start: 1.0}}",
             default "all are shared";
-        /// Whether it is kept out of the fit, to be predicted and scored.
-        hold_out: Option<bool>, example "true", default "false";
+        /// Whether it is a validation record: kept out of the fit, predicted and scored.
+        validation: Option<bool>, example "true", default "false";
     }
 }
 

@@ -9,32 +9,32 @@ use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
 keys! {
     /// What `kmcfit study` looks into besides what it always does.
     pub struct StudySpec (Default) = "study", expecting "a map such as {profiles: [{function: mass, at: 0.0}], starts: 20}" {
-        /// Confidence of drawn bands, profiles, tubes and refits.
+        /// Confidence of drawn bands, profiles, extremes and refits.
         confidence: Option<Number>, example "0.95", default "0.95";
         /// Seed of everything random.
         seed: Option<Count>, example "1", default "1";
         /// Numbers whose profile is drawn: the least cost with the number held.
         profiles: Option<Vec<ProfileSpec>>, example "[{function: mass, at: 0.0}]", default "none";
-        /// Times at which the extreme devices are sought.
-        tubes: Option<OneOrList<Number>>, example "[0.0, 12.5, 25.0]", unit "s", default "five over the record";
-        /// Largest J of a device in the tubes.
-        level: Option<Number>, example "2010.0", unit "that of J", default "what the confidence allows";
+        /// Times at which the smallest and largest compatible values are computed.
+        extremes: Option<OneOrList<Number>>, example "[0.0, 12.5, 25.0]", unit "s", default "five over the record";
+        /// Largest J of a system that counts as compatible with the data.
+        misfit_limit: Option<Number>, example "2010.0", unit "that of J", default "what the confidence allows";
         /// Fits from scattered starts.
         starts: Option<Count>, example "20", default "none";
         /// The starts lie within this factor of the start values.
         spread: Option<Number>, example "3.0", default "3";
         /// Optima whose k/m, c/m and motions agree to this are one.
-        same: Option<Number>, example "1e-3", default "1e-3";
+        merge_tolerance: Option<Number>, example "1e-3", default "1e-3";
         /// Refits to simulated readings.
         bootstrap: Option<Count>, example "200", default "none";
         /// Where the noise of the refits comes from.
         noise: Option<NoiseName>, example "residual", default "parametric";
-        /// Masses for which devices with the same motion are sought.
-        equivalents: Option<Vec<EquivalentSpec>>,
+        /// Masses for which systems with the same response are computed.
+        equivalent_systems: Option<Vec<EquivalentSpec>>,
             example "[{name: constant mass, mass: 1.0}]",
             default "masses that grow, fall and swing away from the fit's";
-        /// Whether each function is held against a constant.
-        varies: Option<bool>, example "true", default "false";
+        /// Whether each function is tested against a constant.
+        constancy_test: Option<bool>, example "true", default "false";
         /// Experiments that might be made next.
         candidates: Option<Vec<CandidateSpec>>,
             example "[{name: again, initial: {displacement: 3.3, velocity: 1.0}}]",

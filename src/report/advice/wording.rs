@@ -75,7 +75,7 @@ impl fmt::Display for Advice {
             } => {
                 write!(f, "{of} free values, {seen} of them visible at most: ")?;
                 if *can_be_simpler {
-                    f.write_str("fewer (knots), or add `smooth`; ")?;
+                    f.write_str("fewer (knots), or add a `penalty`; ")?;
                 }
                 f.write_str("`kmcfit study` tells which are seen")
             }

@@ -83,7 +83,7 @@ impl Builder {
                 let problem = "an experiment that is held out cannot have functions of its own";
                 return Err(
                     BuildError::new(format!("experiments[{i}].functions"), problem)
-                        .found("`functions` beside `hold_out: true`")
+                        .found("`functions` beside `validation: true`")
                         .expected("the shared functions: they are what is to be tested"),
                 );
             }

@@ -33,15 +33,23 @@ pub enum PenaltyWeight {
     Period,
 }
 
-/// Penalty `weight * integral (d^order (p - reference)/dt^order)^2 dt`; a reference is for order 0 only.
+/// Penalty on a coefficient function p, added to J.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smoothness {
-    /// Order of the derivative: 0, 1 or 2.
-    pub order: usize,
-    /// Weight.
-    pub weight: PenaltyWeight,
-    /// Values that a penalty of order 0 pulls towards; zero without.
-    pub reference: Option<Limit>,
+pub enum PenaltySpec {
+    /// `weight * integral (d^order (p - reference)/dt^order)^2 dt`.
+    Tikhonov {
+        /// Order of the derivative: 0, 1 or 2.
+        order: usize,
+        /// Weight.
+        weight: PenaltyWeight,
+        /// Values that a penalty of order 0 pulls towards; zero without. Other orders have none.
+        reference: Option<Limit>,
+    },
+    /// `weight * total variation of p`: a jump costs no more than a slow change.
+    TotalVariation {
+        /// Weight.
+        weight: f64,
+    },
 }
 
 /// Known, or estimated in a basis.
@@ -58,8 +66,7 @@ pub struct CoefficientSpec {
     form: Form,
     pub(super) min: Option<Limit>,
     pub(super) max: Option<Limit>,
-    pub(super) smooth: Vec<Smoothness>,
-    pub(super) variation: Option<f64>,
+    pub(super) penalties: Vec<PenaltySpec>,
     pub(super) width: Option<f64>,
 }
 
@@ -69,8 +76,7 @@ impl CoefficientSpec {
             form,
             min: None,
             max: None,
-            smooth: Vec::new(),
-            variation: None,
+            penalties: Vec::new(),
             width: None,
         }
     }
@@ -155,27 +161,26 @@ impl CoefficientSpec {
         self
     }
 
-    /// Penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2; several add up.
+    /// Tikhonov penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2.
     #[must_use]
-    pub fn smooth(self, order: usize, weight: f64) -> Self {
-        self.smoothness(Smoothness {
+    pub fn tikhonov(self, order: usize, weight: f64) -> Self {
+        self.penalty(PenaltySpec::Tikhonov {
             order,
             weight: PenaltyWeight::Given(weight),
             reference: None,
         })
     }
 
-    /// A penalty on a derivative; several add up.
-    #[must_use]
-    pub fn smoothness(mut self, penalty: Smoothness) -> Self {
-        self.smooth.push(penalty);
-        self
-    }
-
     /// Penalty `weight * total variation`: a jump costs no more than a slow change.
     #[must_use]
-    pub fn variation(mut self, weight: f64) -> Self {
-        self.variation = Some(weight);
+    pub fn total_variation(self, weight: f64) -> Self {
+        self.penalty(PenaltySpec::TotalVariation { weight })
+    }
+
+    /// A penalty; several add up.
+    #[must_use]
+    pub fn penalty(mut self, penalty: PenaltySpec) -> Self {
+        self.penalties.push(penalty);
         self
     }
 
@@ -225,13 +230,12 @@ impl CoefficientSpec {
         let given = [
             ("min", self.min.is_some()),
             ("max", self.max.is_some()),
-            ("smooth", !self.smooth.is_empty()),
-            ("variation", self.variation.is_some()),
+            ("penalty", !self.penalties.is_empty()),
         ];
         if let Some((name, _)) = given.iter().find(|(_, given)| *given)
             && !self.is_estimated()
         {
-            let problem = "a fixed function cannot be limited or smoothed";
+            let problem = "a fixed function has neither bounds nor penalties";
             return Err(BuildError::new(format!("{key}.{name}"), problem)
                 .found(format!("`fixed` and `{name}`"))
                 .expected("one of the two"));
@@ -245,34 +249,41 @@ impl CoefficientSpec {
         bound("min", &self.min)?;
         bound("max", &self.max)?;
         uncrossed(key, self.min.as_ref(), self.max.as_ref(), grid)?;
-        for (i, penalty) in self.smooth.iter().enumerate() {
-            penalty.check(&format!("{key}.smooth[{i}]"), grid)?;
+        for (i, penalty) in self.penalties.iter().enumerate() {
+            penalty.check(&format!("{key}.penalty[{i}]"), grid)?;
         }
-        match self.variation {
-            Some(weight) => check_weight(&format!("{key}.variation.weight"), weight),
-            None => Ok(()),
-        }
+        Ok(())
     }
 }
 
-impl Smoothness {
+impl PenaltySpec {
     fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
-        if self.order > HIGHEST_ORDER {
+        let (order, weight, reference) = match self {
+            Self::TotalVariation { weight } => {
+                return check_weight(&format!("{key}.weight"), *weight);
+            }
+            Self::Tikhonov {
+                order,
+                weight,
+                reference,
+            } => (*order, *weight, reference),
+        };
+        if order > HIGHEST_ORDER {
             let problem = "this derivative cannot be penalised";
             return Err(BuildError::new(format!("{key}.order"), problem)
-                .found(self.order)
+                .found(order)
                 .expected("0 (the value), 1 (the slope) or 2 (the curvature)"));
         }
-        if let PenaltyWeight::Given(weight) = self.weight {
+        if let PenaltyWeight::Given(weight) = weight {
             check_weight(&format!("{key}.weight"), weight)?;
         }
         let at = format!("{key}.reference");
-        match &self.reference {
-            Some(_) if self.order > 0 => Err(BuildError::new(
+        match reference {
+            Some(_) if order > 0 => Err(BuildError::new(
                 &at,
                 "only a penalty of order 0 has a reference",
             )
-            .found(format!("a reference with order {}", self.order))
+            .found(format!("a reference with order {order}"))
             .expected("no `reference`, or `order: 0`")),
             Some(reference) => values_at_nodes(reference, &at, grid.nodes()).map(drop),
             None => Ok(()),

@@ -96,8 +96,8 @@ fn check_offsets(
     if !(estimated && problem.experiments.iter().all(shifted)) {
         return Ok(());
     }
-    let problem = "the offset of the force and those of the sensors cannot both be estimated: a shifted motion looks the same";
-    Err(BuildError::new("functions.offset", problem)
+    let problem = "a static force and the offsets of the sensors cannot both be estimated: a shifted response looks the same";
+    Err(BuildError::new("functions.static_force", problem)
         .found("no known offset, initial displacement or prior")
         .expected("a number for one of them, or a `prior`"))
 }

@@ -41,7 +41,7 @@ mod place;
 mod record;
 
 pub use basis::{BasisSpec, Knots};
-pub use coefficient::{CoefficientSpec, PenaltyWeight, Smoothness, Start};
+pub use coefficient::{CoefficientSpec, PenaltySpec, PenaltyWeight, Start};
 pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
 pub use notice::BuildNotice;
@@ -297,9 +297,7 @@ impl Builder {
         let problem = Problem::new(system, functions.with_scalars(scalars), experiments);
         let mut problem = problem.map_err(|why| BuildError::new("functions", why.to_string()))?;
         let measured = self.measurements(&problem, &mut notices)?;
-        let weight_search =
-            self.penalize_roughness(&mut problem, measured.as_ref(), &mut notices)?;
-        self.penalize_variation(&mut problem)?;
+        let weight_search = self.add_penalties(&mut problem, measured.as_ref(), &mut notices)?;
         let mut rows = Vec::new();
         for slot in self.slots() {
             let assembly = slot.owner.map_or(0, |i| assemblies.of_record[i]);
@@ -326,7 +324,7 @@ impl Builder {
         if !self.records.is_empty() && self.records.iter().all(|r| r.validation) {
             let problem = "every experiment is held out of the fit";
             return Err(BuildError::new("experiments", problem)
-                .found("`hold_out: true` in all of them")
+                .found("`validation: true` in all of them")
                 .expected("at least one experiment without"));
         }
         for (i, record) in self.records.iter().enumerate() {

@@ -1,7 +1,8 @@
-//! Penalties of a builder: roughness and total variation of its functions.
+//! Penalties of a builder: Tikhonov penalties and total variation of its functions.
 
-use super::coefficient::{PenaltyWeight, Smoothness, values_at_nodes};
+use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
+use crate::constraints::Limit;
 use crate::functions::{Basis, Design, Penalty, Variation};
 use crate::problem::Problem;
 use crate::record::Weighting;
@@ -17,8 +18,8 @@ pub struct WeightSearch {
 }
 
 impl Builder {
-    /// Adds the penalties on roughness to the problem; those whose weight is to be chosen have weight 1.
-    pub(super) fn penalize_roughness(
+    /// Adds the penalties to the problem; those whose weight is to be chosen have weight 1.
+    pub(super) fn add_penalties(
         &self,
         problem: &mut Problem,
         measured: Option<&Measurements>,
@@ -29,33 +30,52 @@ impl Builder {
             let Some(basis) = problem.functions.get(j).basis.clone() else {
                 continue;
             };
-            for (i, spec) in slot.spec.smooth.iter().enumerate() {
-                let key = format!("{}.smooth[{i}]", slot.key);
-                let weight = match spec.weight {
+            for (i, spec) in slot.spec.penalties.iter().enumerate() {
+                let key = format!("{}.penalty[{i}]", slot.key);
+                let (order, weight, reference) = match spec {
+                    PenaltySpec::Tikhonov {
+                        order,
+                        weight,
+                        reference,
+                    } => (*order, *weight, reference.as_ref()),
+                    PenaltySpec::TotalVariation { weight } => {
+                        penalize_variation(problem, (j, &basis), &key, *weight)?;
+                        continue;
+                    }
+                };
+                let factor = match weight {
                     PenaltyWeight::Given(weight) => weight,
                     PenaltyWeight::Period => {
-                        self.check_period(&key, spec)?;
-                        measured.map_or(0.0, |m| m.period_weight(problem, j, spec.order))
+                        self.check_period(&key, order)?;
+                        measured.map_or(0.0, |m| m.period_weight(problem, j, order))
                     }
                     PenaltyWeight::Rule(rule) => {
                         self.check_rule(&key, rule, search.as_ref())?;
                         1.0
                     }
                 };
-                let penalty = penalty(problem, (j, &basis), &key, spec, weight)?;
+                let mut penalty = Penalty::new(
+                    j,
+                    order,
+                    factor,
+                    basis.roughness(&problem.oscillator.grid, order),
+                );
+                if let Some(reference) = reference {
+                    penalty.target = target(problem, &basis, &key, reference, &penalty)?;
+                }
                 if penalty.target.is_empty() {
                     let basis = basis.name();
                     notices.push(BuildNotice::NoRoughness { key, basis });
                     continue;
                 }
-                if let PenaltyWeight::Rule(rule) = spec.weight {
+                if let PenaltyWeight::Rule(rule) = weight {
                     let search = search.get_or_insert_with(|| WeightSearch {
                         rule,
                         penalties: Vec::new(),
                     });
                     search.penalties.push(problem.penalties.len());
                 }
-                if weight > 0.0 {
+                if factor > 0.0 {
                     let added = problem.penalize(penalty);
                     added.map_err(|why| BuildError::new(&key, why.to_string()))?;
                 }
@@ -64,26 +84,8 @@ impl Builder {
         Ok(search)
     }
 
-    /// Adds the penalties on total variation to the problem.
-    pub(super) fn penalize_variation(&self, problem: &mut Problem) -> Result<(), BuildError> {
-        let grid = problem.oscillator.grid;
-        for (function, slot) in self.slots().iter().enumerate() {
-            let weight = slot.spec.variation.filter(|weight| *weight > 0.0);
-            let basis = problem.functions.get(function).basis.as_ref();
-            if let (Some(basis), Some(weight)) = (basis, weight) {
-                let added = problem.penalize_variation(Variation {
-                    function,
-                    weight,
-                    rows: Design::Sparse(basis.changes(&grid)),
-                });
-                added.map_err(|why| BuildError::new(&slot.key, why.to_string()))?;
-            }
-        }
-        Ok(())
-    }
-
     /// Refuses the rule `period` where it has no meaning.
-    fn check_period(&self, key: &str, spec: &Smoothness) -> Result<(), BuildError> {
+    fn check_period(&self, key: &str, order: usize) -> Result<(), BuildError> {
         if !self.is_equation_error() {
             let problem = "the rule `period` is a rule of the method `equation-error` alone";
             return Err(BuildError::new(format!("{key}.weight"), problem)
@@ -92,7 +94,7 @@ impl Builder {
                     "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
                 ));
         }
-        if spec.order == 0 {
+        if order == 0 {
             let problem = "the rule `period` is about a derivative";
             return Err(BuildError::new(format!("{key}.order"), problem)
                 .found(0)
@@ -143,26 +145,41 @@ fn is_unknown(weighting: &Weighting) -> bool {
     !matches!(weighting, Weighting::Sigma(_) | Weighting::Sigmas(_))
 }
 
-fn penalty(
-    problem: &Problem,
+/// Adds a penalty on total variation to the problem.
+fn penalize_variation(
+    problem: &mut Problem,
     (function, basis): (usize, &Basis),
     key: &str,
-    spec: &Smoothness,
     weight: f64,
-) -> Result<Penalty, BuildError> {
-    let grid = &problem.oscillator.grid;
-    let rows = basis.roughness(grid, spec.order);
-    let mut penalty = Penalty::new(function, spec.order, weight, rows);
-    if let Some(reference) = &spec.reference {
-        let key = format!("{key}.reference");
-        let values = values_at_nodes(reference, &key, grid.nodes())?;
-        // The part of the reference outside the basis adds a constant to the cost and nothing else.
-        let nearest = basis.project(grid, &values).ok_or_else(|| {
-            BuildError::new(&key, "the reference cannot be turned into this basis")
-                .found(format!("`{}`", basis.name()))
-                .expected("a basis whose functions the nodes can tell apart")
-        })?;
-        penalty.target = penalty.residuals(&nearest);
+) -> Result<(), BuildError> {
+    if weight == 0.0 {
+        return Ok(());
     }
-    Ok(penalty)
+    let rows = Design::Sparse(basis.changes(&problem.oscillator.grid));
+    let added = problem.penalize_variation(Variation {
+        function,
+        weight,
+        rows,
+    });
+    added.map_err(|why| BuildError::new(key, why.to_string()))
+}
+
+/// Residuals of a penalty at its reference.
+fn target(
+    problem: &Problem,
+    basis: &Basis,
+    key: &str,
+    reference: &Limit,
+    penalty: &Penalty,
+) -> Result<Vec<f64>, BuildError> {
+    let grid = &problem.oscillator.grid;
+    let key = format!("{key}.reference");
+    let values = values_at_nodes(reference, &key, grid.nodes())?;
+    // The part of the reference outside the basis adds a constant to the cost and nothing else.
+    let nearest = basis.project(grid, &values).ok_or_else(|| {
+        BuildError::new(&key, "the reference cannot be turned into this basis")
+            .found(format!("`{}`", basis.name()))
+            .expected("a basis whose functions the nodes can tell apart")
+    })?;
+    Ok(penalty.residuals(&nearest))
 }

@@ -64,7 +64,14 @@ const NAMES: [[&str; 6]; 7] = [
         "N m",
         "coulomb_friction_N_m",
     ],
-    ["offset", "F_0", "N", "offset_N", "N m", "offset_N_m"],
+    [
+        "static_force",
+        "F_0",
+        "N",
+        "static_force_N",
+        "N m",
+        "static_force_N_m",
+    ],
 ];
 
 impl CoefficientKind {

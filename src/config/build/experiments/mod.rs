@@ -85,7 +85,7 @@ fn is_equation_error(file: &ModelFile) -> bool {
 
 /// Whether an experiment is kept out of the fit.
 pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
-    spec.hold_out == Some(true)
+    spec.validation == Some(true)
 }
 
 /// Reads the files of all experiments; `None` where there is none to be read.
@@ -98,7 +98,7 @@ pub(super) fn read(
     if specs.iter().all(is_held_out) {
         return Err(file
             .error_at("experiments", "every experiment is held out of the fit")
-            .found("`hold_out: true` in all of them")
+            .found("`validation: true` in all of them")
             .expected("at least one experiment without"));
     }
     if matches!(purpose, Purpose::Simulate { .. }) {

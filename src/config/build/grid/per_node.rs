@@ -105,7 +105,7 @@ fn free_values((_, spec): &Given) -> FreeValues {
 /// Whether inequalities or total variation may take a quadratic program.
 fn has_programs(file: &ModelFile, functions: &[Given]) -> bool {
     let limited =
-        |(_, spec): &Given| spec.min.is_some() || spec.max.is_some() || spec.variation.is_some();
+        |(_, spec): &Given| spec.min.is_some() || spec.max.is_some() || spec.has_total_variation();
     file.spec.constraints.is_some() || functions.iter().any(limited)
 }
 
@@ -129,7 +129,7 @@ mod tests {
     fn the_estimate_is_above_what_was_measured() {
         let nodal = "{basis: nodal, start: 1.0}";
         let constant = "{basis: constant, start: 1.0}";
-        let variation = "{basis: nodal, start: 1.0, variation: {weight: 0.01}}";
+        let variation = "{basis: nodal, start: 1.0, penalty: {kind: tv, weight: 0.01}}";
         let measured = [
             (constant, "lbfgs", 439),
             (nodal, "lbfgs", 1649),

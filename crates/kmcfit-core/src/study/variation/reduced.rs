@@ -169,12 +169,12 @@ mod tests {
         let record = Record::new("decay").displacement(&times, &readings);
         let parts = [
             CoefficientSpec::piecewise_linear(5, 1.0)
-                .smooth(1, 0.3)
+                .tikhonov(1, 0.3)
                 .min(0.1),
             CoefficientSpec::piecewise_linear(4, 0.2)
-                .smooth(0, 0.7)
-                .smooth(2, 0.2),
-            CoefficientSpec::piecewise_constant(6, 1.7).variation(0.4),
+                .tikhonov(0, 0.7)
+                .tikhonov(2, 0.2),
+            CoefficientSpec::piecewise_constant(6, 1.7).total_variation(0.4),
         ];
         let value = |of, value| Statement::Mean { of, value };
         Builder::new(parts)

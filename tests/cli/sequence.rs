@@ -103,15 +103,15 @@ fn one_command_tells_what_finds_the_device() {
     assert_eq!(document["left_out"], Value::Array(Vec::new()));
 }
 
-/// The key `story` is found in every style of YAML.
+/// The key `sequence` is found in every style of YAML.
 #[test]
-fn a_story_in_flow_style() {
+fn a_sequence_in_flow_style() {
     let bench = Workbench::with_shipped_models();
     for text in [
-        "{format: 1, title: T, story: [nowhere.yaml]}\n",
-        "{\"format\": 1, \"story\": [\"nowhere.yaml\"]}\n",
-        "format: 1\n'story': [nowhere.yaml]\n",
-        "format: 1\n? story\n: [nowhere.yaml]\n",
+        "{format: 1, title: T, sequence: [nowhere.yaml]}\n",
+        "{\"format\": 1, \"sequence\": [\"nowhere.yaml\"]}\n",
+        "format: 1\n'sequence': [nowhere.yaml]\n",
+        "format: 1\n? sequence\n: [nowhere.yaml]\n",
     ] {
         bench.write("models/flow.yaml", text);
         let (code, _, said) = bench.run(&["study", "models/flow.yaml"]);
