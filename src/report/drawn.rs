@@ -1,8 +1,8 @@
 //! The figures of a fit, from the run.
 
 use super::FittedModel;
-use super::figure::Figure;
-use super::figures::{self, FunctionCurve, RatioCurves};
+use super::chart::Figure;
+use super::figures::{self, FunctionCurve};
 use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
 use kmcfit_core::internals::identifiability::{Band, Bands};
 use kmcfit_core::internals::solvers::IterationRecord;
@@ -154,12 +154,7 @@ impl FittedModel<'_> {
         let bands = self
             .bands()
             .map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
-        figures::ratios(
-            &times,
-            &curves(&found),
-            truth.as_ref().map(curves).as_ref(),
-            &bands,
-        )
+        figures::ratios(&times, &found, truth.as_ref(), &bands)
     }
 }
 
@@ -187,13 +182,4 @@ pub(super) fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>
     list.iter()
         .map(|band| [side(band, 0), side(band, 1)])
         .collect()
-}
-
-fn curves(ratios: &Ratios) -> RatioCurves<'_> {
-    RatioCurves {
-        k_over_m: &ratios.k_over_m,
-        c_over_m: &ratios.c_over_m,
-        frequency: &ratios.frequency,
-        damping_ratio: &ratios.damping_ratio,
-    }
 }

@@ -5,9 +5,8 @@ use super::figures::{self, style};
 use super::measures::Measures;
 use super::table::{Row, known_rows};
 use super::{CLOSE, Comparison, MATCHED, RECOVERED};
-use crate::report::mark::Style;
+use crate::report::chart::{Style, sample};
 use crate::report::page as shell;
-use crate::report::svg::sample;
 use crate::report::text::{escape, prose};
 
 pub(super) fn page(comparison: &Comparison) -> String {
