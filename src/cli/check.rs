@@ -1,6 +1,6 @@
 //! `kmcfit check`
 
-use super::{Failure, NOT_CONVERGED, OK, Overrides, inputs, print, say, unwritable};
+use super::{Failure, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
 use crate::config::{Model, Purpose, build};
 use crate::report::figures::{self, GradientCurve};
 use crate::report::{CsvTable, render};
@@ -98,12 +98,7 @@ const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, Purpose::Fit)?;
-    for remark in &model.remarks {
-        say("note", remark);
-    }
-    for warning in &model.warnings {
-        say("warning", warning);
-    }
+    announce(&model);
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         print(&describe(&model));
         return Ok(OK);

@@ -20,7 +20,7 @@ mod shell;
 mod simulate;
 mod study;
 
-use crate::config::ModelFile;
+use crate::config::{Model, ModelFile};
 use crate::error::{InputError, Place};
 use clap::{CommandFactory, Parser, Subcommand};
 use environment::{check_arithmetic, provide_host};
@@ -134,6 +134,12 @@ pub fn main() -> ExitCode {
         true => BAD_INPUT,
         false => code,
     })
+}
+
+/// Prints the notes and warnings of a model.
+fn announce(model: &Model) {
+    model.remarks.iter().for_each(|remark| say("note", remark));
+    (model.warnings.iter()).for_each(|warning| say("warning", warning));
 }
 
 fn exit_code(status: Status) -> u8 {

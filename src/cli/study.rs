@@ -1,10 +1,10 @@
 //! `kmcfit study`
 
-use super::compare::{children, claim, entries, files_of, side_by_side, verdict};
-use super::fit::{note_discarded, search};
+use super::compare::{open_analyses, tell};
+use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, OK, Overrides, analyses, inputs, interrupt, print, say, stem,
+    Failure, NOT_CONVERGED, OK, Overrides, analyses, announce, inputs, interrupt, print, say, stem,
     unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
@@ -100,66 +100,6 @@ fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     }
 }
 
-/// Runs the models of a story and tells them on one page.
-fn tell(path: &Path, story: &Story, out: &Path, as_json: bool, go_on: bool) -> Result<u8, Failure> {
-    let entries = entries(&story.models, out)?;
-    let mut heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
-    for model in &story.models {
-        heading = heading.with_model(&ModelFile::read(model)?);
-    }
-    let flag = interrupt::flag();
-    let mut read = files_of(&entries);
-    read.push(path.into());
-    let folder = OutputFolder::prepare(out, claim("study", STUDY_JOURNAL).inputs(read))?;
-    let children = children(&entries, &folder)?;
-    let mut journal = journal(&folder, &heading, go_on)?;
-    let (comparison, interrupted) = side_by_side(entries, children, &flag, &mut journal, go_on)?;
-    let comparison = match interrupted {
-        true => comparison,
-        false => comparison.told_as(&story.title),
-    };
-    let written = comparison
-        .write(&folder)
-        .and_then(|()| journal.finish_if(!interrupted));
-    written.map_err(|error| unwritable(folder.path(), &error))?;
-    if as_json {
-        print(&json(&comparison.document()));
-    } else {
-        print(&format!("{}\n\n", story.title));
-        if interrupted {
-            print("interrupted: the story is not complete, so nothing is concluded from it\n");
-        } else {
-            for sentence in comparison.conclusions() {
-                print(&format!("- {sentence}\n"));
-            }
-        }
-        print(&format!(
-            "\nthe page is {}\n",
-            folder.path().join("compare.html").display()
-        ));
-    }
-    Ok(match interrupted {
-        true => interrupt::exit_code(),
-        false => verdict(&comparison),
-    })
-}
-
-/// The journal of a study: resumed, which is refused where a model has changed, or begun.
-fn journal(
-    folder: &OutputFolder,
-    heading: &Heading,
-    go_on: bool,
-) -> Result<AnalysisJournal, InputError> {
-    match go_on {
-        true => AnalysisJournal::resume(folder.path(), STUDY_JOURNAL, heading),
-        false => {
-            note_discarded(folder, heading)?;
-            AnalysisJournal::begin(folder.path(), STUDY_JOURNAL, heading)
-                .map_err(|error| unwritable(folder.path(), &error))
-        }
-    }
-}
-
 fn study(
     file: &ModelFile,
     out: &Path,
@@ -170,12 +110,7 @@ fn study(
     let mut model = build(file, Purpose::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
-    for remark in &model.remarks {
-        say("note", remark);
-    }
-    for warning in &model.warnings {
-        say("warning", warning);
-    }
+    announce(&model);
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));
     let heading = Heading::of_model("study", file, true, None);
@@ -183,7 +118,7 @@ fn study(
         .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
         .inputs(inputs(file));
     let folder = OutputFolder::prepare(out, claim)?;
-    let journal = journal(&folder, &heading, go_on)?;
+    let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, go_on)?;
     let mut work = Work {
         model: &model,
         folder: folder.path(),
