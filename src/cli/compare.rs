@@ -2,7 +2,7 @@
 
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
-use super::{Failure, NOT_CONVERGED, OK, inputs, interrupt, print, say, unwritable};
+use super::{Failure, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable};
 use crate::config::{Model, ModelFile, Purpose, Story, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
@@ -400,8 +400,7 @@ fn stem(path: &Path) -> String {
 
 /// Whether every run ended as asked for.
 fn verdict(comparison: &Comparison) -> u8 {
-    let fine = [Status::Converged, Status::Completed].map(Status::name);
-    let all = (comparison.measures().iter()).all(|m| fine.contains(&m.status.as_str()));
+    let all = (comparison.measures().iter()).all(|m| exit_code(m.status) == OK);
     match all && comparison.left_out().is_empty() {
         true => OK,
         false => NOT_CONVERGED,

@@ -4,8 +4,8 @@ use super::compare::{open_analyses, tell};
 use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, OK, Overrides, analyses, announce, inputs, interrupt, print, say, stem,
-    unwritable,
+    Failure, NOT_CONVERGED, Overrides, analyses, announce, exit_code, inputs, interrupt, print,
+    say, stem, unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
@@ -162,12 +162,10 @@ fn study(
             ));
         }
     }
-    let fitted = document.fit.as_ref().map(|fit| fit.status.as_str());
-    let fine = [Status::Converged, Status::Completed].map(Status::name);
-    Ok(match (done, fitted) {
+    Ok(match (done, &document.fit) {
         (false, _) => interrupt::exit_code(),
-        (true, Some(status)) if fine.contains(&status) => OK,
-        (true, _) => NOT_CONVERGED,
+        (true, Some(fit)) => exit_code(fit.status),
+        (true, None) => NOT_CONVERGED,
     })
 }
 
@@ -366,7 +364,7 @@ impl Work<'_> {
         };
         let fit = fitted.map_err(Trouble::Numerical)?;
         FitJournal::clear(folder)?;
-        let interrupted = fit.status == Status::Interrupted.name();
+        let interrupted = fit.status == Status::Interrupted;
         let problem = analyses::as_fitted(&model.problem, &fit);
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);

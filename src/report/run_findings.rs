@@ -86,7 +86,7 @@ impl FittedModel<'_> {
             let summary = FunctionSummary {
                 unit: self.unit(function).into(),
                 is_rounding: largest > 0.0 && is_rounding(largest, sizes[i]),
-                verdict: judged.map(|j| j.verdict.name().into()),
+                verdict: judged.map(|j| (&j.verdict).into()),
                 known_range: judged.and_then(|j| j.known_range),
                 powers: self.powers(i),
                 standard_error: standard_error(function, range.start, self.known.covariance()),

@@ -2,10 +2,8 @@
 
 use super::advice::{self, Advice};
 use super::cost::CostKind;
-use super::document::ChannelSummary;
-use super::document::{Prediction, ResultDocument};
+use super::document::{ChannelSummary, Prediction, ResultDocument, VerdictKind};
 use crate::digits::significant;
-use kmcfit_core::internals::identifiability::Verdict;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
@@ -23,7 +21,8 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     writeln!(
         text,
         "{}: {}",
-        document.outcome.status, document.outcome.reason
+        document.outcome.status.name(),
+        document.outcome.reason
     )?;
     write_findings(text, document)?;
     write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
@@ -125,15 +124,14 @@ fn found(document: &ResultDocument) -> String {
     let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
     let function = |name: &str| {
         let f = document.functions.get(name)?;
-        let is = |verdict: &str| f.verdict.as_deref() == Some(verdict);
         if f.is_rounding {
             return Some(format!("{name} 0 {}", f.unit));
         }
-        if is(Verdict::NotSeen.name()) {
+        if f.verdict == Some(VerdictKind::NotSeen) {
             return Some(format!("{name} not seen"));
         }
         let (range, seen) = match f.known_range {
-            Some(range) if is(Verdict::OnlyOn(Vec::new()).name()) => (range, " where it is seen"),
+            Some(range) if f.verdict == Some(VerdictKind::OnlyOn) => (range, " where it is seen"),
             _ => ([f.min, f.max], ""),
         };
         let [low, high] = range.map(short);
@@ -323,7 +321,7 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        let is_seen = function.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        let is_seen = function.verdict != Some(VerdictKind::NotSeen);
         match function.standard_error.filter(|_| !function.is_rounding) {
             _ if !is_seen => write!(text, "  not seen")?,
             Some(error) => write!(text, "  +- {error:.2e}")?,
@@ -378,7 +376,7 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
             "from the {}: {cost} after {} ({})",
             rung.start,
             count(rung.iterations as usize, "iteration"),
-            rung.status
+            rung.status.name()
         )?;
     }
     Ok(())

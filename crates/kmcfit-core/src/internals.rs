@@ -76,8 +76,8 @@ pub mod solvers {
         Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
         Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
         WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error, fit,
-        fit_from, fit_with_noise, fit_with_noise_watched, predict_held_out, states_from_readings,
-        timed, without_motion,
+        fit_from, fit_with_noise, fit_with_noise_watched, number_or_nan, predict_held_out,
+        states_from_readings, timed, without_motion,
     };
 }
 pub mod study {

@@ -24,7 +24,7 @@ pub fn fit(problem: &Problem, fit: &Fit) -> FitPiece {
         _ => None,
     };
     FitPiece {
-        status: fit.outcome.status.name().into(),
+        status: fit.outcome.status,
         reason: fit.outcome.reason.to_string(),
         cost: fit.best.evaluation.cost,
         misfit: fit.best.evaluation.misfit,

@@ -2,8 +2,9 @@
 
 mod wording;
 
-use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultDocument};
-use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
+use super::cost::CostKind;
+use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
 use kmcfit_core::internals::system::Method;
@@ -48,7 +49,7 @@ pub enum Advice {
         /// Whether its sigma is known.
         has_sigma: bool,
         /// The pattern.
-        pattern: PatternSummary,
+        pattern: ResidualPattern,
     },
     /// A larger sigma.
     LargerSigma {
@@ -146,7 +147,7 @@ pub fn next(document: &ResultDocument) -> Vec<Advice> {
 }
 
 fn is_simulated(document: &ResultDocument) -> bool {
-    document.model.method != Solver::EquationError.name()
+    document.model.cost_kind != CostKind::EquationError
 }
 
 /// A function that varies no more than noise lets a constant vary.
@@ -162,7 +163,7 @@ fn about_constants(document: &ResultDocument) -> Option<Advice> {
 
 /// Whether the iterations ran out on a model that is wrong: where it is right, steps of Gauss and Newton need few.
 fn wanders(document: &ResultDocument) -> bool {
-    document.outcome.status == Status::MaxIterations.name()
+    document.outcome.status == Status::MaxIterations
         && document.model.method == Solver::GaussNewton.name()
         && worst_fit(document).is_some_and(|worst| worst < POOR)
 }
@@ -277,22 +278,17 @@ fn about_residuals(document: &ResultDocument) -> Option<Advice> {
 }
 
 fn about_ending(document: &ResultDocument) -> Option<Advice> {
-    let status = document.outcome.status.as_str();
-    let is = |s: Status| s.name() == status;
-    Some(match () {
-        () if is(Status::MaxIterations) => {
-            Advice::MoreIterations(10 * document.counts.iterations.max(1))
-        }
-        () if is(Status::TimeLimit) => Advice::MoreTime,
-        () if is(Status::Interrupted) => Advice::Resume,
-        () if is(Status::Stalled) && document.model.method != Solver::GaussNewton.name() => {
-            Advice::AnotherMethod
-        }
-        () if is(Status::Stalled) || is(Status::Infeasible) || is(Status::Failed) => {
-            Advice::AnotherStart
-        }
-        () => return None,
-    })
+    let is_newton = document.model.method == Solver::GaussNewton.name();
+    match document.outcome.status {
+        Status::MaxIterations => Some(Advice::MoreIterations(
+            10 * document.counts.iterations.max(1),
+        )),
+        Status::TimeLimit => Some(Advice::MoreTime),
+        Status::Interrupted => Some(Advice::Resume),
+        Status::Stalled if !is_newton => Some(Advice::AnotherMethod),
+        Status::Stalled | Status::Infeasible | Status::Failed => Some(Advice::AnotherStart),
+        Status::Converged | Status::Completed => None,
+    }
 }
 
 /// A share in per cent; one far below zero in powers of ten.

@@ -6,6 +6,7 @@ use super::verdict;
 use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
+use kmcfit_core::internals::solvers::Status;
 use kmcfit_core::internals::system::NodalCoefficients;
 use serde::Serialize;
 
@@ -17,7 +18,7 @@ pub struct Measures {
     /// Title of the model.
     pub title: String,
     /// How the run ended, in one word.
-    pub status: String,
+    pub status: Status,
     /// How the run ended, in one sentence.
     pub reason: String,
     /// What the numbers mean, in one line.
@@ -75,7 +76,7 @@ impl Measures {
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
-            status: document.outcome.status.clone(),
+            status: document.outcome.status,
             reason: document.outcome.reason.clone(),
             verdict: verdict::verdict(run, errors.as_ref()),
             true_device: errors.as_ref().map(Errors::within_truth),

@@ -89,7 +89,7 @@ fn card(run: &Measures, look: Style) -> String {
         escape(&run.name),
         escape(&run.title),
         prose(&capital(&run.verdict)),
-        escape(&run.status),
+        run.status.name(),
         prose(&run.reason),
     );
     if !run.knowledge.is_empty() {

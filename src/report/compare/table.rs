@@ -125,7 +125,7 @@ fn rows(runs: &[Measures]) -> Vec<Row> {
     let metre = units.metre;
     let error = |of: fn(&Errors) -> f64| move |m: &Measures| m.errors.as_ref().map(of);
     let mut t = Rows::of(runs);
-    t.add("status", "status", |m| m.status.clone());
+    t.add("status", "status", |m| m.status.name().to_owned());
     t.add("method", "method", |m| m.method.clone());
     t.add("nodes", "nodes", |m| m.nodes as u64);
     t.add("free values", "parameters", |m| m.parameters as u64);

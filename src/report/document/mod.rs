@@ -3,27 +3,21 @@
 mod channel;
 mod search;
 
-pub use channel::{
-    ChannelSummary, HoldOutSummary, IgnoredSummary, PatternSummary, RefinedSummary, ScalarSummary,
-    StatisticsSummary,
-};
+pub use channel::{ChannelSummary, HoldOutSummary, IgnoredSummary, ScalarSummary};
 pub use search::{PathSummary, RungSummary, WeightSummary};
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
+use kmcfit_core::internals::assessment::{FitStatistics, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::Verdict;
+use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
 use kmcfit_core::internals::system::Grid;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the document's format.
 pub const FORMAT: u32 = 1;
-
-/// A number that left the range of floating-point numbers stands as `null` in JSON, which has no word
-/// for it: it is read back as not a number.
-pub(super) fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
 
 /// The whole document.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +39,7 @@ pub struct ResultDocument {
     /// How far the best point is from the first-order condition of a minimum under the constraints; absent where the fit did not
     /// come to an end, where J is zero, and where the linearised problem could not be solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub optimality: Option<OptimalitySummary>,
+    pub optimality: Option<Optimality>,
     /// Work done; one count is one pass over all experiments.
     pub counts: CountsSummary,
     /// Wall-clock time of the fit, s. Two runs of one model differ in this and in `timings` only.
@@ -77,10 +71,10 @@ pub struct ResultDocument {
     pub scalars: Vec<ScalarSummary>,
     /// All readings together.
     #[serde(default)]
-    pub statistics: StatisticsSummary,
+    pub statistics: FitStatistics,
     /// The optimum on a grid of half the step; `null` where it has no motion there.
     #[serde(default)]
-    pub half_step: Option<RefinedSummary>,
+    pub half_step: Option<StepCheck>,
     /// The motion of the found device from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
@@ -140,8 +134,8 @@ impl ModelSummary {
 /// How the run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutcomeSummary {
-    /// One of the words of [`kmcfit_core::internals::solvers::Status`].
-    pub status: String,
+    /// In one word.
+    pub status: Status,
     /// In one sentence.
     pub reason: String,
 }
@@ -150,19 +144,19 @@ pub struct OutcomeSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CostSummary {
     /// At the start.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub initial: f64,
     /// At the best point.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub r#final: f64,
     /// `final / initial`.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub ratio: f64,
     /// Part of `final` from the readings.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub misfit: f64,
     /// Part of `final` from the regularisation.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub regularisation: f64,
 }
 
@@ -170,33 +164,11 @@ pub struct CostSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GradientSummary {
     /// At the start.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub initial_norm_squared: f64,
     /// At the best point.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub final_norm_squared: f64,
-}
-
-/// The first-order condition of a minimum under the constraints, measured at the best point by the linearised problem
-/// ([`kmcfit_core::internals::solvers::Optimality`]). All numbers have no unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OptimalitySummary {
-    /// The share of J by which the solution of the linearised problem promises to lower it.
-    #[serde(deserialize_with = "number_or_null")]
-    pub stationarity: f64,
-    /// The largest change of a function that this solution asks for, relative to its size.
-    #[serde(deserialize_with = "number_or_null")]
-    pub step: f64,
-    /// Largest violation of a constraint relative to its row's scale.
-    #[serde(deserialize_with = "number_or_null")]
-    pub feasibility: f64,
-    /// Sum of the multipliers' sizes times the distances from the bounds, as a share of J.
-    #[serde(deserialize_with = "number_or_null")]
-    pub complementarity: f64,
-    /// A fit that says `converged` by its last steps has a `complementarity` and a `stationarity` or `step` of at most this, and
-    /// a `feasibility` of at most 1e-9. One that ended by a limit on J/J0 or G^2/G0^2 may have any.
-    #[serde(deserialize_with = "number_or_null")]
-    pub tolerance: f64,
 }
 
 /// Work done.
@@ -242,10 +214,10 @@ pub struct FunctionSummary {
     #[serde(default)]
     pub unit: String,
     /// Smallest value at a node.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub min: f64,
     /// Largest value at a node.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub max: f64,
     /// For a polynomial the factors `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i`
     /// in the unit of the function per s^i.
@@ -257,7 +229,7 @@ pub struct FunctionSummary {
     /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
     /// whose errors can be believed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<String>,
+    pub verdict: Option<VerdictKind>,
     /// Its smallest and largest value at the nodes where it is known, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub known_range: Option<[f64; 2]>,
@@ -277,6 +249,30 @@ pub struct FunctionSummary {
     pub truth_rms_error: Option<f64>,
 }
 
+/// The kind of a [`Verdict`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum VerdictKind {
+    Identified,
+    OnlyRatio,
+    OnlyOn,
+    NotSeen,
+    Fixed,
+}
+
+impl From<&Verdict> for VerdictKind {
+    fn from(verdict: &Verdict) -> Self {
+        match verdict {
+            Verdict::Identified { .. } => Self::Identified,
+            Verdict::OnlyRatio(_) => Self::OnlyRatio,
+            Verdict::OnlyOn(_) => Self::OnlyOn,
+            Verdict::NotSeen => Self::NotSeen,
+            Verdict::Fixed => Self::Fixed,
+        }
+    }
+}
+
 /// One experiment at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentSummary {
@@ -288,7 +284,7 @@ pub struct ExperimentSummary {
     /// Number of readings of all channels.
     pub readings: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
     /// How well each channel is matched.
     #[serde(default)]
@@ -399,9 +395,7 @@ impl FailureDocument {
             title: title.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             outcome: OutcomeSummary {
-                status: kmcfit_core::internals::solvers::Status::Failed
-                    .name()
-                    .into(),
+                status: Status::Failed,
                 reason: reason.into(),
             },
         }

@@ -3,11 +3,9 @@
 use super::table::{list, number, table};
 use crate::report::advice::{self, Advice};
 use crate::report::cost::CostKind;
-use crate::report::document::ChannelSummary;
-use crate::report::document::{FunctionSummary, ResultDocument};
+use crate::report::document::{ChannelSummary, FunctionSummary, ResultDocument, VerdictKind};
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use kmcfit_core::internals::identifiability::Verdict;
 use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
@@ -42,15 +40,14 @@ pub(super) fn opening(document: &ResultDocument) -> String {
 /// How it ended, as a coloured word and a reason.
 fn state(document: &ResultDocument) -> String {
     let outcome = &document.outcome;
-    let is = |status: Status| outcome.status == status.name();
-    let colour = match () {
-        () if is(Status::Converged) || is(Status::Completed) => "good",
-        () if is(Status::Failed) || is(Status::Infeasible) => "bad",
-        () => "warn",
+    let colour = match outcome.status {
+        Status::Converged | Status::Completed => "good",
+        Status::Failed | Status::Infeasible => "bad",
+        _ => "warn",
     };
     format!(
         "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
-        escape(&outcome.status),
+        outcome.status.name(),
         prose(&outcome.reason)
     )
 }
@@ -118,7 +115,7 @@ fn found(document: &ResultDocument) -> String {
     }
     let known = |x: Option<f64>| x.map_or(String::new(), number);
     let row = |(name, f): &(&str, &FunctionSummary)| {
-        let is_seen = f.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        let is_seen = f.verdict != Some(VerdictKind::NotSeen);
         let [low, high] = match (is_seen, f.is_rounding) {
             (false, _) => [String::new(), String::new()],
             (true, true) => [number(0.0), number(0.0)],
@@ -127,7 +124,7 @@ fn found(document: &ResultDocument) -> String {
         let error = f.standard_error.filter(|_| is_seen && !f.is_rounding);
         let mut cells = vec![name.to_string(), low, high, f.unit.clone()];
         cells.extend(has_error.then(|| known(error)));
-        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict.as_deref()).to_owned()));
+        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict).to_owned()));
         if has_truth {
             cells.extend([known(f.truth_max_error), known(f.truth_rms_error)]);
         }
@@ -137,15 +134,15 @@ fn found(document: &ResultDocument) -> String {
     table(&headings, &rows)
 }
 
-/// A verdict's name as a word of a table.
-fn verdict_in_words(verdict: Option<&str>) -> &'static str {
+/// A verdict as a word of a table.
+fn verdict_in_words(verdict: Option<VerdictKind>) -> &'static str {
     match verdict {
-        Some("identified") => "yes",
-        Some("only-ratio") => "only a ratio",
-        Some("only-on") => "at times",
-        Some("not-seen") => "not seen",
-        Some("fixed") => "given",
-        _ => "",
+        Some(VerdictKind::Identified) => "yes",
+        Some(VerdictKind::OnlyRatio) => "only a ratio",
+        Some(VerdictKind::OnlyOn) => "at times",
+        Some(VerdictKind::NotSeen) => "not seen",
+        Some(VerdictKind::Fixed) => "given",
+        None => "",
     }
 }
 
