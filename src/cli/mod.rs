@@ -1,6 +1,5 @@
 //! The command line: one file per command, no numerics.
 
-mod analyses;
 mod arguments;
 mod check;
 mod compare;

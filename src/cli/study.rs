@@ -4,12 +4,12 @@ use super::compare::{open_analyses, tell};
 use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, Overrides, analyses, announce, exit_code, inputs, interrupt, print,
-    say, stem, unwritable,
+    Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
+    unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
 use crate::error::{InputError, Place};
-use crate::report::study::{FitPiece, StudyDocument};
+use crate::report::study::{self, FitPiece, Optimum, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
         overrides.extend(arguments.set.parse()?);
         let file = ModelFile::read_with(&run.document.model.file, &overrides)?;
-        return study(&file, &out, arguments.json, threads, false);
+        return run_in(&file, &out, arguments.json, threads, false);
     }
     match Story::read(&arguments.model)? {
         Some(story) => {
@@ -66,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         }
         None => {
             let file = arguments.set.read(&arguments.model)?;
-            study(&file, &out, arguments.json, threads, false)
+            run_in(&file, &out, arguments.json, threads, false)
         }
     }
 }
@@ -82,7 +82,7 @@ pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Resul
         Some(story) => tell(&model, &story, folder, as_json, true),
         None => {
             let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
-            study(&file, folder, as_json, threads, true)
+            run_in(&file, folder, as_json, threads, true)
         }
     }
 }
@@ -100,7 +100,7 @@ fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     }
 }
 
-fn study(
+fn run_in(
     file: &ModelFile,
     out: &Path,
     as_json: bool,
@@ -212,9 +212,6 @@ impl From<io::Error> for Trouble {
     }
 }
 
-/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation there.
-type Optimum<'a> = (&'a Problem, &'a [f64], &'a Evaluation);
-
 /// A study at work.
 struct Work<'a> {
     model: &'a Model,
@@ -232,78 +229,71 @@ impl Work<'_> {
     /// All analyses, up to an interrupt.
     fn run(&mut self) -> Result<(), Trouble> {
         let (problem, theta, evaluation) = self.fit()?;
-        let optimum = (&problem, theta.as_slice(), &evaluation);
-        self.at_the_optimum(optimum)?;
-        self.further_fits(optimum)?;
-        self.extremes(optimum)
+        let at = Optimum {
+            problem: &problem,
+            theta: &theta,
+            evaluation: &evaluation,
+        };
+        self.at_the_optimum(at)?;
+        self.further_fits(at)?;
+        self.extremes(at)
     }
 
     /// Analyses of the linearised fit and of one number at a time.
-    fn at_the_optimum(&mut self, optimum: Optimum) -> Result<(), Trouble> {
-        let (problem, theta, evaluation) = optimum;
+    fn at_the_optimum(&mut self, at: Optimum) -> Result<(), Trouble> {
         let model = self.model;
         let plan = &model.study;
-        let spectrum = || analyses::spectrum(problem, theta, evaluation);
-        self.document.spectrum = Some(self.analysis("spectrum", spectrum)?);
-        let truth = model.truth.as_ref();
-        let bands = || analyses::bands(problem, theta, evaluation, plan, truth);
+        self.document.spectrum = Some(self.analysis("spectrum", || study::spectrum(at))?);
+        let bands = || study::bands(at, plan, model.truth.as_ref());
         self.document.bands = Some(self.analysis("bands", bands)?);
         for (i, target) in plan.profiles.iter().enumerate() {
-            let Some(of) = analyses::linear(problem, target) else {
+            let Some(of) = study::linear(at.problem, target) else {
                 continue;
             };
-            let profile = || analyses::profile_of(problem, theta, &of, plan);
+            let profile = || study::profile_of(at, &of, plan);
             let found = self.analysis(&format!("profile {i}"), profile)?;
             let found = self.or_fail(&format!("the profile of {}", of.name), found);
             self.document.profiles.extend(found);
         }
         if !plan.candidates.is_empty() {
-            let candidates = || analyses::candidates(problem, theta, evaluation, &plan.candidates);
+            let candidates = || study::candidates(at, &plan.candidates);
             self.document.candidates = self.analysis("candidates", candidates)?;
         }
-        let equivalents = || analyses::equivalents(problem, evaluation, &plan.equivalents);
+        let equivalents = || study::equivalents(at, &plan.equivalents);
         self.document.equivalents = self.analysis("equivalents", equivalents)?;
         Ok(())
     }
 
     /// Further fits: from other starting points, of constant functions, of other noise.
-    fn further_fits(&mut self, (problem, theta, _): Optimum) -> Result<(), Trouble> {
+    fn further_fits(&mut self, at: Optimum) -> Result<(), Trouble> {
         let (model, threads) = (self.model, self.threads);
         let plan = &model.study;
         if plan.starts > 0 {
-            let starts = || analyses::multistart(model, problem, theta, plan, threads);
+            let starts = || study::starts(model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
         }
         if plan.varies {
-            let varies = || analyses::varies(problem, theta, plan, threads);
-            let found = self.analysis("varies", varies)?;
+            let found = self.analysis("varies", || study::varies(at, plan, threads))?;
             let found = self.or_fail("whether each function varies", found);
             self.document.varies = found.unwrap_or_default();
         }
         if plan.replicates > 0 {
-            let refits = || analyses::refits(problem, theta, plan, threads);
-            let found = self.analysis("refits", refits)?;
+            let found = self.analysis("refits", || study::refits(at, plan, threads))?;
             self.document.bootstrap = self.or_fail("refits", found).unwrap_or_default();
         }
         Ok(())
     }
 
     /// Extremes of the functions, and the predictions of the systems that have them.
-    fn extremes(&mut self, (problem, theta, evaluation): Optimum) -> Result<(), Trouble> {
+    fn extremes(&mut self, at: Optimum) -> Result<(), Trouble> {
         let (model, threads) = (self.model, self.threads);
-        let plan = &model.study;
-        let (tubes, predictions) = self.analysis("tubes", || {
-            let level = analyses::level(problem, theta, evaluation, plan);
-            let (tubes, extremes) = analyses::tubes(problem, theta, &level, plan, threads);
-            let predictions = analyses::predictions(problem, theta, evaluation, model, &extremes);
-            (tubes, predictions)
-        })?;
+        let (tubes, predictions) = self.analysis("tubes", || study::tubes(model, at, threads))?;
         if tubes.is_empty() {
             let reason = "the optimum itself is not within the stated level and the constraints";
             self.fail("tubes", reason);
         }
         self.document.tubes = tubes;
-        self.document.budgeted = !problem.penalties.is_empty();
+        self.document.budgeted = !at.problem.penalties.is_empty();
         self.document.predictions = predictions;
         Ok(())
     }
@@ -347,13 +337,13 @@ impl Work<'_> {
             let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            interrupted = Some(analyses::fit(problem, &found));
-            Ok::<_, String>(analyses::fit(problem, &found))
+            let fit = FitPiece::of(problem, &found);
+            interrupted = Some(fit.clone());
+            Ok::<_, String>(fit)
         };
         let whole = || !flag.load(Ordering::Relaxed);
         let is_right = |kept: &Result<FitPiece, String>| {
-            kept.as_ref()
-                .map_or(true, |fit| analyses::is_of(&model.problem, fit))
+            kept.as_ref().map_or(true, |fit| fit.is_of(&model.problem))
         };
         self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.analysis("fit", compute, whole)?;
@@ -365,7 +355,7 @@ impl Work<'_> {
         let fit = fitted.map_err(Trouble::Numerical)?;
         FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted;
-        let problem = analyses::as_fitted(&model.problem, &fit);
+        let problem = fit.problem(&model.problem);
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);
         let evaluation = problem

@@ -35,7 +35,7 @@ pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
         Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, anchors, count, is_rounding,
-        is_unhindered, rank_experiments, verdicts,
+        is_unhindered, rank_experiments, residual_spread, verdicts,
     };
 }
 pub mod objective {
@@ -82,8 +82,8 @@ pub mod solvers {
 }
 pub mod study {
     pub use crate::study::{
-        Linear, Profile, ProfileSettings, Target, bootstrap, equivalent, multistart, prediction,
-        profile, profiles, pull_apart, variation,
+        Choice, EquivalentSystem, Linear, Profile, ProfileSettings, Target, bootstrap, equivalent,
+        equivalent_systems, multistart, prediction, profile, profiles, pull_apart, variation,
     };
 }
 pub mod system {

@@ -3,6 +3,7 @@
 mod figures;
 mod page;
 mod pieces;
+mod records;
 mod text;
 
 pub use pieces::{
@@ -11,7 +12,7 @@ pub use pieces::{
     PredictionRecord, ProfilePiece, SpectrumPiece, StudyDocument, TubeRecord, VariesRecord,
 };
 
-pub use text::ENDED;
+pub use records::*;
 
 use super::{json, render};
 use crate::results::{Claim, OutputFolder};

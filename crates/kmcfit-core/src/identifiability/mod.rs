@@ -35,7 +35,9 @@ pub use anchors::anchors;
 pub use band::{Band, Side};
 pub use bands::{BandSettings, Bands};
 pub use counting::{Symmetry, count};
-pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
+pub use experiments::{
+    Candidate, CandidateChannel, Gain, Ranked, rank_experiments, residual_spread,
+};
 pub use gauge::Gauge;
 pub use sensitivity::{Seen, Sensitivity, Spectrum};
 pub use verdict::{Judgement, Verdict, verdicts};
