@@ -4,8 +4,8 @@
 pub mod assessment {
     pub use crate::assessment::{
         BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, POOR, Plausibility,
-        ResidualPattern, StepCheck, Unidentified, constant_probability, diagnostics, outliers,
-        pattern, standard_error,
+        RECOVERED, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        constant_probability, diagnostics, is_same_truth, outliers, pattern, standard_error,
     };
 }
 pub mod builder {

@@ -5,11 +5,9 @@ use super::measures::Measures;
 use super::run::ComparedRun;
 use super::table::short;
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use kmcfit_core::internals::assessment::is_same_truth;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
-
-/// Truths that differ by less than this share of their size are one and the same on two grids.
-const SAME_TRUTH: f64 = 2e-3;
 
 /// The look of run `index` in all figures: 24 runs differ in colour or dash pattern.
 pub(super) fn style(index: usize) -> Style {
@@ -179,14 +177,15 @@ fn reaches(
 /// The true devices, each once, with its label and the run whose grid it is on.
 fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
     let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
-    for run in runs {
-        let Some(truth) = &run.finished.truth else {
-            continue;
+    let grid = |run: &'_ ComparedRun| run.finished.oscillator.grid;
+    for (run, truth) in runs
+        .iter()
+        .filter_map(|run| Some((run, run.finished.truth.as_ref()?)))
+    {
+        let is_same = |(other, known): &(&ComparedRun, &NodalCoefficients)| {
+            is_same_truth((known, &grid(other)), (truth, &grid(run)))
         };
-        if !found
-            .iter()
-            .any(|(other, known)| same(other, known, run, truth))
-        {
+        if !found.iter().any(is_same) {
             found.push((run, truth));
         }
     }
@@ -199,36 +198,6 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
         .into_iter()
         .map(|(run, truth)| (label(run), run, truth))
         .collect()
-}
-
-/// Whether two true devices agree at the nodes of the second that the first covers.
-fn same(
-    run: &ComparedRun,
-    one: &NodalCoefficients,
-    other_run: &ComparedRun,
-    other: &NodalCoefficients,
-) -> bool {
-    let grid = &run.finished.oscillator.grid;
-    let close = |f: &[f64], g: &[f64]| {
-        let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);
-        other_run.times().iter().zip(g).all(|(t, value)| {
-            let place = (t - grid.start()) / grid.step();
-            interpolate(f, place).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
-        })
-    };
-    one.functions()
-        .zip(other.functions())
-        .all(|(f, g)| close(f, g))
-}
-
-/// The value between two nodes; `None` outside.
-fn interpolate(f: &[f64], place: f64) -> Option<f64> {
-    let i = place.floor();
-    if i < 0.0 || i + 1.0 >= f.len() as f64 {
-        return None;
-    }
-    let (i, share) = (i as usize, place - i);
-    Some(f[i] + share * (f[i + 1] - f[i]))
 }
 
 /// The residuals of the measured motions, one panel for each name of an experiment.

@@ -1,13 +1,12 @@
 //! What is compared: the numbers of one run.
 
-use super::errors::Errors;
 use super::run::ComparedRun;
-use super::verdict;
+use super::verdict::{Match, verdict};
 use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
+use kmcfit_core::internals::assessment::{RECOVERED, Roughness, TruthErrors};
 use kmcfit_core::internals::solvers::Status;
-use kmcfit_core::internals::system::NodalCoefficients;
 use serde::Serialize;
 
 /// The numbers of one run, and what they mean in one line.
@@ -23,6 +22,9 @@ pub struct Measures {
     pub reason: String,
     /// What the numbers mean, in one line.
     pub verdict: String,
+    /// Whether the measured motion is matched.
+    #[serde(skip)]
+    pub is_matched: bool,
     /// Whether the truth is known, and reached in `k/m` and `c/m`.
     pub true_device: Option<bool>,
     /// Solver.
@@ -48,7 +50,7 @@ pub struct Measures {
     /// Wall-clock time, s.
     pub seconds: f64,
     /// Distances from the truth, where it is known.
-    pub errors: Option<Errors>,
+    pub errors: Option<TruthErrors>,
     /// Smallest mass at a node, kg.
     pub smallest_mass: f64,
     /// Smallest damping at a node, N s/m.
@@ -72,14 +74,16 @@ impl Measures {
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let device = &run.finished.device;
-        let errors = (run.finished.truth.as_ref()).map(|truth| Errors::of(device, truth));
+        let matching = Match::of(run);
+        let errors = (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(device, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
             status: document.outcome.status,
             reason: document.outcome.reason.clone(),
-            verdict: verdict::verdict(run, errors.as_ref()),
-            true_device: errors.as_ref().map(Errors::within_truth),
+            verdict: verdict(&matching, errors.as_ref()),
+            is_matched: matching.is_matched(),
+            true_device: errors.as_ref().map(|e| e.within(RECOVERED)),
             method: document.model.method.clone(),
             nodes: document.model.nodes,
             parameters: document.model.parameters,
@@ -107,37 +111,6 @@ impl Measures {
             knowledge: document.identifiability.knowledge.clone(),
             open: document.identifiability.open.clone(),
             warnings: document.warnings.clone(),
-        }
-    }
-}
-
-/// `integral (m'')^2 dt`, `integral (c')^2 dt`, `integral (k')^2 dt` by differences of the values at
-/// the nodes, whatever the basis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Roughness {
-    /// `integral (m'')^2 dt`, kg^2/s^3.
-    pub mass: f64,
-    /// `integral (c')^2 dt`, N^2 s/m^2.
-    pub damping: f64,
-    /// `integral (k')^2 dt`, N^2/(m^2 s).
-    pub stiffness: f64,
-}
-
-impl Roughness {
-    /// The roughness of a device on a grid with this step, s.
-    pub fn of(device: &NodalCoefficients, step: f64) -> Self {
-        let slope = |f: &[f64]| -> f64 {
-            let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
-            squares.sum::<f64>() * step
-        };
-        let curvature = |f: &[f64]| -> f64 {
-            let second = |w: &[f64]| ((w[0] - 2.0 * w[1] + w[2]) / step / step).powi(2);
-            f.windows(3).map(second).sum::<f64>() * step
-        };
-        Self {
-            mass: curvature(&device.mass),
-            damping: slope(&device.coefficients[0]),
-            stiffness: slope(&device.coefficients[1]),
         }
     }
 }

@@ -5,7 +5,6 @@
 //! `compare.csv` and `compare.html` show the same ones.
 
 mod conclusions;
-mod errors;
 mod figures;
 mod measures;
 mod page;
@@ -14,18 +13,13 @@ mod table;
 mod text;
 mod verdict;
 
-pub use errors::Errors;
-pub use measures::{Measures, Roughness};
+pub use measures::Measures;
 pub use run::{ComparedRun, MatchedMotion};
 
 use super::render;
 use crate::results::{Claim, OutputFolder};
 use serde::Serialize;
 use std::io;
-
-/// Largest relative error of `k/m` and `c/m` below which a device counts as the true one: well above
-/// what steppers and stopping tests leave, well below what a reader could see in a figure.
-pub const RECOVERED: f64 = 1e-3;
 
 /// Largest relative error of `k/m` and `c/m` below which a device counts as close to the true one:
 /// what a smooth fit of a record with a few per cent of noise can be asked for.

@@ -4,10 +4,11 @@ use super::conclusions::conclusions;
 use super::figures::{self, style};
 use super::measures::Measures;
 use super::table::{Row, known_rows};
-use super::{CLOSE, Comparison, MATCHED, RECOVERED};
+use super::{CLOSE, Comparison, MATCHED};
 use crate::report::chart::{Style, sample};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
+use kmcfit_core::internals::assessment::RECOVERED;
 
 pub(super) fn page(comparison: &Comparison) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
