@@ -5,7 +5,7 @@ use super::{
     Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
     Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
@@ -61,13 +61,10 @@ pub(super) struct Printed {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
-        return Err(InputError::new(
-            Place::Argument("--checkpoint".into()),
-            "no time can be this",
-        )
-        .found(seconds)
-        .expected("a number of seconds, 0 (after every iteration) or greater")
-        .into());
+        return Err(InputError::argument("--checkpoint", "no time can be this")
+            .found(seconds)
+            .expected("a number of seconds, 0 (after every iteration) or greater")
+            .into());
     }
     let file = arguments.set.read(&arguments.model)?;
     let own = || Path::new("runs").join(stem(&arguments.model));

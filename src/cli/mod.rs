@@ -20,7 +20,7 @@ mod simulate;
 mod study;
 
 use crate::config::{Model, ModelFile};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use clap::{CommandFactory, Parser, Subcommand};
 use environment::{check_arithmetic, provide_host};
 use kmcfit_core::internals::solvers::Status;
@@ -171,10 +171,7 @@ fn inputs(file: &ModelFile) -> Vec<PathBuf> {
 
 /// A failure to write, as an input error about where the output should go.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
-    InputError::new(
-        Place::Argument("--out".into()),
-        "the results cannot be written",
-    )
-    .found(format!("{}: {error}", path.display()))
-    .expected("a place that can be written to")
+    InputError::argument("--out", "the results cannot be written")
+        .found(format!("{}: {error}", path.display()))
+        .expected("a place that can be written to")
 }

@@ -8,7 +8,7 @@ use super::{
     unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Story, build};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::report::study::{self, FitPiece, Optimum, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::{
@@ -89,12 +89,9 @@ pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Resul
 
 fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     match asked {
-        Some(0) => Err(InputError::new(
-            Place::Argument("--threads".into()),
-            "a study needs a thread",
-        )
-        .found(0)
-        .expected("1 or more")),
+        Some(0) => Err(InputError::argument("--threads", "a study needs a thread")
+            .found(0)
+            .expected("1 or more")),
         Some(threads) => Ok(threads),
         None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
     }

@@ -2,7 +2,6 @@
 
 mod wording;
 
-use super::cost::CostKind;
 use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
@@ -17,15 +16,6 @@ const COARSE: f64 = 1e-3;
 const HARDLY: f64 = 50.0;
 /// So many things to try next are enough.
 const MOST: usize = 3;
-
-/// The worst fit of a channel, per cent.
-pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
-    let channels = document.experiments.iter().flat_map(|e| &e.channels);
-    channels
-        .map(|c| c.fit_percent)
-        .filter(|x| x.is_finite())
-        .reduce(f64::min)
-}
 
 /// A recommendation.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,7 +120,7 @@ pub fn next(document: &ResultDocument) -> Vec<Advice> {
     }
     steps.extend(about_constants(document));
     let known = &document.identifiability;
-    if is_simulated(document) && document.model.parameters > 0 {
+    if document.is_simulated() && document.model.parameters > 0 {
         // Constraints may hold what the readings do not show.
         let is_open = known.seen < known.of && !known.open.is_empty();
         let is_smooth = document.cost.regularisation > 0.0;
@@ -144,10 +134,6 @@ pub fn next(document: &ResultDocument) -> Vec<Advice> {
     }
     steps.truncate(MOST);
     steps
-}
-
-fn is_simulated(document: &ResultDocument) -> bool {
-    document.model.cost_kind != CostKind::EquationError
 }
 
 /// A function that varies no more than noise lets a constant vary.
@@ -165,13 +151,13 @@ fn about_constants(document: &ResultDocument) -> Option<Advice> {
 fn wanders(document: &ResultDocument) -> bool {
     document.outcome.status == Status::MaxIterations
         && document.model.method == Solver::GaussNewton.name()
-        && worst_fit(document).is_some_and(|worst| worst < POOR)
+        && document.worst_fit().is_some_and(|worst| worst < POOR)
 }
 
 /// Steps that are too long, with as many nodes as would do by the order of the stepper.
 fn about_steps(document: &ResultDocument) -> Option<Advice> {
     let half = document.half_step.as_ref()?;
-    let is_exact = worst_fit(document).is_some_and(|worst| worst > EXACT);
+    let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
     let beside_residuals = match is_exact {
         true => 0.0,
         false => half.change_per_residual,
@@ -224,7 +210,7 @@ fn changes_nothing(document: &ResultDocument) -> bool {
 
 /// What the residuals ask for.
 fn about_residuals(document: &ResultDocument) -> Option<Advice> {
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    let channels = || document.channels();
     let mut patterns = channels().filter_map(|c| Some((c, c.pattern.clone()?)));
     if let Some((channel, pattern)) = patterns.next() {
         return Some(Advice::Pattern {
@@ -233,7 +219,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Advice> {
             pattern,
         });
     }
-    let fit = worst_fit(document).unwrap_or(100.0);
+    let fit = document.worst_fit().unwrap_or(100.0);
     let times = document.statistics.reduced_chi_square.map(f64::sqrt);
     if let Some(times) = times.filter(|times| *times > BEYOND_SIGMA && fit > POOR) {
         return Some(Advice::LargerSigma { times, fit });
@@ -271,7 +257,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Advice> {
     Some(Advice::Mismatch {
         channel: (channels().count() > 1).then(|| (kind, record.name.clone())),
         fit,
-        from_readings: !tried && is_simulated(document),
+        from_readings: !tried && document.is_simulated(),
         suspect: suspect(document, record),
         absent: absent(document),
     })

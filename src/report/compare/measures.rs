@@ -2,7 +2,6 @@
 
 use super::run::ComparedRun;
 use super::verdict::{Match, verdict};
-use crate::report::advice::worst_fit;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
 use kmcfit_core::internals::assessment::{RECOVERED, Roughness, TruthErrors};
@@ -95,7 +94,7 @@ impl Measures {
                 (CostKind::Integral | CostKind::Mixed, false) => "m^2 s",
                 (CostKind::Integral | CostKind::Mixed, true) => "rad^2 s",
             },
-            worst_fit: worst_fit(document),
+            worst_fit: document.worst_fit(),
             is_rotation: document.is_rotation(),
             has_ratio: document.has_ratio(),
             cost_ratio: document.cost.ratio,

@@ -27,9 +27,13 @@ impl Match {
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let ratio = document.cost.ratio;
-        let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-        if channels().any(|c| c.sigma_estimated) {
-            return Self::Fit(channels().map(|c| c.fit_percent).fold(100.0, f64::min));
+        if document.estimates_sigma() {
+            return Self::Fit(
+                document
+                    .channels()
+                    .map(|c| c.fit_percent)
+                    .fold(100.0, f64::min),
+            );
         }
         match document.model.cost_kind {
             CostKind::ChiSquare => Self::ChiSquare {

@@ -95,3 +95,10 @@ pub struct HoldOutSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
+
+impl HoldOutSummary {
+    /// Its name in tables.
+    pub(in crate::report) fn title(&self) -> String {
+        format!("{} (held out)", self.name)
+    }
+}

@@ -193,11 +193,56 @@ fn linear_terms() -> Vec<String> {
 }
 
 impl ResultDocument {
+    /// The channels of the experiments that were fitted.
+    pub(super) fn channels(&self) -> impl Iterator<Item = &ChannelSummary> {
+        self.experiments.iter().flat_map(|e| &e.channels)
+    }
+
+    /// The channels of all records with the names of these, those that were held out last.
+    pub(super) fn records(&self) -> impl Iterator<Item = (String, &ChannelSummary)> {
+        let fitted = self.experiments.iter();
+        let fitted = fitted.map(|e| (e.name.clone(), &e.channels));
+        let held = self.held_out.iter();
+        let held = held.map(|e| (e.title(), &e.channels));
+        let named = fitted.chain(held);
+        named.flat_map(|(name, channels)| channels.iter().map(move |c| (name.clone(), c)))
+    }
+
+    /// The functions in the order of the equation of motion.
+    pub(super) fn terms(&self) -> impl Iterator<Item = (&str, &FunctionSummary)> {
+        let names = std::iter::once("mass").chain(self.model.terms.iter().map(String::as_str));
+        names.filter_map(|name| Some((name, self.functions.get(name)?)))
+    }
+
+    /// All functions: those of the equation of motion, then those of single experiments.
+    pub(super) fn all_functions(&self) -> impl Iterator<Item = (&str, &FunctionSummary)> {
+        let own = self.functions.iter().map(|(name, f)| (name.as_str(), f));
+        let own =
+            own.filter(|(name, _)| *name != "mass" && !self.model.terms.iter().any(|t| t == name));
+        self.terms().chain(own)
+    }
+
+    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.model.cost_kind != CostKind::EquationError
+    }
+
+    /// Whether the standard deviation of the readings of a channel was estimated by a first fit, so that the last one has
+    /// another cost.
+    pub(super) fn estimates_sigma(&self) -> bool {
+        self.channels().any(|c| c.sigma_estimated)
+    }
+
     /// Whether `J/J0` says how much better the optimum is than the start: where the standard deviation of the readings
     /// is estimated, J is taken with that of the optimum.
     pub(super) fn has_ratio(&self) -> bool {
-        let mut channels = self.experiments.iter().flat_map(|e| &e.channels);
-        !channels.any(|c| c.sigma_estimated)
+        !self.estimates_sigma()
+    }
+
+    /// The fit of the channel that is matched worst, per cent.
+    pub(super) fn worst_fit(&self) -> Option<f64> {
+        let fits = self.channels().map(|c| c.fit_percent);
+        fits.filter(|x| x.is_finite()).reduce(f64::min)
     }
 
     /// Whether the motion is a rotation, in rad: then the mass is a moment of inertia.
