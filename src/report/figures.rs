@@ -4,6 +4,7 @@ use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use super::predict::PredictedMotion;
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
 
 /// Beyond this number of readings the dots are drawn smaller.
@@ -220,49 +221,36 @@ pub fn functions(t: &[f64], curves: &[FunctionCurve]) -> Figure {
     .panels(curves.iter().map(|curve| curve.panel(t)))
 }
 
-/// The error of a gradient against the step of the difference that tests it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GradientCurve<'a> {
-    /// Nodes of the time grid.
-    pub nodes: usize,
-    /// Which adjoint made the gradient: `discrete` or `continuous`.
-    pub adjoint: &'a str,
-    /// Step along the gradient.
-    pub step: &'a [f64],
-    /// |(J(p - a g) - J(p))/a + G²| / G² at each step a.
-    pub error: &'a [f64],
-}
-
 /// The error of the gradient against the step, a panel for each adjoint and a line for each grid.
-pub fn gradient_error(curves: &[GradientCurve]) -> Figure {
-    let mut adjoints: Vec<&str> = Vec::new();
+pub fn gradient_error(curves: &[GradientCheck]) -> Figure {
+    let mut kinds: Vec<GradientKind> = Vec::new();
     let mut nodes: Vec<usize> = curves.iter().map(|curve| curve.nodes).collect();
     nodes.sort_unstable();
     nodes.dedup();
     for curve in curves {
-        if !adjoints.contains(&curve.adjoint) {
-            adjoints.push(curve.adjoint);
+        if !kinds.contains(&curve.kind) {
+            kinds.push(curve.kind);
         }
     }
+    // A grid looks the same in all panels.
+    let panel = |kind: &GradientKind| {
+        let curves = curves.iter().filter(|curve| curve.kind == *kind);
+        let lines = curves.map(|curve| {
+            let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
+            let label = format!("N = {}", curve.nodes);
+            Mark::line(label, &curve.step, &curve.error, Style::nth(index))
+        });
+        Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""))
+            .title(format!("{} adjoint", kind.name()))
+            .marks(lines)
+    };
     Figure::new(
         "gradient_error",
         "Error of the gradient",
         "Relative error of the gradient against the step of the difference that tests it.",
     )
-    .columns(adjoints.len())
-    .panels((adjoints.iter()).map(|adjoint| gradient_panel(curves, adjoint, &nodes)))
-}
-
-/// The curves of one adjoint, finest grid on top; a grid looks the same in all panels.
-fn gradient_panel(curves: &[GradientCurve], adjoint: &str, nodes: &[usize]) -> Panel {
-    let axes = Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""));
-    let curves = curves.iter().filter(|curve| curve.adjoint == adjoint);
-    axes.title(format!("{adjoint} adjoint"))
-        .marks(curves.map(|curve| {
-            let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
-            let label = format!("N = {}", curve.nodes);
-            Mark::line(label, curve.step, curve.error, Style::nth(index))
-        }))
+    .columns(kinds.len())
+    .panels(kinds.iter().map(panel))
 }
 
 /// The ratios of the coefficient functions against the times `t` in s, and the true ones where

@@ -39,7 +39,9 @@ pub mod identifiability {
     };
 }
 pub mod objective {
-    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
+    pub use crate::objective::{
+        Evaluation, GradientCheck, GradientKind, SimulatedRecord, state_scales,
+    };
 }
 pub mod problem {
     pub use crate::problem::{Problem, ProblemError, ProblemParts};

@@ -148,3 +148,53 @@ fn interpolate(f: &[f64], place: f64) -> Option<f64> {
     let (i, share) = (i as usize, place - i);
     Some(f[i] + share * (f[i + 1] - f[i]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
+        let constant = |value| vec![value; mass.len()];
+        NodalCoefficients {
+            mass: mass.to_vec(),
+            coefficients: vec![constant(damping), constant(stiffness)],
+        }
+    }
+
+    /// m = t^2 on [0, 1]: (m'')^2 = 4, counted at the inner nodes.
+    #[test]
+    fn roughness_of_a_parabola() {
+        let step = 1e-3;
+        let mass: Vec<f64> = (0..=1000)
+            .map(|i| 1.0 + (i as f64 * step).powi(2))
+            .collect();
+        let found = Roughness::of(&device(&mass, 0.3, 1.0), step);
+        assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
+        assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_common_factor_is_the_same_device() {
+        let truth = device(&[1.0, 0.5, 0.8], 0.1, 1.0);
+        let doubled = device(&[2.0, 1.0, 1.6], 0.2, 2.0);
+        let errors = TruthErrors::of(&doubled, &truth);
+        assert!(errors.within(RECOVERED) && !errors.undamped);
+        assert_eq!(errors.mass_relative, 1.0);
+    }
+
+    #[test]
+    fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
+        let truth = device(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&device(&[1.0, 1.0], 0.02, 1.0), &truth);
+        assert!(errors.undamped);
+        assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
+        assert!(!errors.within(RECOVERED));
+    }
+
+    #[test]
+    fn a_device_without_mass_is_no_true_device() {
+        let truth = device(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&device(&[1.0, 0.0], 0.0, 1.0), &truth);
+        assert!(!errors.within(RECOVERED));
+    }
+}
