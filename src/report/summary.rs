@@ -1,8 +1,10 @@
 //! What a person reads in ten seconds.
 
 use super::advice::{self, Advice};
-use super::document::{ChannelSummary, FunctionSummary, Prediction, ResultDocument, VerdictKind};
+use super::document::{ChannelSummary, Prediction, ResultDocument};
 use crate::digits::significant;
+use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::identifiability::VerdictKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 

@@ -3,9 +3,10 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, POOR, Plausibility,
-        RECOVERED, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        constant_probability, diagnostics, is_same_truth, outliers, pattern, standard_error,
+        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, FunctionSummary, POOR,
+        Plausibility, RECOVERED, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        constant_probability, diagnostics, function_summaries, is_same_truth, outliers, pattern,
+        standard_error,
     };
 }
 pub mod builder {
@@ -34,8 +35,8 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
-        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, anchors, count, is_rounding,
-        is_unhindered, rank_experiments, residual_spread, verdicts,
+        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, VerdictKind, anchors, count,
+        is_rounding, is_unhindered, rank_experiments, residual_spread, verdicts,
     };
 }
 pub mod objective {

@@ -1,6 +1,6 @@
 //! What a panel shows: curves, dots, bands, lines across, and how they look.
 
-use super::data::{places, rounded};
+use super::numbers::{places, rounded};
 use serde::Serialize;
 
 /// The colours of Okabe and Ito, which readers with any colour vision can tell apart, and a grey.

@@ -10,6 +10,7 @@ pub mod figure;
 mod layout;
 mod legend;
 pub mod mark;
+mod numbers;
 mod panel;
 mod shape;
 pub mod svg;

@@ -8,9 +8,8 @@ pub use search::{PathSummary, RungSummary, WeightSummary};
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use kmcfit_core::internals::assessment::{FitStatistics, StepCheck};
+use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::Verdict;
 use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
@@ -249,72 +248,6 @@ impl ResultDocument {
     pub fn is_rotation(&self) -> bool {
         let mass = self.functions.get(CoefficientKind::Mass.name());
         mass.is_some_and(|mass| mass.unit == CoefficientKind::Mass.angular_unit())
-    }
-}
-
-/// One function at the best point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FunctionSummary {
-    /// SI unit.
-    #[serde(default)]
-    pub unit: String,
-    /// Smallest value at a node.
-    #[serde(deserialize_with = "number_or_nan")]
-    pub min: f64,
-    /// Largest value at a node.
-    #[serde(deserialize_with = "number_or_nan")]
-    pub max: f64,
-    /// For a polynomial the factors `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i`
-    /// in the unit of the function per s^i.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub powers: Option<Vec<f64>>,
-    /// Whether it is zero but for rounding, beside the size at which it would matter.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub is_rounding: bool,
-    /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
-    /// whose errors can be believed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<VerdictKind>,
-    /// Its smallest and largest value at the nodes where it is known, if there are any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known_range: Option<[f64; 2]>,
-    /// For a constant its standard error from the linearised fit, without constraints, penalties and
-    /// priors, where the readings determine all parameters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub standard_error: Option<f64>,
-    /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
-    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub constant_p_value: Option<f64>,
-    /// Largest distance from the truth at a node, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truth_max_error: Option<f64>,
-    /// Root-mean-square distance from the truth over the nodes, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truth_rms_error: Option<f64>,
-}
-
-/// The kind of a [`Verdict`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[allow(missing_docs)]
-pub enum VerdictKind {
-    Identified,
-    OnlyRatio,
-    OnlyOn,
-    NotSeen,
-    Fixed,
-}
-
-impl From<&Verdict> for VerdictKind {
-    fn from(verdict: &Verdict) -> Self {
-        match verdict {
-            Verdict::Identified { .. } => Self::Identified,
-            Verdict::OnlyRatio(_) => Self::OnlyRatio,
-            Verdict::OnlyOn(_) => Self::OnlyOn,
-            Verdict::NotSeen => Self::NotSeen,
-            Verdict::Fixed => Self::Fixed,
-        }
     }
 }
 

@@ -2,9 +2,11 @@
 
 use super::table::{list, number, table};
 use crate::report::advice::{self, Advice};
-use crate::report::document::{ChannelSummary, FunctionSummary, ResultDocument, VerdictKind};
+use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
+use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::identifiability::VerdictKind;
 use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.

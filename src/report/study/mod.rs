@@ -1,6 +1,7 @@
 //! What a study found: pieces that are kept as they are finished, one document, figures, one page.
 
 mod figures;
+mod fit;
 mod page;
 mod pieces;
 mod records;

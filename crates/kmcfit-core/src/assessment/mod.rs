@@ -2,6 +2,7 @@
 
 mod channel;
 mod constancy;
+mod function;
 mod plausibility;
 mod recovery;
 mod statistics;
@@ -9,6 +10,7 @@ mod step_check;
 
 pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
 pub use constancy::{constant_probability, standard_error};
+pub use function::{FunctionSummary, function_summaries};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERED, Roughness, TruthErrors, is_same_truth};
 pub use statistics::{FitStatistics, statistics};

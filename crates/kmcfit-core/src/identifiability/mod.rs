@@ -12,6 +12,7 @@
 mod active;
 mod anchors;
 mod band;
+mod band_curves;
 mod bands;
 mod components;
 mod counting;
@@ -40,4 +41,4 @@ pub use experiments::{
 };
 pub use gauge::Gauge;
 pub use sensitivity::{Seen, Sensitivity, Spectrum};
-pub use verdict::{Judgement, Verdict, verdicts};
+pub use verdict::{Judgement, Verdict, VerdictKind, verdicts};

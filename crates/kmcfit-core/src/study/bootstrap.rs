@@ -46,6 +46,9 @@ impl From<SimulationError> for NoRefits {
     }
 }
 
+/// The interval of a number; `None` where too few refits ended well.
+pub type NumberInterval = (Linear, Option<[f64; 2]>);
+
 /// The intervals of all constants and scalars and of further numbers, each once, from refits.
 ///
 /// # Errors
@@ -57,7 +60,7 @@ pub fn intervals(
     (noise, count, seed): (Noise, usize, u64),
     level: f64,
     threads: usize,
-) -> Result<Vec<(Linear, Option<[f64; 2]>)>, NoRefits> {
+) -> Result<Vec<NumberInterval>, NoRefits> {
     let evaluation = problem.evaluate(optimum)?;
     if problem.covariance(&evaluation).is_none() {
         return Err(NoRefits::Undetermined);
@@ -68,7 +71,7 @@ pub fn intervals(
     let constants = constants.map(|(f, _)| Linear::mean(problem, f));
     let scalars = 0..problem.functions.scalars().len();
     let scalars = scalars.map(|i| Linear::scalar(problem, i));
-    let mut intervals: Vec<(Linear, Option<[f64; 2]>)> = Vec::new();
+    let mut intervals: Vec<NumberInterval> = Vec::new();
     for of in constants.chain(scalars).chain(further) {
         if intervals.iter().all(|(other, _)| other.name != of.name) {
             let interval = found.interval(&of, level);

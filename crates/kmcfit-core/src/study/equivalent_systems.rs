@@ -92,14 +92,15 @@ pub fn equivalent_systems(
 /// Masses that grow, fall and swing away from the fit's.
 fn factors(mass: &[f64]) -> Vec<Choice> {
     let last = (mass.len() - 1) as f64;
-    let choices: [(&str, fn(f64) -> f64); 3] = [
+    type Factor = fn(f64) -> f64;
+    let choices: [(&str, Factor); 3] = [
         ("mass that grows by a half", |x| 1.0 + 0.5 * x),
         ("mass that falls by a third", |x| 1.0 - x / 3.0),
         ("mass that swings by a fifth", |x| {
             1.0 + 0.2 * (12.0 * x).sin()
         }),
     ];
-    let choice = |(name, factor): (&str, fn(f64) -> f64)| Choice {
+    let choice = |(name, factor): (&str, Factor)| Choice {
         name: name.into(),
         mass: (mass.iter().enumerate())
             .map(|(i, m)| m * factor(i as f64 / last))
