@@ -1,11 +1,11 @@
 //! The standard figures of a fit, from plain slices.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use super::predict::PredictedMotion;
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
+use kmcfit_core::internals::study::PredictedMotion;
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;

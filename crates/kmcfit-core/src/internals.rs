@@ -85,8 +85,9 @@ pub mod solvers {
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, Linear, Profile, ProfileSettings, Target, bootstrap, equivalent,
-        equivalent_systems, multistart, prediction, profile, profiles, pull_apart, variation,
+        Choice, EquivalentSystem, Linear, PredictedMotion, Prediction, Profile, ProfileSettings,
+        Target, bootstrap, equivalent, equivalent_systems, multistart, predict, prediction,
+        profile, profiles, pull_apart, variation,
     };
 }
 pub mod system {

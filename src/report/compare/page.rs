@@ -19,11 +19,8 @@ pub(super) fn page(comparison: &Comparison) -> String {
     };
     let mut body = format!("<p>{}</p>\n", prose(&lead(comparison)));
     if comparison.story.is_some() {
-        body += "<h2>What it comes to</h2>\n<ul>\n";
-        for conclusion in conclusions(&comparison.measures) {
-            body += &format!("<li>{}</li>\n", prose(&conclusion));
-        }
-        body += "</ul>\n";
+        body += "<h2>What it comes to</h2>\n";
+        body += &shell::list(&conclusions(&comparison.measures));
     }
     body += "<h2>What each run means</h2>\n";
     for (i, run) in comparison.measures.iter().enumerate() {

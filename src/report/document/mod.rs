@@ -11,6 +11,7 @@ use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
+pub use kmcfit_core::internals::study::Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -285,30 +286,6 @@ pub struct IdentifiabilitySummary {
     pub open: Vec<String>,
     /// What the model says besides the readings, in words.
     pub knowledge: Vec<String>,
-}
-
-/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
-    /// Initial displacement, m.
-    pub displacement: f64,
-    /// Initial velocity, m/s.
-    pub velocity: f64,
-    /// `integral (y - y_true)^2 dt`, m^2 s, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cost: Option<f64>,
-    /// `integral y_true^2 dt`, m^2 s, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub energy: Option<f64>,
-    /// Largest distance of the motion from zero, m; `None` where there is no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub largest: Option<f64>,
-    /// Displacement at the last node, m; `None` where there is no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub last: Option<f64>,
-    /// Why there is no motion from there, if there is none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<String>,
 }
 
 /// The constraints at the best point.

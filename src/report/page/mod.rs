@@ -13,6 +13,7 @@ mod table;
 
 pub(super) use fit::page as fit_page;
 pub(crate) use repeat::quoted as shell_quoted;
+pub(super) use table::list;
 
 use super::chart::{Figure, data, render};
 use super::text::escape;

@@ -15,6 +15,7 @@
 pub mod bootstrap;
 pub mod equivalent;
 mod equivalent_systems;
+mod free_response;
 mod functional;
 pub mod multistart;
 mod parallel;
@@ -26,5 +27,6 @@ mod simulate;
 pub mod variation;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
+pub use free_response::{PredictedMotion, Prediction, predict};
 pub use functional::{Linear, Target};
 pub use profile::{Profile, ProfileSettings, profile, profiles};
