@@ -101,6 +101,29 @@ impl InputError {
         }
     }
 
+    /// An error about an argument.
+    pub fn argument(name: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::new(Place::Argument(name.into()), problem)
+    }
+
+    /// An error at a line of a file and a column in it, both from 1.
+    pub fn line(
+        file: impl AsRef<Path>,
+        line: usize,
+        column: usize,
+        problem: impl Into<String>,
+    ) -> Self {
+        let file = file.as_ref().to_path_buf();
+        Self::new(Place::Line { file, line, column }, problem)
+    }
+
+    /// An error in a text file behind some text.
+    pub fn behind(file: impl AsRef<Path>, text: &str, problem: impl Into<String>) -> Self {
+        let line = 1 + text.matches('\n').count();
+        let column = 1 + text.chars().rev().take_while(|&c| c != '\n').count();
+        Self::line(file, line, column, problem)
+    }
+
     /// An error about a file as a whole.
     pub fn file(file: impl AsRef<Path>, problem: impl Into<String>) -> Self {
         Self::new(Place::File(file.as_ref().to_path_buf()), problem)
@@ -129,8 +152,14 @@ impl InputError {
 
     /// Adds what to try.
     #[must_use]
-    pub fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
+    pub fn hint(self, hint: impl Into<String>) -> Self {
+        self.hint_if(Some(hint.into()))
+    }
+
+    /// Adds what to try, where there is something.
+    #[must_use]
+    pub fn hint_if(mut self, hint: Option<String>) -> Self {
+        self.hint = hint.or(self.hint);
         self
     }
 }

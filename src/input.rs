@@ -5,7 +5,7 @@ use std::fs::{self, File, Metadata};
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::memory;
 use crate::near::did_you_mean;
 
@@ -165,16 +165,8 @@ pub fn check_lines(path: &Path, text: &str) -> Result<(), InputError> {
 }
 
 fn long_line(path: &Path, line: usize) -> InputError {
-    let place = Place::Line {
-        file: path.to_path_buf(),
-        line,
-        column: 1,
-    };
-    InputError::new(
-        place,
-        format!("the line is longer than {LONGEST_LINE} bytes"),
-    )
-    .expected("one row of a table in each line")
+    let problem = format!("the line is longer than {LONGEST_LINE} bytes");
+    InputError::line(path, line, 1, problem).expected("one row of a table in each line")
 }
 
 /// The lines of a table that is too long to be kept as text, one after the other.
@@ -222,19 +214,16 @@ impl<'a> Lines<'a> {
         match std::str::from_utf8(line) {
             Ok(text) if self.count == 1 => Ok(Some(text.trim_start_matches('\u{feff}'))),
             Ok(text) => Ok(Some(text)),
-            Err(error) => {
-                let place = Place::Line {
-                    file: self.path.to_path_buf(),
-                    line: self.count,
-                    column: 1 + String::from_utf8_lossy(&line[..error.valid_up_to()])
-                        .chars()
-                        .count(),
-                };
-                Err(InputError::new(place, "the file is not UTF-8 text")
-                    .found(format!("the byte 0x{:02x}", line[error.valid_up_to()])))
-            }
+            Err(error) => Err(not_utf8(self.path, self.count, line, error.valid_up_to())),
         }
     }
+}
+
+/// The error for a byte of a line that is not UTF-8.
+fn not_utf8(path: &Path, number: usize, line: &[u8], at: usize) -> InputError {
+    let column = 1 + String::from_utf8_lossy(&line[..at]).chars().count();
+    InputError::line(path, number, column, "the file is not UTF-8 text")
+        .found(format!("the byte 0x{:02x}", line[at]))
 }
 
 /// A short quotation of somebody's text for a message: one line, cut where it is long.
@@ -277,11 +266,9 @@ fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
     if error.kind() != ErrorKind::NotFound {
         return InputError::file(path, format!("the file cannot be read: {error}")).expected(what);
     }
-    let missing = InputError::file(path, "there is no such file").expected(what);
-    match neighbour(path) {
-        Some(hint) => missing.hint(hint),
-        None => missing,
-    }
+    InputError::file(path, "there is no such file")
+        .expected(what)
+        .hint_if(neighbour(path))
 }
 
 /// What may have been meant by a path that leads nowhere: a missing folder or a near file name.
@@ -315,18 +302,15 @@ fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
             let good = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
             let byte = error.as_bytes().get(good).copied().unwrap_or_default();
-            let place = Place::Line {
-                file: path.to_path_buf(),
-                line: 1 + before.matches('\n').count(),
-                column: 1 + before.chars().rev().take_while(|&c| c != '\n').count(),
-            };
-            Err(InputError::new(place, "the file is not UTF-8 text")
-                .found(format!("the byte 0x{byte:02x}"))
-                .hint(if utf16 {
-                    "it looks like UTF-16: save it as UTF-8"
-                } else {
-                    "save it as UTF-8, or write only plain letters there"
-                }))
+            Err(
+                InputError::behind(path, &before, "the file is not UTF-8 text")
+                    .found(format!("the byte 0x{byte:02x}"))
+                    .hint(if utf16 {
+                        "it looks like UTF-16: save it as UTF-8"
+                    } else {
+                        "save it as UTF-8, or write only plain letters there"
+                    }),
+            )
         }
     }
 }

@@ -4,7 +4,7 @@
 //! N m, and mass, damping and stiffness are a moment of inertia and so on. Volts stand for readings
 //! that nobody calibrated: they count as they are.
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::nearest;
 
@@ -158,8 +158,7 @@ impl Unit {
 
 /// The error for a text that is no unit of this kind.
 fn unknown(kind: Kind, text: &str) -> InputError {
-    let place = Place::Argument(format!("unit of the {}", kind.name()));
-    let error = InputError::new(place, "unknown unit")
+    let error = InputError::argument(format!("unit of the {}", kind.name()), "unknown unit")
         .found(quote(text))
         .expected(one_of(Unit::symbols(kind)));
     let of_other = Kind::ALL

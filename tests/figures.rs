@@ -1,10 +1,11 @@
 //! The standard figures as SVG documents: well-formed, stable, small, and safe with any data.
 
 use kmcfit::report::figures::{
-    FunctionCurve, GradientCurve, RatioCurves, convergence, functions, gradient_error, motion,
-    observation, ratios,
+    FunctionCurve, convergence, functions, gradient_error, motion, observation, ratios,
 };
 use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
+use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 
 /// All standard figures from one series, used as values of everything.
 fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
@@ -14,24 +15,27 @@ fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
         truth: Some(y),
         ..FunctionCurve::new("mass m", "kg", y)
     };
-    let gradient = |nodes, adjoint| GradientCurve {
+    let gradient = |nodes, kind| GradientCheck {
         nodes,
-        adjoint,
-        step: t,
-        error: y,
+        kind,
+        step: t.to_vec(),
+        error: y.to_vec(),
     };
-    let found = RatioCurves {
-        k_over_m: y,
-        c_over_m: t,
-        frequency: y,
-        damping_ratio: y,
+    let found = Ratios {
+        k_over_m: y.to_vec(),
+        c_over_m: t.to_vec(),
+        frequency: y.to_vec(),
+        damping_ratio: y.to_vec(),
     };
     vec![
         observation(&[("displacement y", "m", t, y), ("velocity v", "m/s", t, t)]),
         convergence(t, y, t),
         motion(t, y, &[(0, t, y), (10, t, t)]),
         functions(t, &[curve, curve, curve]),
-        gradient_error(&[gradient(1000, "discrete"), gradient(2000, "continuous")]),
+        gradient_error(&[
+            gradient(1000, GradientKind::Discrete),
+            gradient(2000, GradientKind::Continuous),
+        ]),
         ratios(t, &found, Some(&found), &[[y.to_vec(), t.to_vec()]]),
     ]
 }
@@ -100,7 +104,7 @@ fn figures_without_content_are_documents_too() {
     check(&render(&observation(&[])));
     check(&render(&gradient_error(&[])));
     check(&render(&functions(&[], &[])));
-    check(&render(&ratios(&[], &RatioCurves::default(), None, &[])));
+    check(&render(&ratios(&[], &Ratios::default(), None, &[])));
     check(&render(&Figure::new("", "", "").columns(0).panel(
         Panel::new(
             Axis::linear("", "").limits(1.0, 1.0),

@@ -109,7 +109,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     let equivalent = linear + 8.0 / (3.0 * std::f64::consts::PI) * omega * amplitude * quadratic;
     assert!((equivalent / 3.26 - 1.0).abs() <= 0.03, "{equivalent}");
 
-    let with_offset = format!("{damping}\n  offset: {{basis: constant, start: 0.0}}");
+    let with_offset = format!("{damping}\n  static_force: {{basis: constant, start: 0.0}}");
     let Some((model, run)) = roll_decay(&with_offset) else {
         return;
     };

@@ -1,6 +1,6 @@
 //! What is wrong with the arguments, where clap says too little.
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::near::nearest;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::error::Error;
@@ -23,9 +23,8 @@ pub fn no_number(error: &clap::Error) -> Option<InputError> {
     };
     let argument = text(ContextKind::InvalidArg)?;
     let name = argument.split(' ').next().unwrap_or(&argument);
-    let place = Place::Argument(name.into());
     let found = text(ContextKind::InvalidValue)?;
-    let error = InputError::new(place, "this is no number");
+    let error = InputError::argument(name, "this is no number");
     Some(error.found(format!("`{found}`")).expected(expected))
 }
 

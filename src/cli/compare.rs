@@ -1,14 +1,15 @@
 //! `kmcfit compare`
 
-use super::fit::{begun, fit_into, note_discarded};
+use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
-use super::{Failure, NOT_CONVERGED, OK, inputs, interrupt, print, say, unwritable};
-use crate::config::{Model, ModelFile, Purpose, build};
+use super::{Failure, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable};
+use crate::config::{Model, ModelFile, Purpose, Sequence, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
 use crate::results::{
     AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, MANIFEST, OutputFolder, RESULT,
+    STUDY_JOURNAL,
 };
 use kmcfit_core::internals::solvers::Status;
 use std::path::{Path, PathBuf};
@@ -29,32 +30,20 @@ pub struct Arguments {
     json: bool,
 }
 
-/// One argument, read and found usable.
-pub(super) enum Entry {
-    /// To be fitted into a folder of its own.
-    Model(Box<ToFit>),
-    /// Finished.
-    Run(Box<ComparedRun>),
-}
-
-/// A model that is to be fitted.
-pub(super) struct ToFit {
-    file: ModelFile,
-    model: Model,
-    heading: Heading,
-}
-
-impl ToFit {
-    fn claim(&self) -> Claim {
-        fit_claim(&self.model).inputs(inputs(&self.file))
-    }
-}
-
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let entries = entries(&arguments.runs, &arguments.out)?;
-    let claim = claim("compare", COMPARE_JOURNAL).inputs(files_of(&entries));
-    let folder = OutputFolder::prepare(&arguments.out, claim)?;
-    begin(entries, &folder, &arguments.runs, arguments.json)
+    compare(&arguments.runs, &arguments.out, arguments.json, false)
+}
+
+/// Resumes a comparison that did not come to its end.
+pub(super) fn go_on(place: &Path, as_json: bool) -> Result<u8, Failure> {
+    let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
+    compare(&runs, place, as_json, true)
+}
+
+fn compare(runs: &[PathBuf], out: &Path, as_json: bool, is_resumed: bool) -> Result<u8, Failure> {
+    let job = Job::of_runs(runs, out)?;
+    let folder = OutputFolder::prepare(out, job.claim())?;
+    job.run(&folder, as_json, is_resumed)
 }
 
 /// Prepares a folder for a comparison inside another folder.
@@ -64,156 +53,193 @@ pub(super) fn prepare(parent: &OutputFolder, name: &str) -> Result<OutputFolder,
 
 /// Compares models and runs in a folder that was prepared.
 pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, Failure> {
-    begin(entries(runs, folder.path())?, folder, runs, false)
+    Job::of_runs(runs, folder.path())?.run(folder, false, false)
 }
 
-fn begin(
-    entries: Entries,
-    folder: &OutputFolder,
-    runs: &[PathBuf],
+/// Fits the models of a sequence one after another and compares them on one page.
+pub(super) fn tell(
+    path: &Path,
+    sequence: &Sequence,
+    out: &Path,
     as_json: bool,
+    is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let children = children(&entries, folder)?;
-    let heading = heading(&entries, runs);
-    note_discarded(folder, &heading)?;
-    let journal = AnalysisJournal::begin(folder.path(), COMPARE_JOURNAL, &heading)
-        .map_err(|error| unwritable(folder.path(), &error))?;
-    finish(entries, (folder, children), journal, (as_json, false))
-}
-
-/// Resumes a comparison that did not come to its end.
-pub(super) fn go_on(place: &Path, as_json: bool) -> Result<u8, Failure> {
-    let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
-    let entries = entries(&runs, place)?;
-    let claim = claim("compare", COMPARE_JOURNAL).inputs(files_of(&entries));
-    let folder = OutputFolder::prepare(place, claim)?;
-    let children = children(&entries, &folder)?;
-    let heading = heading(&entries, &runs);
-    let journal = AnalysisJournal::resume(place, COMPARE_JOURNAL, &heading)?;
-    finish(entries, (&folder, children), journal, (as_json, true))
+    let heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
+    let job = Job {
+        entries: entries(&sequence.models, out)?,
+        heading,
+        journal: STUDY_JOURNAL,
+        sequence: Some(sequence),
+    };
+    let folder = OutputFolder::prepare(out, job.claim().inputs([path.into()]))?;
+    job.run(&folder, as_json, is_resumed)
 }
 
 /// What a comparison writes into its folder, fits apart.
-pub(super) fn claim(command: &'static str, journal: &'static str) -> Claim {
+fn claim(command: &'static str, journal: &'static str) -> Claim {
     Comparison::claim(command).journals(&[journal])
 }
 
-fn heading(entries: &Entries, runs: &[PathBuf]) -> Heading {
-    let heading = Heading::new("compare", runs.to_vec());
-    entries
-        .iter()
-        .fold(heading, |heading, (_, entry)| match entry {
+/// One argument, read and found usable.
+enum Entry {
+    /// To be fitted into a folder of its own.
+    Model(Box<ToFit>),
+    /// Finished.
+    Run(Box<ComparedRun>),
+}
+
+/// A model that is to be fitted.
+struct ToFit {
+    file: ModelFile,
+    model: Model,
+    heading: Heading,
+}
+
+impl Entry {
+    /// The files that the comparison reads for it.
+    fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Entry::Model(to_fit) => inputs(&to_fit.file),
+            Entry::Run(run) => vec![run.finished.folder.join(RESULT)],
+        }
+    }
+
+    /// Prepares a folder for a model; `None` for a finished run.
+    fn prepare(
+        &self,
+        name: &str,
+        parent: &OutputFolder,
+    ) -> Result<Option<OutputFolder>, InputError> {
+        match self {
+            Entry::Model(to_fit) => {
+                let claim = fit_claim(&to_fit.model).inputs(self.files());
+                parent.prepare_inside(name, claim).map(Some)
+            }
+            Entry::Run(_) => Ok(None),
+        }
+    }
+}
+
+/// Models and runs to be compared, or the models of a sequence.
+struct Job<'a> {
+    /// The arguments and the name of each.
+    entries: Vec<(String, Entry)>,
+    heading: Heading,
+    journal: &'static str,
+    sequence: Option<&'a Sequence>,
+}
+
+impl Job<'_> {
+    fn of_runs(runs: &[PathBuf], out: &Path) -> Result<Self, InputError> {
+        Ok(Self {
+            entries: entries(runs, out)?,
+            heading: Heading::new("compare", runs.to_vec()),
+            journal: COMPARE_JOURNAL,
+            sequence: None,
+        })
+    }
+
+    fn claim(&self) -> Claim {
+        let command = match self.sequence {
+            Some(_) => "study",
+            None => "compare",
+        };
+        let files = self.entries.iter().flat_map(|(_, entry)| entry.files());
+        claim(command, self.journal).inputs(files)
+    }
+
+    /// The heading with all files on which the results depend.
+    fn full_heading(&self) -> Heading {
+        let entries = self.entries.iter();
+        entries.fold(self.heading.clone(), |heading, (_, entry)| match entry {
             Entry::Model(to_fit) => heading.with_model(&to_fit.file),
             Entry::Run(run) => heading.with_file(run.finished.folder.join(RESULT)),
         })
-}
-
-/// The files that a comparison reads.
-pub(super) fn files_of(entries: &Entries) -> Vec<PathBuf> {
-    let files = entries.iter().flat_map(|(_, entry)| match entry {
-        Entry::Model(to_fit) => inputs(&to_fit.file),
-        Entry::Run(run) => vec![run.finished.folder.join(RESULT)],
-    });
-    files.collect()
-}
-
-fn finish(
-    entries: Entries,
-    (folder, children): (&OutputFolder, Children),
-    mut journal: AnalysisJournal,
-    (as_json, is_resumed): (bool, bool),
-) -> Result<u8, Failure> {
-    let flag = interrupt::flag();
-    let (comparison, interrupted) =
-        side_by_side(entries, children, &flag, &mut journal, is_resumed)?;
-    let written = comparison
-        .write(folder)
-        .and_then(|()| journal.finish_if(!interrupted));
-    written.map_err(|error| unwritable(folder.path(), &error))?;
-    if as_json {
-        print(&json(&comparison.document()));
-    } else {
-        print(&comparison.text());
-        print(&format!(
-            "\nresults in {}, the page is {}\n",
-            folder.path().display(),
-            folder.path().join("compare.html").display()
-        ));
     }
-    if interrupted {
-        let folder = folder.path().display();
-        say(
-            "note",
-            format!("`kmcfit resume {folder}` goes on with this comparison"),
-        );
-    }
-    Ok(match interrupted {
-        true => interrupt::exit_code(),
-        false => verdict(&comparison),
-    })
-}
 
-/// The folders of the fits of a comparison, in the order of its entries; `None` for a finished run.
-pub(super) type Children = Vec<Option<OutputFolder>>;
-
-/// Prepares a folder for each model: what is wrong with one is found before the first fit.
-pub(super) fn children(entries: &Entries, folder: &OutputFolder) -> Result<Children, InputError> {
-    let prepare = |(name, entry): &(String, Entry)| match entry {
-        Entry::Model(to_fit) => folder.prepare_inside(name, to_fit.claim()).map(Some),
-        Entry::Run(_) => Ok(None),
-    };
-    entries.iter().map(prepare).collect()
-}
-
-/// Fits models and reads finished runs; the comparison, and whether it was interrupted. Where it is resumed, fits that
-/// the journal lists as finished are read from their folders, and one with a journal of its own is
-/// resumed.
-pub(super) fn side_by_side(
-    entries: Entries,
-    children: Children,
-    flag: &Arc<AtomicBool>,
-    journal: &mut AnalysisJournal,
-    is_resumed: bool,
-) -> Result<(Comparison, bool), Failure> {
-    let mut compared = Compared::default();
-    for ((name, entry), folder) in entries.into_iter().zip(children) {
-        match (entry, folder) {
-            (Entry::Model(to_fit), Some(folder)) => {
-                let finished = ComparedRun::read(&name, folder.path()).ok();
-                match finished.filter(|_| journal.has(&name)) {
-                    Some(run) => compared.runs.push(run),
-                    None => {
-                        let heading = &to_fit.heading;
-                        let before = is_resumed
-                            .then(|| FitJournal::resume(folder.path(), heading).ok())
-                            .flatten();
-                        let begin = || begun(&folder, heading);
-                        let fit = before.map_or_else(begin, Ok)?;
-                        compared.fit(&name, to_fit.model, fit, &folder, flag)?;
-                    }
+    fn run(self, folder: &OutputFolder, as_json: bool, is_resumed: bool) -> Result<u8, Failure> {
+        let full = |error| unwritable(folder.path(), &error);
+        // What is wrong with the place of one model is found before the first fit.
+        let children = self.entries.iter();
+        let children = children.map(|(name, entry)| entry.prepare(name, folder));
+        let children = children.collect::<Result<Vec<_>, _>>()?;
+        let heading = self.full_heading();
+        let mut journal = open_analyses(folder, self.journal, &heading, is_resumed)?;
+        let mut compared = Compared {
+            flag: interrupt::flag(),
+            is_resumed,
+            ..Compared::default()
+        };
+        for ((name, entry), child) in self.entries.into_iter().zip(children) {
+            match (entry, child) {
+                (Entry::Model(to_fit), Some(child)) => {
+                    compared.model(&name, *to_fit, &child, &mut journal)?;
                 }
-                if !compared.interrupted {
-                    let kept = journal.analysis(&name, || true, || true);
-                    kept.map_err(|error| unwritable(folder.path(), &error))?;
-                }
+                (Entry::Run(run), _) => compared.runs.push(*run),
+                (Entry::Model(..), None) => {}
             }
-            (Entry::Run(run), _) => compared.runs.push(*run),
-            (Entry::Model(..), None) => {}
         }
+        let interrupted = compared.interrupted;
+        let mut comparison = Comparison::new(compared.runs, compared.left_out);
+        if let Some(sequence) = self.sequence.filter(|_| !interrupted) {
+            comparison = comparison.told_as(&sequence.title);
+        }
+        comparison.write(folder).map_err(full)?;
+        journal.finish_if(!interrupted).map_err(full)?;
+        match as_json {
+            true => print(&json(&comparison.document())),
+            false => show(&comparison, self.sequence, interrupted, folder.path()),
+        }
+        if interrupted && self.sequence.is_none() {
+            interrupt::say_resumable(folder.path(), "comparison");
+        }
+        Ok(match interrupted {
+            true => interrupt::exit_code(),
+            false => verdict(&comparison),
+        })
     }
-    let interrupted = compared.interrupted;
-    Ok((
-        Comparison::new(compared.runs, compared.left_out),
-        interrupted,
-    ))
 }
 
-/// The arguments and the name of each.
-pub(super) type Entries = Vec<(String, Entry)>;
+/// The journal of a study or comparison: resumed, which is refused where an input has changed, or begun.
+pub(super) fn open_analyses(
+    folder: &OutputFolder,
+    name: &str,
+    heading: &Heading,
+    is_resumed: bool,
+) -> Result<AnalysisJournal, InputError> {
+    if is_resumed {
+        return AnalysisJournal::resume(folder.path(), name, heading);
+    }
+    note_discarded(folder, heading)?;
+    AnalysisJournal::begin(folder.path(), name, heading)
+        .map_err(|error| unwritable(folder.path(), &error))
+}
+
+/// Prints a comparison, or the conclusions of a sequence.
+fn show(comparison: &Comparison, sequence: Option<&Sequence>, interrupted: bool, folder: &Path) {
+    let page = folder.join("compare.html");
+    let page = page.display();
+    let Some(sequence) = sequence else {
+        print(&comparison.text());
+        let folder = folder.display();
+        return print(&format!("\nresults in {folder}, the page is {page}\n"));
+    };
+    print(&format!("{}\n\n", sequence.title));
+    match interrupted {
+        true => {
+            print("interrupted: the sequence is not complete, so nothing is concluded from it\n")
+        }
+        false => comparison
+            .conclusions()
+            .iter()
+            .for_each(|sentence| print(&format!("- {sentence}\n"))),
+    }
+    print(&format!("\nthe page is {page}\n"));
+}
 
 /// The arguments, read and found usable, and what each is called: whatever is wrong with them is said
 /// before anything is run or made.
-pub(super) fn entries(runs: &[PathBuf], out: &Path) -> Result<Entries, InputError> {
+fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, Entry)>, InputError> {
     let entries = runs.iter().zip(names(runs, out));
     entries
         .map(|(path, name)| Ok((name.clone(), entry(path, &name)?)))
@@ -225,21 +251,49 @@ pub(super) fn entries(runs: &[PathBuf], out: &Path) -> Result<Entries, InputErro
 struct Compared {
     runs: Vec<ComparedRun>,
     left_out: Vec<LeftOut>,
+    flag: Arc<AtomicBool>,
+    is_resumed: bool,
     interrupted: bool,
 }
 
 impl Compared {
-    /// Fits a model into its folder. A run without a result does not end the comparison; a folder
-    /// that cannot be written to does.
+    /// Fits a model into its folder. Where the comparison is resumed, a fit that the journal lists as finished is read
+    /// from there, and one with a journal of its own is resumed.
+    fn model(
+        &mut self,
+        name: &str,
+        ToFit { model, heading, .. }: ToFit,
+        folder: &OutputFolder,
+        journal: &mut AnalysisJournal,
+    ) -> Result<(), Failure> {
+        let finished = ComparedRun::read(name, folder.path()).ok();
+        match finished.filter(|_| journal.has(name)) {
+            Some(run) => self.runs.push(run),
+            None => {
+                let before = self
+                    .is_resumed
+                    .then(|| open_journal(folder, &heading, true));
+                let before = before.and_then(Result::ok);
+                let begin = || open_journal(folder, &heading, false);
+                self.fit(name, model, before.map_or_else(begin, Ok)?, folder)?;
+            }
+        }
+        if !self.interrupted {
+            let kept = journal.analysis(name, || true, || true);
+            kept.map_err(|error| unwritable(folder.path(), &error))?;
+        }
+        Ok(())
+    }
+
+    /// A run without a result does not end the comparison; a folder that cannot be written to does.
     fn fit(
         &mut self,
         name: &str,
         mut model: Model,
         journal: FitJournal,
         folder: &OutputFolder,
-        flag: &Arc<AtomicBool>,
     ) -> Result<(), Failure> {
-        if flag.load(Ordering::Relaxed) {
+        if self.flag.load(Ordering::Relaxed) {
             self.interrupted = true;
             self.leave_out(name, "not begun: interrupted".into());
             return Ok(());
@@ -247,7 +301,7 @@ impl Compared {
         for warning in &model.warnings {
             say("warning", format!("{name}: {warning}"));
         }
-        model.settings.interrupt = Some(Arc::clone(flag));
+        model.settings.interrupt = Some(Arc::clone(&self.flag));
         let progress = Progress::new(&model.settings.stopping).named(name);
         match fit_into(folder, &model, &progress, true, journal) {
             Ok((_, status)) => {
@@ -347,9 +401,8 @@ fn stem(path: &Path) -> String {
 }
 
 /// Whether every run ended as asked for.
-pub(super) fn verdict(comparison: &Comparison) -> u8 {
-    let fine = [Status::Converged, Status::Completed].map(Status::name);
-    let all = (comparison.measures().iter()).all(|m| fine.contains(&m.status.as_str()));
+fn verdict(comparison: &Comparison) -> u8 {
+    let all = (comparison.measures().iter()).all(|m| exit_code(m.status) == OK);
     match all && comparison.left_out().is_empty() {
         true => OK,
         false => NOT_CONVERGED,

@@ -1,9 +1,9 @@
 //! What the numerics take from the process: limits, thread starts, the arithmetic that a variable names.
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::faults::{self, Operation};
 use crate::memory;
-use crate::near::nearest;
+use crate::near::did_you_mean;
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
 use std::sync::LazyLock;
@@ -25,13 +25,9 @@ pub fn provide_host() {
 pub fn check_arithmetic() -> Result<(), InputError> {
     check_limit().map_err(|found| {
         let names = arithmetics();
-        let place = Place::Argument(LIMIT.into());
-        let error = InputError::new(place, "no arithmetic has this name")
+        InputError::argument(LIMIT, "no arithmetic has this name")
             .found(format!("`{found}`"))
-            .expected(names.join(", "));
-        match nearest(&found, names) {
-            Some(near) => error.hint(format!("did you mean `{near}`?")),
-            None => error,
-        }
+            .expected(names.join(", "))
+            .hint_if(did_you_mean(&found, names))
     })
 }

@@ -1,9 +1,11 @@
 //! `kmcfit fit`
 
 use super::progress::Progress;
-use super::{Failure, Overrides, exit_code, inputs, interrupt, print, say, stem, unwritable};
+use super::{
+    Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
+};
 use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
     Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
@@ -17,8 +19,6 @@ use kmcfit_core::internals::solvers::{
 };
 use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Fit the functions of a model to its data; write result, tables and figures.
@@ -61,28 +61,53 @@ pub(super) struct Printed {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
-        return Err(InputError::new(
-            Place::Argument("--checkpoint".into()),
-            "no time can be this",
-        )
-        .found(seconds)
-        .expected("a number of seconds, 0 (after every iteration) or greater")
-        .into());
+        return Err(InputError::argument("--checkpoint", "no time can be this")
+            .found(seconds)
+            .expected("a number of seconds, 0 (after every iteration) or greater")
+            .into());
     }
     let file = arguments.set.read(&arguments.model)?;
-    let model = build(&file, Purpose::Fit)?;
-    let heading = Heading::of_model("fit", &file, !arguments.no_report, arguments.checkpoint);
-    let flag = interrupt::flag();
-    let claim = fit_claim(&model).inputs(inputs(&file));
-    let folder = OutputFolder::prepare(&output_path(arguments), claim)?;
-    note_discarded(&folder, &heading)?;
+    let own = || Path::new("runs").join(stem(&arguments.model));
     let printed = Printed {
         json: arguments.json,
         timings: arguments.timings,
         plot: arguments.plot,
     };
-    let journal = begun(&folder, &heading)?;
-    run_in(&folder, model, flag, (heading.figures, journal), &printed)
+    let heading = Heading::of_model("fit", &file, !arguments.no_report, arguments.checkpoint);
+    let out = arguments.out.clone().unwrap_or_else(own);
+    fit(&file, &heading, &out, &printed, false)
+}
+
+/// Goes on with a fit that did not come to its end.
+pub(super) fn go_on(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
+    let path = heading.inputs.first().cloned().unwrap_or_default();
+    let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
+    let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
+    fit(&file, &now, place, printed, true)
+}
+
+fn fit(
+    file: &ModelFile,
+    heading: &Heading,
+    out: &Path,
+    printed: &Printed,
+    is_resumed: bool,
+) -> Result<u8, Failure> {
+    let mut model = build(file, Purpose::Fit)?;
+    model.settings.interrupt = Some(interrupt::flag());
+    let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
+    if !is_resumed {
+        note_discarded(&folder, heading)?;
+    }
+    let journal = open_journal(&folder, heading, is_resumed)?;
+    announce(&model);
+    let progress = Progress::new(&model.settings.stopping);
+    let (document, status) = fit_into(&folder, &model, &progress, heading.figures, journal)?;
+    tell(&document, folder.path(), printed);
+    if status == Status::Interrupted {
+        interrupt::say_resumable(folder.path(), "fit");
+    }
+    Ok(exit_code(status))
 }
 
 /// Says that unfinished work of the same command on the same inputs is discarded.
@@ -105,50 +130,17 @@ pub(super) fn note_discarded(folder: &OutputFolder, heading: &Heading) -> Result
     Ok(())
 }
 
-/// A new journal.
-pub(super) fn begun(folder: &OutputFolder, heading: &Heading) -> Result<FitJournal, Failure> {
-    let journal = FitJournal::begin(folder.path(), heading);
-    Ok(journal.map_err(|error| unwritable(folder.path(), &error))?)
-}
-
-/// Goes on with a fit that did not come to its end.
-pub(super) fn go_on(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
-    let path = heading.inputs.first().cloned().unwrap_or_default();
-    let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
-    let model = build(&file, Purpose::Fit)?;
-    let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
-    let flag = interrupt::flag();
-    let claim = fit_claim(&model).inputs(inputs(&file));
-    let folder = OutputFolder::prepare(place, claim)?;
-    let journal = FitJournal::resume(folder.path(), &now)?;
-    run_in(&folder, model, flag, (heading.figures, journal), printed)
-}
-
-fn run_in(
+/// The journal of a fit: resumed, which is refused where an input has changed, or begun.
+pub(super) fn open_journal(
     folder: &OutputFolder,
-    mut model: Model,
-    flag: Arc<AtomicBool>,
-    (with_figures, journal): (bool, FitJournal),
-    printed: &Printed,
-) -> Result<u8, Failure> {
-    model.settings.interrupt = Some(flag);
-    for remark in &model.remarks {
-        say("note", remark);
+    heading: &Heading,
+    is_resumed: bool,
+) -> Result<FitJournal, InputError> {
+    match is_resumed {
+        true => FitJournal::resume(folder.path(), heading),
+        false => FitJournal::begin(folder.path(), heading)
+            .map_err(|error| unwritable(folder.path(), &error)),
     }
-    for warning in &model.warnings {
-        say("warning", warning);
-    }
-    let progress = Progress::new(&model.settings.stopping);
-    let (document, status) = fit_into(folder, &model, &progress, with_figures, journal)?;
-    tell(&document, folder.path(), printed);
-    if status == Status::Interrupted {
-        let folder = folder.path().display();
-        say(
-            "note",
-            format!("`kmcfit resume {folder}` goes on with this fit"),
-        );
-    }
-    Ok(exit_code(status))
 }
 
 /// Prints what a run came to.
@@ -258,27 +250,21 @@ pub(super) fn search(
     }
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {
-        None => {
-            fit_with_noise_watched(problem, &start, settings, &mut watch).map(|(problem, fit)| {
-                let with_sigmas = Model {
-                    problem,
-                    ..model.clone()
-                };
-                (Some(with_sigmas), None, fit)
-            })
+        None => fit_with_noise_watched(problem, &start, settings, &mut watch)
+            .map(|(problem, fit)| (None, problem, fit)),
+        Some(WeightSearch { rule, penalties }) => {
+            choose_weight_watched(problem, &start, settings, *rule, penalties, &mut watch)
+                .map(|(path, problem, fit)| (Some(path), problem, fit))
         }
-        Some(WeightSearch { rule, penalties }) => choose_weight_watched(
-            problem, &start, settings, *rule, penalties, &mut watch,
-        )
-        .map(|(path, problem, fit)| {
-            let weighted = Model {
-                problem,
-                ..model.clone()
-            };
-            (Some(weighted), Some(path), fit)
-        }),
     };
     progress.clear();
+    let result = result.map(|(path, problem, fit)| {
+        let as_fitted = Model {
+            problem,
+            ..model.clone()
+        };
+        (Some(as_fitted), path, fit)
+    });
     let result = result.or_else(|breakdown| {
         let fit = without_motion(problem, &model.given_start, settings, breakdown)?;
         Ok((None, None, fit))
@@ -307,10 +293,4 @@ fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
         }
     };
     model.predictions.iter().flat_map(one).collect()
-}
-
-/// `runs/NAME` with the name of the model file.
-fn output_path(arguments: &Arguments) -> PathBuf {
-    let own = || Path::new("runs").join(stem(&arguments.model));
-    arguments.out.clone().unwrap_or_else(own)
 }

@@ -2,7 +2,7 @@
 
 use super::{Failure, OK, print, schema, unwritable};
 use crate::config::{ModelFile, starter};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::observations::SAMPLE_RATES;
 use crate::report::shell_quoted;
 use crate::results::write_together;
@@ -28,17 +28,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let rate = arguments.sample_rate;
     if let Some(rate) = rate.filter(|rate| !SAMPLE_RATES.contains(rate)) {
-        return Err(InputError::new(
-            Place::Argument("--sample-rate".into()),
-            "no rate can be this",
-        )
-        .found(format!("{rate:?}"))
-        .expected(format!(
-            "samples per second, a number from {:e} to {:e}",
-            SAMPLE_RATES.start(),
-            SAMPLE_RATES.end()
-        ))
-        .into());
+        return Err(InputError::argument("--sample-rate", "no rate can be this")
+            .found(format!("{rate:?}"))
+            .expected(format!(
+                "samples per second, a number from {:e} to {:e}",
+                SAMPLE_RATES.start(),
+                SAMPLE_RATES.end()
+            ))
+            .into());
     }
     let out = match &arguments.out {
         Some(out) => out.clone(),

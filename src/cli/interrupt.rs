@@ -4,6 +4,7 @@ use super::{INTERRUPTED, TERMINATED};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::io;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
 
@@ -56,6 +57,15 @@ pub fn exit_code() -> u8 {
         signal if signal == SIGTERM.unsigned_abs() as usize => TERMINATED,
         _ => INTERRUPTED,
     }
+}
+
+/// Says how interrupted work is continued.
+pub fn say_resumable(folder: &Path, what: &str) {
+    let folder = folder.display();
+    super::say(
+        "note",
+        format!("`kmcfit resume {folder}` goes on with this {what}"),
+    );
 }
 
 /// Makes a file that grows beyond a limit (`ulimit -f`) an error of the write, which is reported, and not a signal

@@ -1,6 +1,5 @@
 //! The command line: one file per command, no numerics.
 
-mod analyses;
 mod arguments;
 mod check;
 mod compare;
@@ -20,8 +19,8 @@ mod shell;
 mod simulate;
 mod study;
 
-use crate::config::ModelFile;
-use crate::error::{InputError, Place};
+use crate::config::{Model, ModelFile};
+use crate::error::InputError;
 use clap::{CommandFactory, Parser, Subcommand};
 use environment::{check_arithmetic, provide_host};
 use kmcfit_core::internals::solvers::Status;
@@ -136,6 +135,12 @@ pub fn main() -> ExitCode {
     })
 }
 
+/// Prints the notes and warnings of a model.
+fn announce(model: &Model) {
+    model.remarks.iter().for_each(|remark| say("note", remark));
+    (model.warnings.iter()).for_each(|warning| say("warning", warning));
+}
+
 fn exit_code(status: Status) -> u8 {
     match status {
         Status::Converged | Status::Completed => OK,
@@ -166,10 +171,7 @@ fn inputs(file: &ModelFile) -> Vec<PathBuf> {
 
 /// A failure to write, as an input error about where the output should go.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
-    InputError::new(
-        Place::Argument("--out".into()),
-        "the results cannot be written",
-    )
-    .found(format!("{}: {error}", path.display()))
-    .expected("a place that can be written to")
+    InputError::argument("--out", "the results cannot be written")
+        .found(format!("{}: {error}", path.display()))
+        .expected("a place that can be written to")
 }

@@ -1,7 +1,7 @@
 //! `--set KEY=VALUE`
 
 use crate::config::{ModelFile, Override};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use std::path::Path;
 
 /// Values in the place of those of the model file.
@@ -27,8 +27,8 @@ impl Overrides {
     /// Refuses overrides where nothing can be set.
     pub fn refuse(&self, what: &str) -> Result<(), InputError> {
         match self.set.first() {
-            Some(first) => Err(InputError::new(
-                Place::Argument(format!("--set {first}")),
+            Some(first) => Err(InputError::argument(
+                format!("--set {first}"),
                 "nothing can be set here",
             )
             .found(what)

@@ -1,7 +1,7 @@
 //! `kmcfit predict`
 
 use super::{Failure, OK, print, unwritable};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::report::{
     CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
 };
@@ -71,12 +71,13 @@ fn state(text: &str) -> Result<State, InputError> {
             displacement,
             velocity,
         }),
-        _ => Err(InputError::new(
-            Place::Argument("--initial".into()),
-            "this is no initial state",
-        )
-        .found(format!("`{text}`"))
-        .expected("two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1")),
+        _ => Err(
+            InputError::argument("--initial", "this is no initial state")
+                .found(format!("`{text}`"))
+                .expected(
+                    "two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1",
+                ),
+        ),
     }
 }
 

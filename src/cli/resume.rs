@@ -1,7 +1,7 @@
 //! `kmcfit resume`
 
 use super::fit::{self, Printed};
-use super::{Failure, INTERRUPTED, NOT_CONVERGED, OK, compare, say, study};
+use super::{Failure, INTERRUPTED, compare, exit_code, say, study};
 use crate::error::InputError;
 use crate::report::Run;
 use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
@@ -65,10 +65,8 @@ fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, Failure> {
         "nothing is left to do: this run had come to its end",
     );
     fit::tell(&run.document, folder, printed);
-    let is = |status: Status| run.document.outcome.status == status.name();
-    Ok(match () {
-        () if is(Status::Converged) || is(Status::Completed) => OK,
-        () if is(Status::Interrupted) => INTERRUPTED,
-        () => NOT_CONVERGED,
+    Ok(match run.document.outcome.status {
+        Status::Interrupted => INTERRUPTED,
+        status => exit_code(status),
     })
 }

@@ -3,7 +3,7 @@
 use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{ModelFile, Purpose, build};
 use crate::digest::{digest, digest_of_file};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::input::{one_of, quote, read_text};
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
@@ -117,12 +117,11 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     let target = out.canonicalize().ok();
     for input in inputs(file) {
         if target.is_some() && input.canonicalize().ok() == target {
-            return Err(InputError::new(
-                Place::Argument("--out".into()),
-                "this file is an input of the model",
-            )
-            .found(out.display())
-            .expected("another file, so that no measurement is lost"));
+            return Err(
+                InputError::argument("--out", "this file is an input of the model")
+                    .found(out.display())
+                    .expected("another file, so that no measurement is lost"),
+            );
         }
     }
     if out.is_dir() {
@@ -132,8 +131,8 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     let beside = record_path(out);
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     match is_taken(out) || is_taken(&beside) {
-        true if !is_own(out, &beside) => Err(InputError::new(
-            Place::Argument("--out".into()),
+        true if !is_own(out, &beside) => Err(InputError::argument(
+            "--out",
             "a file stands here that was not written by `kmcfit simulate`, or was changed since",
         )
         .found(match is_taken(out) {
@@ -227,8 +226,8 @@ fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
 
 fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {
     match (arguments.noise, arguments.seed) {
-        (Some(sigma), _) if !(sigma.is_finite() && sigma >= 0.0) => Err(InputError::new(
-            Place::Argument("--noise".into()),
+        (Some(sigma), _) if !(sigma.is_finite() && sigma >= 0.0) => Err(InputError::argument(
+            "--noise",
             "a standard deviation cannot be this",
         )
         .found(sigma)
@@ -252,11 +251,8 @@ fn chosen<'a>(
     };
     found.ok_or_else(|| {
         let names = experiments.iter().map(|e| e.name.as_str());
-        InputError::new(
-            Place::Argument("--experiment".into()),
-            "the model has no such experiment",
-        )
-        .found(quote(arguments.experiment.as_deref().unwrap_or_default()))
-        .expected(one_of(names))
+        InputError::argument("--experiment", "the model has no such experiment")
+            .found(quote(arguments.experiment.as_deref().unwrap_or_default()))
+            .expected(one_of(names))
     })
 }

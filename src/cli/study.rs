@@ -1,15 +1,15 @@
 //! `kmcfit study`
 
-use super::compare::{children, claim, entries, files_of, side_by_side, verdict};
-use super::fit::{note_discarded, search};
+use super::compare::{open_analyses, tell};
+use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, OK, Overrides, analyses, inputs, interrupt, print, say, stem,
+    Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
     unwritable,
 };
 use crate::config::{Model, ModelFile, Override, Purpose, Sequence, build};
-use crate::error::{InputError, Place};
-use crate::report::study::{FitPiece, StudyDocument};
+use crate::error::InputError;
+use crate::report::study::{self, FitPiece, Optimum, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
@@ -25,10 +25,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the data can and cannot tell: of a model, or a story of several models on one page.
+/// What the data can and cannot tell: of a model, or a sequence of several models on one page.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Model file or story (YAML), or the folder of a finished run, whose model is fitted again.
+    /// Model file or sequence (YAML), or the folder of a finished run, whose model is fitted again.
     model: PathBuf,
     /// Folder for the results [default: runs/NAME-study].
     #[arg(long)]
@@ -55,23 +55,23 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
         overrides.extend(arguments.set.parse()?);
         let file = ModelFile::read_with(&run.document.model.file, &overrides)?;
-        return study(&file, &out, arguments.json, threads, false);
+        return run_in(&file, &out, arguments.json, threads, false);
     }
     match Sequence::read(&arguments.model)? {
-        Some(story) => {
+        Some(sequence) => {
             arguments
                 .set
-                .refuse("a story, whose models say themselves what they are")?;
-            tell(&arguments.model, &story, &out, arguments.json, false)
+                .refuse("a sequence, whose models say themselves what they are")?;
+            tell(&arguments.model, &sequence, &out, arguments.json, false)
         }
         None => {
             let file = arguments.set.read(&arguments.model)?;
-            study(&file, &out, arguments.json, threads, false)
+            run_in(&file, &out, arguments.json, threads, false)
         }
     }
 }
 
-/// Goes on with a study or a story that did not come to its end.
+/// Goes on with a study or a sequence that did not come to its end.
 pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
     let threads = threads(asked)?;
     let Heading {
@@ -79,94 +79,25 @@ pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Resul
     } = AnalysisJournal::heading(folder, STUDY_JOURNAL)?;
     let model = inputs.into_iter().next().unwrap_or_default();
     match Sequence::read(&model)? {
-        Some(story) => tell(&model, &story, folder, as_json, true),
+        Some(sequence) => tell(&model, &sequence, folder, as_json, true),
         None => {
             let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
-            study(&file, folder, as_json, threads, true)
+            run_in(&file, folder, as_json, threads, true)
         }
     }
 }
 
 fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     match asked {
-        Some(0) => Err(InputError::new(
-            Place::Argument("--threads".into()),
-            "a study needs a thread",
-        )
-        .found(0)
-        .expected("1 or more")),
+        Some(0) => Err(InputError::argument("--threads", "a study needs a thread")
+            .found(0)
+            .expected("1 or more")),
         Some(threads) => Ok(threads),
         None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
     }
 }
 
-/// Runs the models of a story and tells them on one page.
-fn tell(
-    path: &Path,
-    story: &Sequence,
-    out: &Path,
-    as_json: bool,
-    go_on: bool,
-) -> Result<u8, Failure> {
-    let entries = entries(&story.models, out)?;
-    let mut heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
-    for model in &story.models {
-        heading = heading.with_model(&ModelFile::read(model)?);
-    }
-    let flag = interrupt::flag();
-    let mut read = files_of(&entries);
-    read.push(path.into());
-    let folder = OutputFolder::prepare(out, claim("study", STUDY_JOURNAL).inputs(read))?;
-    let children = children(&entries, &folder)?;
-    let mut journal = journal(&folder, &heading, go_on)?;
-    let (comparison, interrupted) = side_by_side(entries, children, &flag, &mut journal, go_on)?;
-    let comparison = match interrupted {
-        true => comparison,
-        false => comparison.told_as(&story.title),
-    };
-    let written = comparison
-        .write(&folder)
-        .and_then(|()| journal.finish_if(!interrupted));
-    written.map_err(|error| unwritable(folder.path(), &error))?;
-    if as_json {
-        print(&json(&comparison.document()));
-    } else {
-        print(&format!("{}\n\n", story.title));
-        if interrupted {
-            print("interrupted: the story is not complete, so nothing is concluded from it\n");
-        } else {
-            for sentence in comparison.conclusions() {
-                print(&format!("- {sentence}\n"));
-            }
-        }
-        print(&format!(
-            "\nthe page is {}\n",
-            folder.path().join("compare.html").display()
-        ));
-    }
-    Ok(match interrupted {
-        true => interrupt::exit_code(),
-        false => verdict(&comparison),
-    })
-}
-
-/// The journal of a study: resumed, which is refused where a model has changed, or begun.
-fn journal(
-    folder: &OutputFolder,
-    heading: &Heading,
-    go_on: bool,
-) -> Result<AnalysisJournal, InputError> {
-    match go_on {
-        true => AnalysisJournal::resume(folder.path(), STUDY_JOURNAL, heading),
-        false => {
-            note_discarded(folder, heading)?;
-            AnalysisJournal::begin(folder.path(), STUDY_JOURNAL, heading)
-                .map_err(|error| unwritable(folder.path(), &error))
-        }
-    }
-}
-
-fn study(
+fn run_in(
     file: &ModelFile,
     out: &Path,
     as_json: bool,
@@ -176,12 +107,7 @@ fn study(
     let mut model = build(file, Purpose::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
-    for remark in &model.remarks {
-        say("note", remark);
-    }
-    for warning in &model.warnings {
-        say("warning", warning);
-    }
+    announce(&model);
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));
     let heading = Heading::of_model("study", file, true, None);
@@ -189,7 +115,7 @@ fn study(
         .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
         .inputs(inputs(file));
     let folder = OutputFolder::prepare(out, claim)?;
-    let journal = journal(&folder, &heading, go_on)?;
+    let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, go_on)?;
     let mut work = Work {
         model: &model,
         folder: folder.path(),
@@ -233,12 +159,10 @@ fn study(
             ));
         }
     }
-    let fitted = document.fit.as_ref().map(|fit| fit.status.as_str());
-    let fine = [Status::Converged, Status::Completed].map(Status::name);
-    Ok(match (done, fitted) {
+    Ok(match (done, &document.fit) {
         (false, _) => interrupt::exit_code(),
-        (true, Some(status)) if fine.contains(&status) => OK,
-        (true, _) => NOT_CONVERGED,
+        (true, Some(fit)) => exit_code(fit.status),
+        (true, None) => NOT_CONVERGED,
     })
 }
 
@@ -285,9 +209,6 @@ impl From<io::Error> for Trouble {
     }
 }
 
-/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation there.
-type Optimum<'a> = (&'a Problem, &'a [f64], &'a Evaluation);
-
 /// A study at work.
 struct Work<'a> {
     model: &'a Model,
@@ -305,78 +226,71 @@ impl Work<'_> {
     /// All analyses, up to an interrupt.
     fn run(&mut self) -> Result<(), Trouble> {
         let (problem, theta, evaluation) = self.fit()?;
-        let optimum = (&problem, theta.as_slice(), &evaluation);
-        self.at_the_optimum(optimum)?;
-        self.further_fits(optimum)?;
-        self.extremes(optimum)
+        let at = Optimum {
+            problem: &problem,
+            theta: &theta,
+            evaluation: &evaluation,
+        };
+        self.at_the_optimum(at)?;
+        self.further_fits(at)?;
+        self.extremes(at)
     }
 
     /// Analyses of the linearised fit and of one number at a time.
-    fn at_the_optimum(&mut self, optimum: Optimum) -> Result<(), Trouble> {
-        let (problem, theta, evaluation) = optimum;
+    fn at_the_optimum(&mut self, at: Optimum) -> Result<(), Trouble> {
         let model = self.model;
         let plan = &model.study;
-        let spectrum = || analyses::spectrum(problem, theta, evaluation);
-        self.document.spectrum = Some(self.analysis("spectrum", spectrum)?);
-        let truth = model.truth.as_ref();
-        let bands = || analyses::bands(problem, theta, evaluation, plan, truth);
+        self.document.spectrum = Some(self.analysis("spectrum", || study::spectrum(at))?);
+        let bands = || study::bands(at, plan, model.truth.as_ref());
         self.document.bands = Some(self.analysis("bands", bands)?);
         for (i, target) in plan.profiles.iter().enumerate() {
-            let Some(of) = analyses::linear(problem, target) else {
+            let Some(of) = study::linear(at.problem, target) else {
                 continue;
             };
-            let profile = || analyses::profile_of(problem, theta, &of, plan);
+            let profile = || study::profile_of(at, &of, plan);
             let found = self.analysis(&format!("profile {i}"), profile)?;
             let found = self.or_fail(&format!("the profile of {}", of.name), found);
             self.document.profiles.extend(found);
         }
         if !plan.candidates.is_empty() {
-            let candidates = || analyses::candidates(problem, theta, evaluation, &plan.candidates);
+            let candidates = || study::candidates(at, &plan.candidates);
             self.document.candidates = self.analysis("candidates", candidates)?;
         }
-        let equivalents = || analyses::equivalents(problem, evaluation, &plan.equivalents);
+        let equivalents = || study::equivalents(at, &plan.equivalents);
         self.document.equivalents = self.analysis("equivalents", equivalents)?;
         Ok(())
     }
 
     /// Further fits: from other starting points, of constant functions, of other noise.
-    fn further_fits(&mut self, (problem, theta, _): Optimum) -> Result<(), Trouble> {
+    fn further_fits(&mut self, at: Optimum) -> Result<(), Trouble> {
         let (model, threads) = (self.model, self.threads);
         let plan = &model.study;
         if plan.starts > 0 {
-            let starts = || analyses::multistart(model, problem, theta, plan, threads);
+            let starts = || study::starts(model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
         }
         if plan.varies {
-            let varies = || analyses::varies(problem, theta, plan, threads);
-            let found = self.analysis("varies", varies)?;
+            let found = self.analysis("varies", || study::varies(at, plan, threads))?;
             let found = self.or_fail("whether each function varies", found);
             self.document.varies = found.unwrap_or_default();
         }
         if plan.replicates > 0 {
-            let refits = || analyses::refits(problem, theta, plan, threads);
-            let found = self.analysis("refits", refits)?;
+            let found = self.analysis("refits", || study::refits(at, plan, threads))?;
             self.document.bootstrap = self.or_fail("refits", found).unwrap_or_default();
         }
         Ok(())
     }
 
     /// Extremes of the functions, and the predictions of the systems that have them.
-    fn extremes(&mut self, (problem, theta, evaluation): Optimum) -> Result<(), Trouble> {
+    fn extremes(&mut self, at: Optimum) -> Result<(), Trouble> {
         let (model, threads) = (self.model, self.threads);
-        let plan = &model.study;
-        let (tubes, predictions) = self.analysis("tubes", || {
-            let level = analyses::level(problem, theta, evaluation, plan);
-            let (tubes, extremes) = analyses::tubes(problem, theta, &level, plan, threads);
-            let predictions = analyses::predictions(problem, theta, evaluation, model, &extremes);
-            (tubes, predictions)
-        })?;
+        let (tubes, predictions) = self.analysis("tubes", || study::tubes(model, at, threads))?;
         if tubes.is_empty() {
             let reason = "the optimum itself is not within the stated level and the constraints";
             self.fail("tubes", reason);
         }
         self.document.tubes = tubes;
-        self.document.budgeted = !problem.penalties.is_empty();
+        self.document.budgeted = !at.problem.penalties.is_empty();
         self.document.predictions = predictions;
         Ok(())
     }
@@ -420,13 +334,13 @@ impl Work<'_> {
             let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            interrupted = Some(analyses::fit(problem, &found));
-            Ok::<_, String>(analyses::fit(problem, &found))
+            let fit = FitPiece::of(problem, &found);
+            interrupted = Some(fit.clone());
+            Ok::<_, String>(fit)
         };
         let whole = || !flag.load(Ordering::Relaxed);
         let is_right = |kept: &Result<FitPiece, String>| {
-            kept.as_ref()
-                .map_or(true, |fit| analyses::is_of(&model.problem, fit))
+            kept.as_ref().map_or(true, |fit| fit.is_of(&model.problem))
         };
         self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.analysis("fit", compute, whole)?;
@@ -437,8 +351,8 @@ impl Work<'_> {
         };
         let fit = fitted.map_err(Trouble::Numerical)?;
         FitJournal::clear(folder)?;
-        let interrupted = fit.status == Status::Interrupted.name();
-        let problem = analyses::as_fitted(&model.problem, &fit);
+        let interrupted = fit.status == Status::Interrupted;
+        let problem = fit.problem(&model.problem);
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);
         let evaluation = problem

@@ -9,7 +9,7 @@ mod sources;
 pub use restart::restart_with_plain_allocators;
 pub use sources::{Available, Limit};
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use std::path::Path;
 
 /// Assumed to be available where the system does not say, bytes.
@@ -70,12 +70,9 @@ pub fn check_file(path: &Path, needed: u64) -> Result<(), InputError> {
 /// When less than that is available.
 pub(crate) fn check_base() -> Result<(), InputError> {
     check(BASE).map_err(|available| {
-        InputError::new(
-            Place::Argument("memory".into()),
-            "there is too little memory to begin",
-        )
-        .found(available)
-        .expected(format!("at least {}", in_words(BASE as f64)))
+        InputError::argument("memory", "there is too little memory to begin")
+            .found(available)
+            .expected(format!("at least {}", in_words(BASE as f64)))
     })
 }
 

@@ -107,12 +107,9 @@ impl Table {
                 .hint("the file has no column names: give the column by its number");
         }
         let names = || self.headers().iter().map(String::as_str);
-        let error = error.expected(one_of(names()));
         let bare = names().map(|header| split_unit(header).0);
-        match did_you_mean(name, names().chain(bare)) {
-            Some(hint) => error.hint(hint),
-            None => error,
-        }
+        let hint = did_you_mean(name, names().chain(bare));
+        error.expected(one_of(names())).hint_if(hint)
     }
 }
 

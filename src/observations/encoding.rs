@@ -5,7 +5,7 @@ use std::path::Path;
 
 use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 
 /// How the letters of a file were written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +53,9 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
         }
     };
     match text.find('\0') {
-        Some(at) => Err(zero_byte(path, &text[..at])),
+        Some(at) => Err(InputError::behind(path, &text[..at], "the file is not text")
+            .found("the byte 0x00")
+            .hint("is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8")),
         None => Ok((text, encoding)),
     }
 }
@@ -63,18 +65,6 @@ fn without_mark(text: String) -> String {
         Some(rest) => rest.to_owned(),
         None => text,
     }
-}
-
-/// The error for a zero byte after some text.
-fn zero_byte(path: &Path, before: &str) -> InputError {
-    let place = Place::Line {
-        file: path.to_path_buf(),
-        line: 1 + before.matches('\n').count(),
-        column: 1 + before.chars().rev().take_while(|&c| c != '\n').count(),
-    };
-    InputError::new(place, "the file is not text")
-        .found("the byte 0x00")
-        .hint("is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8")
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::encoding::Encoding;
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::input::quote;
 
 /// How a table is written; what is `None` is detected.
@@ -41,7 +41,7 @@ impl TableFormat {
         if let Some(sign) = self.decimal
             && !matches!(sign, '.' | ',')
         {
-            return Err(argument("decimal", "not a decimal sign")
+            return Err(InputError::argument("decimal", "not a decimal sign")
                 .found(quote(&sign.to_string()))
                 .expected("`.` or `,`"));
         }
@@ -52,23 +52,22 @@ impl TableFormat {
             || delimiter.is_ascii_punctuation()
                 && !matches!(delimiter, '.' | '+' | '-' | '"' | '#');
         if !separates {
-            return Err(argument("delimiter", "fields cannot be separated by this")
-                .found(quote(&delimiter.to_string()))
-                .expected("a comma, a semicolon, a tab, a blank or the like"));
+            return Err(
+                InputError::argument("delimiter", "fields cannot be separated by this")
+                    .found(quote(&delimiter.to_string()))
+                    .expected("a comma, a semicolon, a tab, a blank or the like"),
+            );
         }
         match self.decimal == self.delimiter {
-            true => Err(
-                argument("delimiter", "the delimiter is also the decimal sign")
-                    .found(quote(&delimiter.to_string()))
-                    .expected("two different signs"),
-            ),
+            true => Err(InputError::argument(
+                "delimiter",
+                "the delimiter is also the decimal sign",
+            )
+            .found(quote(&delimiter.to_string()))
+            .expected("two different signs")),
             false => Ok(()),
         }
     }
-}
-
-fn argument(name: &str, problem: &str) -> InputError {
-    InputError::new(Place::Argument(name.to_owned()), problem)
 }
 
 /// How a table was found to be written; its `Display` says it in words.

@@ -3,7 +3,7 @@
 
 use super::Table;
 use super::columns::split_unit;
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use crate::input::quote;
 use crate::units::{Kind, Unit, unbracketed};
 
@@ -74,23 +74,17 @@ impl Table {
             return Ok(());
         }
         let line = |line: Option<usize>| line.unwrap_or(1);
-        let place = Place::Line {
-            file: self.path().to_path_buf(),
-            line: line(self.format().units_row),
-            column: 1,
-        };
-        Err(InputError::new(
-            place,
-            format!("two units for the column {}", quote(&self.label(index))),
-        )
-        .found(format!(
-            "{} in the row of units (line {}), {} in the column name (line {})",
-            quote(stated.row.unwrap_or_default()),
-            line(self.format().units_row),
-            quote(stated.header.unwrap_or_default()),
-            line(self.format().header)
-        ))
-        .expected("the same unit in both, or in one of them"))
+        let problem = format!("two units for the column {}", quote(&self.label(index)));
+        let units_row = line(self.format().units_row);
+        Err(InputError::line(self.path(), units_row, 1, problem)
+            .found(format!(
+                "{} in the row of units (line {}), {} in the column name (line {})",
+                quote(stated.row.unwrap_or_default()),
+                units_row,
+                quote(stated.header.unwrap_or_default()),
+                line(self.format().header)
+            ))
+            .expected("the same unit in both, or in one of them"))
     }
 }
 

@@ -334,14 +334,11 @@ fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError
     if fields <= MOST_COLUMNS {
         return Ok(());
     }
-    let place = Place::Line {
-        file: path.to_path_buf(),
-        line,
-        column: 1,
-    };
-    Err(InputError::new(place, "the table has too many columns")
-        .found(format!("{fields} fields"))
-        .expected(format!("at most {MOST_COLUMNS}")))
+    Err(
+        InputError::line(path, line, 1, "the table has too many columns")
+            .found(format!("{fields} fields"))
+            .expected(format!("at most {MOST_COLUMNS}")),
+    )
 }
 
 /// Column names: each once, and not all numbers.
@@ -351,14 +348,7 @@ fn check_headers(
     headers: &StringRecord,
     decimal: char,
 ) -> Result<(), InputError> {
-    let error = |problem: String| {
-        let place = Place::Line {
-            file: path.to_path_buf(),
-            line,
-            column: 1,
-        };
-        InputError::new(place, problem)
-    };
+    let error = |problem: String| InputError::line(path, line, 1, problem);
     let is_number = |name| matches!(field::read(name, decimal), Field::Number(_));
     if headers.iter().all(is_number) {
         return Err(error("the column names are missing".to_owned())

@@ -94,12 +94,9 @@ impl Columns {
     pub fn required(&self, name: &str) -> Result<Vec<f64>, InputError> {
         self.column(name).ok_or_else(|| {
             let names = || self.headers.iter().map(String::as_str);
-            let error = InputError::file(&self.path, format!("there is no column `{name}`"))
-                .expected(one_of(names()));
-            match did_you_mean(name, names()) {
-                Some(hint) => error.hint(hint),
-                None => error,
-            }
+            InputError::file(&self.path, format!("there is no column `{name}`"))
+                .expected(one_of(names()))
+                .hint_if(did_you_mean(name, names()))
         })
     }
 

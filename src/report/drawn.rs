@@ -1,10 +1,9 @@
 //! The figures of a fit, from the run.
 
 use super::FittedModel;
-use super::figure::Figure;
-use super::figures::{self, FunctionCurve, RatioCurves};
+use super::chart::Figure;
+use super::figures::{self, FunctionCurve};
 use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
-use kmcfit_core::internals::identifiability::{Band, Bands};
 use kmcfit_core::internals::solvers::IterationRecord;
 
 impl FittedModel<'_> {
@@ -135,7 +134,7 @@ impl FittedModel<'_> {
         let times = problem.oscillator.grid.times();
         let bands = self
             .bands()
-            .map_or(Vec::new(), |b| ends(b, &b.functions, &times));
+            .map_or(Vec::new(), |b| b.curves(&b.functions, &times));
         let curves: Vec<FunctionCurve> = (list.iter().enumerate())
             .map(|(i, (function, found))| FunctionCurve {
                 band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
@@ -153,47 +152,7 @@ impl FittedModel<'_> {
         let times = self.model.problem.oscillator.grid.times();
         let bands = self
             .bands()
-            .map_or(Vec::new(), |b| ends(b, &b.ratios, &times));
-        figures::ratios(
-            &times,
-            &curves(&found),
-            truth.as_ref().map(curves).as_ref(),
-            &bands,
-        )
-    }
-}
-
-/// The lower and upper ends of 95 % bands at `times`, by straight lines between those of `bands`.
-pub(super) fn ends(bands: &Bands, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
-    let known = &bands.times;
-    if known.is_empty() {
-        return Vec::new();
-    }
-    let at = |values: &dyn Fn(usize) -> f64, t: f64| {
-        let next = known.partition_point(|k| *k < t).min(known.len() - 1);
-        let before = next.saturating_sub(1);
-        match known[next] - known[before] {
-            run if known[next] > t && run > 0.0 => {
-                let share = (t - known[before]) / run;
-                values(before) + share * (values(next) - values(before))
-            }
-            _ => values(next),
-        }
-    };
-    let side = |band: &Band, side: usize| -> Vec<f64> {
-        let value = |i: usize| band.pointwise(i)[side];
-        times.iter().map(|t| at(&value, *t)).collect()
-    };
-    list.iter()
-        .map(|band| [side(band, 0), side(band, 1)])
-        .collect()
-}
-
-fn curves(ratios: &Ratios) -> RatioCurves<'_> {
-    RatioCurves {
-        k_over_m: &ratios.k_over_m,
-        c_over_m: &ratios.c_over_m,
-        frequency: &ratios.frequency,
-        damping_ratio: &ratios.damping_ratio,
+            .map_or(Vec::new(), |b| b.curves(&b.ratios, &times));
+        figures::ratios(&times, &found, truth.as_ref(), &bands)
     }
 }

@@ -1,11 +1,11 @@
 //! The standard figures of a fit, from plain slices.
 
-use super::figure::{Axis, Figure, Panel};
-use super::mark::{Colour, Dash, Mark, Style};
-use super::predict::PredictedMotion;
+use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
-use kmcfit_core::internals::simulate::Trajectory;
+use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
+use kmcfit_core::internals::study::PredictedMotion;
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
@@ -24,8 +24,9 @@ fn extent<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
     })
 }
 
-fn time() -> Axis {
-    Axis::linear("time t", "s")
+/// How readings are drawn.
+fn dots(colour: Colour, count: usize) -> Style {
+    Style::new(colour).width(if count > MANY { 2.0 } else { 3.5 })
 }
 
 /// One measured channel: what was measured, its unit, the times in s, and the readings.
@@ -33,33 +34,27 @@ pub type Channel<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
 
 /// The measured motion, one panel for each channel.
 pub fn observation(channels: &[Channel]) -> Figure {
-    let figure = Figure::new(
+    Figure::new(
         "observation",
         "Observed motion",
         "The measured channels against time, one panel for each.",
-    );
-    channels.iter().fold(figure, |figure, (label, unit, t, y)| {
-        let width = if t.len() > MANY { 2.0 } else { 3.5 };
-        let mark = Mark::points("", t, y, Style::new(Colour::Blue).width(width));
-        figure.panel(Panel::new(time(), Axis::linear(*label, *unit)).mark(mark))
-    })
+    )
+    .panels(channels.iter().map(|(label, unit, t, y)| {
+        let mark = Mark::points("", t, y, dots(Colour::Blue, t.len()));
+        Panel::of_time(*label, *unit).mark(mark)
+    }))
 }
 
 /// A channel's readings and what the model says of them, in the unit of the channel.
 pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
-    let width = if t.len() > MANY { 2.0 } else { 3.5 };
-    let dots = Style::new(Colour::Grey).width(width);
+    let readings = Mark::points("readings", t, observed, dots(Colour::Grey, t.len()));
     let line = Style::new(Colour::Blue).width(1.4);
     Figure::new(
         "channel",
         "Readings and model",
         "The readings of the channel and what the fitted model says of them, against time.",
     )
-    .panel(
-        Panel::new(time(), Axis::linear(label, unit))
-            .mark(Mark::points("readings", t, observed, dots))
-            .mark(Mark::line("model", t, model, line)),
-    )
+    .panel(Panel::of_time(label, unit).marks([readings, Mark::line("model", t, model, line)]))
 }
 
 /// The residuals of a channel against time, and their autocorrelation beside the band in which that of
@@ -70,38 +65,27 @@ pub fn residuals(
     residuals: &[f64],
     diagnostics: &ResidualDiagnostics,
 ) -> Figure {
-    let width = if t.len() > MANY { 2.0 } else { 3.5 };
-    let lags: Vec<f64> = (0..diagnostics.autocorrelation.len())
-        .map(|lag| lag as f64 * diagnostics.step)
-        .collect();
+    let lags = 0..diagnostics.autocorrelation.len();
+    let lags: Vec<f64> = lags.map(|lag| lag as f64 * diagnostics.step).collect();
     let band = Style::new(Colour::Grey).dash(Dash::Dashed);
-    Figure::new("residuals", "Residuals", diagnostics.whiteness.to_string())
-        .panel(
-            Panel::new(time(), Axis::linear(format!("model - {label}"), unit)).mark(Mark::points(
-                "",
-                t,
-                residuals,
-                Style::new(Colour::Blue).width(width),
-            )),
-        )
-        .panel(
-            Panel::new(
-                Axis::linear("lag", "s"),
-                Axis::linear("autocorrelation", ""),
-            )
-            .mark(Mark::horizontal(
-                "95 % of white noise",
-                diagnostics.band,
-                band,
-            ))
-            .mark(Mark::horizontal("", -diagnostics.band, band))
-            .mark(Mark::line(
-                "residuals",
-                &lags,
-                &diagnostics.autocorrelation,
-                Style::new(Colour::Blue),
-            )),
-        )
+    let blue = Style::new(Colour::Blue);
+    let (x, y) = (
+        Axis::linear("lag", "s"),
+        Axis::linear("autocorrelation", ""),
+    );
+    Figure::new("residuals", "Residuals", diagnostics.whiteness.to_string()).panels([
+        Panel::of_time(format!("model - {label}"), unit).mark(Mark::points(
+            "",
+            t,
+            residuals,
+            dots(Colour::Blue, t.len()),
+        )),
+        Panel::new(x, y).marks([
+            Mark::horizontal("95 % of white noise", diagnostics.band, band),
+            Mark::horizontal("", -diagnostics.band, band),
+            Mark::line("residuals", &lags, &diagnostics.autocorrelation, blue),
+        ]),
+    ])
 }
 
 /// Cost J/J₀ and squared gradient norm G²/G₀² against the iteration, both relative to the start;
@@ -117,24 +101,16 @@ pub fn convergence(
     // Both solid, told apart by width: dashes vanish where the gradient norm jumps up and down.
     let gradient = Style::new(Colour::Orange).width(0.9 * factor);
     let squares = gradient_norm_squared_ratio;
+    let y = Axis::log("relative to the start", "");
     Figure::new(
         "convergence",
         "Convergence",
         "Cost and squared gradient norm, relative to the start, against the iteration.",
     )
-    .panel(
-        Panel::new(
-            Axis::log("iteration", ""),
-            Axis::log("relative to the start", ""),
-        )
-        .mark(Mark::line(
-            "gradient norm G²/G₀²",
-            iterations,
-            squares,
-            gradient,
-        ))
-        .mark(Mark::line("cost J/J₀", iterations, cost_ratio, cost)),
-    )
+    .panel(Panel::new(Axis::log("iteration", ""), y).marks([
+        Mark::line("gradient norm G²/G₀²", iterations, squares, gradient),
+        Mark::line("cost J/J₀", iterations, cost_ratio, cost),
+    ]))
 }
 
 /// The motion at one iteration: the iteration, the times in s, and the displacements in m.
@@ -143,27 +119,20 @@ pub type Snapshot<'a> = (usize, &'a [f64], &'a [f64]);
 /// The observed displacement and the motion of the fit at some iterations; times in s,
 /// displacements in m.
 pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
-    let observed = Mark::points(
-        "observed",
-        t_obs,
-        y_obs,
-        Style::new(Colour::Grey).width(4.5),
-    );
-    let panel = Panel::new(time(), Axis::linear("displacement y", "m")).mark(observed);
+    let grey = Style::new(Colour::Grey).width(4.5);
     let last = snapshots.len().saturating_sub(1);
-    let panel = snapshots
-        .iter()
-        .enumerate()
-        .fold(panel, |panel, (index, (iteration, t, y))| {
-            let label = format!("iteration {iteration}");
-            // The last one lies on the observation, where only black shows well.
-            let style = match index {
-                0 => Style::nth(0),
-                _ if index == last => Style::new(Colour::Black).dash(Dash::Dashed),
-                _ => Style::nth(index),
-            };
-            panel.mark(Mark::line(label, t, y, style))
-        });
+    let lines = snapshots.iter().enumerate();
+    let lines = lines.map(|(index, (iteration, t, y))| {
+        // The last one lies on the observation, where only black shows well.
+        let style = match index == last && index > 0 {
+            true => Style::new(Colour::Black).dash(Dash::Dashed),
+            false => Style::nth(index),
+        };
+        Mark::line(format!("iteration {iteration}"), t, y, style)
+    });
+    let panel = Panel::of_time("displacement y", "m")
+        .mark(Mark::points("observed", t_obs, y_obs, grey))
+        .marks(lines);
     Figure::new(
         "motion",
         "Motion during the fit",
@@ -219,209 +188,150 @@ impl<'a> FunctionCurve<'a> {
     fn panel(&self, t: &[f64]) -> Panel {
         let band = |(low, high)| Mark::band("95 % band", t, low, high, Colour::Blue);
         let start = |y| Mark::line("start", t, y, Style::new(Colour::Green).dash(Dash::Dotted));
-        let mut axis = Axis::linear(self.name, self.unit);
-        let mut beyond = "";
+        let mut panel = Panel::of_time(self.name, self.unit);
         if let Some((low, high)) = self.room() {
-            axis = axis.limits(low, high);
-            beyond = "the band reaches beyond this panel";
+            panel.y = panel.y.limits(low, high);
+            panel.title = "the band reaches beyond this panel".into();
         }
-        Panel::new(time(), axis)
-            .title(beyond)
-            .maybe(self.band.map(band))
-            .maybe(self.start.map(start))
-            .mark(Mark::line(
-                "found",
-                t,
-                self.found,
-                Style::new(Colour::Blue).width(1.8),
-            ))
-            .maybe(self.truth.map(|y| truth(t, y)))
+        panel
+            .marks(self.band.map(band))
+            .marks(self.start.map(start))
+            .mark(found("found", t, self.found))
+            .marks(self.truth.map(|y| truth(t, y)))
     }
 }
 
-fn truth(t: &[f64], y: &[f64]) -> Mark {
-    Mark::line(
-        "truth",
-        t,
-        y,
-        Style::new(Colour::Vermillion).dash(Dash::Dashed),
-    )
+fn found(label: &str, t: &[f64], y: &[f64]) -> Mark {
+    Mark::line(label, t, y, Style::new(Colour::Blue).width(1.8))
+}
+
+/// The true values.
+pub(super) fn truth(t: &[f64], y: &[f64]) -> Mark {
+    let style = Style::new(Colour::Vermillion).dash(Dash::Dashed);
+    Mark::line("truth", t, y, style)
 }
 
 /// The coefficient functions against the times `t` in s, one panel each.
 pub fn functions(t: &[f64], curves: &[FunctionCurve]) -> Figure {
-    let figure = Figure::new(
+    Figure::new(
         "functions",
         "Coefficient functions",
         "The coefficient functions that were found, against time, one panel for each.",
-    );
-    curves
-        .iter()
-        .fold(figure, |figure, curve| figure.panel(curve.panel(t)))
-}
-
-/// The error of a gradient against the step of the difference that tests it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GradientCurve<'a> {
-    /// Nodes of the time grid.
-    pub nodes: usize,
-    /// Which adjoint made the gradient: `discrete` or `continuous`.
-    pub adjoint: &'a str,
-    /// Step along the gradient.
-    pub step: &'a [f64],
-    /// |(J(p - a g) - J(p))/a + G²| / G² at each step a.
-    pub error: &'a [f64],
+    )
+    .panels(curves.iter().map(|curve| curve.panel(t)))
 }
 
 /// The error of the gradient against the step, a panel for each adjoint and a line for each grid.
-pub fn gradient_error(curves: &[GradientCurve]) -> Figure {
-    let mut adjoints: Vec<&str> = Vec::new();
+pub fn gradient_error(curves: &[GradientCheck]) -> Figure {
+    let mut kinds: Vec<GradientKind> = Vec::new();
     let mut nodes: Vec<usize> = curves.iter().map(|curve| curve.nodes).collect();
     nodes.sort_unstable();
     nodes.dedup();
     for curve in curves {
-        if !adjoints.contains(&curve.adjoint) {
-            adjoints.push(curve.adjoint);
+        if !kinds.contains(&curve.kind) {
+            kinds.push(curve.kind);
         }
     }
-    let figure = Figure::new(
+    // A grid looks the same in all panels.
+    let panel = |kind: &GradientKind| {
+        let curves = curves.iter().filter(|curve| curve.kind == *kind);
+        let lines = curves.map(|curve| {
+            let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
+            let label = format!("N = {}", curve.nodes);
+            Mark::line(label, &curve.step, &curve.error, Style::nth(index))
+        });
+        Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""))
+            .title(format!("{} adjoint", kind.name()))
+            .marks(lines)
+    };
+    Figure::new(
         "gradient_error",
         "Error of the gradient",
         "Relative error of the gradient against the step of the difference that tests it.",
-    );
-    let panels = adjoints
-        .iter()
-        .map(|adjoint| gradient_panel(curves, adjoint, &nodes));
-    panels.fold(figure.columns(adjoints.len()), Figure::panel)
-}
-
-/// The curves of one adjoint, finest grid on top; a grid looks the same in all panels.
-fn gradient_panel(curves: &[GradientCurve], adjoint: &str, nodes: &[usize]) -> Panel {
-    let axes = Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""));
-    let curves = curves.iter().filter(|curve| curve.adjoint == adjoint);
-    curves.fold(axes.title(format!("{adjoint} adjoint")), |panel, curve| {
-        let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
-        let label = format!("N = {}", curve.nodes);
-        panel.mark(Mark::line(
-            label,
-            curve.step,
-            curve.error,
-            Style::nth(index),
-        ))
-    })
-}
-
-/// What a free motion can show, on the time grid. An empty slice stands for something unknown.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct RatioCurves<'a> {
-    /// k/m in 1/s².
-    pub k_over_m: &'a [f64],
-    /// c/m in 1/s.
-    pub c_over_m: &'a [f64],
-    /// Natural frequency in Hz.
-    pub frequency: &'a [f64],
-    /// Damping ratio.
-    pub damping_ratio: &'a [f64],
-}
-
-impl<'a> RatioCurves<'a> {
-    fn each(&self) -> [&'a [f64]; 4] {
-        [
-            self.k_over_m,
-            self.c_over_m,
-            self.frequency,
-            self.damping_ratio,
-        ]
-    }
+    )
+    .columns(kinds.len())
+    .panels(kinds.iter().map(panel))
 }
 
 /// The ratios of the coefficient functions against the times `t` in s, and the true ones where
-/// known; a ratio that was not found has no panel. `bands` are the lower and upper ends of their bands,
+/// known; a ratio without values has no panel. `bands` are the lower and upper ends of their bands,
 /// as many as are known.
 pub fn ratios(
     t: &[f64],
-    found: &RatioCurves,
-    truth: Option<&RatioCurves>,
+    found: &Ratios,
+    truth: Option<&Ratios>,
     bands: &[[Vec<f64>; 2]],
 ) -> Figure {
-    let names = [
-        ("k/m", "s⁻²"),
-        ("c/m", "s⁻¹"),
-        ("natural frequency", "Hz"),
-        ("damping ratio ζ", ""),
+    type Part = fn(&Ratios) -> &[f64];
+    let parts: [(&str, &str, Part); 4] = [
+        ("k/m", "s⁻²", |r| &r.k_over_m),
+        ("c/m", "s⁻¹", |r| &r.c_over_m),
+        ("natural frequency", "Hz", |r| &r.frequency),
+        ("damping ratio ζ", "", |r| &r.damping_ratio),
     ];
-    let truth = truth.copied().unwrap_or_default();
-    let mut figure = Figure::new(
+    let parts = parts.iter().enumerate();
+    let parts = parts.filter(|(_, (_, _, part))| !part(found).is_empty());
+    Figure::new(
         "ratios",
         "Ratios of the coefficient functions",
         "Stiffness and damping over mass, natural frequency and damping ratio against time.",
     )
-    .columns(2);
-    let pairs = found.each().into_iter().zip(truth.each());
-    for (i, ((name, unit), (found, truth))) in names.iter().zip(pairs).enumerate() {
-        if !found.is_empty() {
-            let truth = (!truth.is_empty()).then_some(truth);
-            let curve = FunctionCurve {
-                truth,
-                band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
-                ..FunctionCurve::new(name, unit, found)
-            };
-            figure = figure.panel(curve.panel(t));
-        }
-    }
-    figure
+    .columns(2)
+    .panels(parts.map(|(i, (name, unit, part))| {
+        let curve = FunctionCurve {
+            truth: truth.map(part),
+            band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
+            ..FunctionCurve::new(name, unit, part(found))
+        };
+        curve.panel(t)
+    }))
 }
 
 /// The motion from other initial states, one panel each, and the true one where known; times in s,
 /// displacements in m.
 pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
-    let figure = Figure::new(
+    Figure::new(
         "predictions",
         "Predictions",
         "The free motion of the device that was found from other initial states, against time.",
-    );
-    motions.iter().fold(figure, |figure, predicted| {
-        let found = Style::new(Colour::Blue).width(1.8);
+    )
+    .panels(motions.iter().map(|predicted| {
         let state = &predicted.summary;
-        let title = format!(
-            "from y = {} m, v = {} m/s",
-            state.displacement, state.velocity
-        );
-        let true_motion = |motion: &Trajectory| truth(t, &motion.displacement);
-        figure.panel(
-            Panel::new(time(), Axis::linear("displacement y", "m"))
-                .title(title)
-                .mark(Mark::line(
-                    "predicted",
-                    t,
-                    &predicted.motion.displacement,
-                    found,
-                ))
-                .maybe(predicted.truth.as_ref().map(true_motion)),
-        )
-    })
+        let (y, v) = (state.displacement, state.velocity);
+        Panel::of_time("displacement y", "m")
+            .title(format!("from y = {y} m, v = {v} m/s"))
+            .mark(found("predicted", t, &predicted.motion.displacement))
+            .marks(predicted.truth.as_ref().map(|m| truth(t, &m.displacement)))
+    }))
 }
 
 /// The path of weights: misfit and roughness against the weight, with what each rule picks.
 pub fn weight_path(path: &WeightPath) -> Figure {
-    let column = |f: fn(&PathPoint) -> f64| path.points.iter().map(f).collect::<Vec<f64>>();
-    let weights = column(|p| p.weight);
-    let curve = |label: &str, values: Vec<f64>, colour: Colour| {
-        Mark::line(label, &weights, &values, Style::new(colour).width(1.8))
-    };
-    let panel = |y: Axis, mark: Mark| {
-        let panel = Panel::new(Axis::log("weight", ""), y).mark(mark);
+    type Part = fn(&PathPoint) -> f64;
+    let parts: [(&str, Colour, Part); 3] = [
+        ("misfit", Colour::Blue, |p| p.misfit),
+        ("roughness", Colour::Black, |p| p.roughness),
+        ("degrees of freedom", Colour::Green, |p| {
+            p.degrees_of_freedom
+        }),
+    ];
+    let weights: Vec<f64> = path.points.iter().map(|p| p.weight).collect();
+    let panel = |(label, colour, part): (&str, Colour, Part)| {
+        let values: Vec<f64> = path.points.iter().map(part).collect();
+        let style = Style::new(colour).width(1.8);
         let dashes = [Dash::Dashed, Dash::Dotted, Dash::DashDot];
-        let picks = WeightRule::ALL
-            .iter()
-            .zip(path.picks)
-            .zip(dashes)
-            .enumerate();
-        picks.fold(panel, |panel, (i, ((rule, pick), dash))| {
+        let picks = WeightRule::ALL.iter().zip(path.picks).zip(dashes);
+        let picks = picks.enumerate().filter_map(|(i, ((rule, pick), dash))| {
             let style = Style::nth(i + 1).dash(dash);
-            let mark = |i: usize| Mark::vertical(rule.name(), path.points[i].weight, style);
-            panel.maybe(pick.map(mark))
-        })
+            Some(Mark::vertical(
+                rule.name(),
+                path.points[pick?].weight,
+                style,
+            ))
+        });
+        Panel::new(Axis::log("weight", ""), Axis::log(label, ""))
+            .mark(Mark::line(label, &weights, &values, style))
+            .marks(picks)
     };
     Figure::new(
         "weights",
@@ -429,28 +339,13 @@ pub fn weight_path(path: &WeightPath) -> Figure {
         "Misfit, roughness and effective degrees of freedom against the weight of the smoothness, \
          with the weight that each rule picks.",
     )
-    .panel(panel(
-        Axis::log("misfit", ""),
-        curve("misfit", column(|p| p.misfit), Colour::Blue),
-    ))
-    .panel(panel(
-        Axis::log("roughness", ""),
-        curve("roughness", column(|p| p.roughness), Colour::Black),
-    ))
-    .panel(panel(
-        Axis::log("degrees of freedom", ""),
-        curve(
-            "degrees of freedom",
-            column(|p| p.degrees_of_freedom),
-            Colour::Green,
-        ),
-    ))
+    .panels(parts.map(panel))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::svg;
+    use crate::report::chart::svg;
 
     /// Of a single iteration there is no line: both curves are dots, three times as wide.
     #[test]

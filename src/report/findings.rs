@@ -1,6 +1,7 @@
-//! Sentences about the plausibility of a fit.
+//! Sentences about a fit: its plausibility, and further fits beside it.
 
 use kmcfit_core::internals::assessment::{FitWarning, Unidentified};
+use kmcfit_core::internals::study::multistart::Finding;
 
 /// Why the optimum identifies no system.
 pub fn unidentified(why: &Unidentified) -> String {
@@ -63,5 +64,33 @@ pub fn warning(warning: &FitWarning) -> String {
         FitWarning::NegligibleForce { experiment } => format!(
             "the force of {experiment} is nothing beside those of the device: as if it did not act"
         ),
+    }
+}
+
+/// A finding of fits from so many starts.
+pub fn of_starts(finding: &Finding, starts: usize) -> String {
+    match finding {
+        Finding::Nowhere => format!("none of {starts} starts led anywhere"),
+        Finding::Points {
+            ended,
+            different,
+            lowest,
+        } => format!(
+            "{ended} of {starts} starts led to {different} different points; the lowest cost is {lowest:.6e}"
+        ),
+        Finding::OneValley(true) => {
+            "the two lowest are ends of one valley: a path between them hardly rises".into()
+        }
+        Finding::OneValley(false) => {
+            "between the two lowest the cost rises on the straight path and along the gauge: no path without a rise was \
+             found"
+                .into()
+        }
+        Finding::Lower { cost, fit } => {
+            format!("a start led lower than the fit: {cost:.6e} instead of {fit:.6e}")
+        }
+        Finding::NotReached(fit) => {
+            format!("no start reached the fit, whose cost is {fit:.6e}: they were too far off, or got stuck")
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::seen::SeenChannel;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{FitAssessment, POOR, StepCheck, diagnostics};
-use kmcfit_core::internals::identifiability::{Bands, Judgement};
+use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
@@ -38,10 +38,6 @@ impl Known {
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub(super) fn bands(&self) -> Option<&Bands> {
         self.assessment.as_ref()?.bands.as_ref()
-    }
-
-    pub(super) fn judgements(&self) -> &[Judgement] {
-        self.assessment.as_ref().map_or(&[], |a| &a.judgements)
     }
 
     /// The step-size check, where there is a response on the finer grid.

@@ -1,15 +1,9 @@
-//! Parts of the result document from the assessment of a fit: channels, scalars, statistics, validation records, the
-//! step-size check.
+//! Parts of the result document from the assessment of a fit: channels, scalars, validation records.
 
-use super::document::{
-    ChannelSummary, HoldOutSummary, IgnoredSummary, PatternSummary, RefinedSummary, ScalarSummary,
-    StatisticsSummary,
-};
+use super::document::{ChannelSummary, HoldOutSummary, IgnoredSummary, ScalarSummary};
 use super::known::HeldOut;
 use super::seen::SeenChannel;
-use kmcfit_core::internals::assessment::{
-    FitStatistics, ResidualPattern, StepCheck, diagnostics, outliers, pattern,
-};
+use kmcfit_core::internals::assessment::{diagnostics, outliers, pattern};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Loss, Weighting};
@@ -42,44 +36,13 @@ pub fn channel(seen: &SeenChannel) -> ChannelSummary {
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
         robust: channel.loss() != Loss::Squares,
-        pattern: pattern(channel, predicted).map(pattern_summary),
+        pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
         whiteness: diagnostics.whiteness.to_string(),
         whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
             .then_some(diagnostics.whiteness.p_value),
         autocorrelation_band: diagnostics.band,
         autocorrelation: diagnostics.autocorrelation,
-    }
-}
-
-fn pattern_summary(pattern: ResidualPattern) -> PatternSummary {
-    match pattern {
-        ResidualPattern::Outliers { readings, first } => PatternSummary::FarOff { readings, first },
-        ResidualPattern::Offset => PatternSummary::Offset,
-        ResidualPattern::Drift => PatternSummary::Drift,
-        ResidualPattern::Tone { frequency, beside } => PatternSummary::Tone { frequency, beside },
-    }
-}
-
-/// Statistics of all channels.
-pub fn statistics(found: &FitStatistics) -> StatisticsSummary {
-    StatisticsSummary {
-        readings: found.readings,
-        parameters: found.parameters,
-        reduced_chi_square: found.reduced_chi_square,
-        aic: found.aic,
-        aicc: found.aicc,
-        bic: found.bic,
-    }
-}
-
-/// The step-size check.
-pub fn refined(check: &StepCheck) -> RefinedSummary {
-    RefinedSummary {
-        step: check.step,
-        misfit: check.misfit,
-        change_per_residual: check.change_per_residual,
-        change_per_reading: check.change_per_reading,
     }
 }
 

@@ -1,9 +1,8 @@
 //! What a run leaves behind: tables, figures, and the result document; imported by the cli alone.
 //!
 //! The way from data to picture runs through the files in this order: [`figures`] states what each
-//! standard figure shows, in the data model of [`figure`] and [`mark`]; `layout`, `panel`,
-//! `legend`, `axis` and `curve` turn it into plain shapes in pixels; [`svg`] writes the shapes.
-//! Only `svg` knows the plotting crate. `page` puts figures and what is said of them into pages.
+//! standard figure shows, in the data model of [`chart`], which draws it; `page` puts figures and what is said of them into
+//! pages.
 //!
 //! ```
 //! use kmcfit::report::{render, Axis, Colour, Figure, Mark, Panel, Style};
@@ -17,51 +16,40 @@
 //! ```
 
 pub mod advice;
-mod axis;
+pub mod chart;
 mod columns;
 pub mod compare;
 mod cost;
 mod csv;
-mod curve;
 pub mod document;
 mod drawn;
-pub mod figure;
 pub mod figures;
 pub(crate) mod findings;
 mod finished;
 mod knowledge;
 mod known;
-mod layout;
-mod legend;
-pub mod mark;
 mod measured;
 mod page;
-mod panel;
-mod predict;
 mod run;
 mod run_findings;
 mod seen;
-mod shape;
 pub mod study;
 mod summary;
-pub mod svg;
 mod tables;
 mod terminal;
 mod text;
 mod timings;
 
+pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
 pub use columns::Columns;
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
-pub use figure::{Axis, Figure, Panel, Scale};
 pub use finished::Run;
+pub use kmcfit_core::internals::study::{PredictedMotion, predict};
 pub use known::Known;
-pub use mark::{Colour, Dash, Mark, Style};
 pub(crate) use page::shell_quoted;
-pub use predict::{PredictedMotion, predict};
 pub use run::{FittedModel, fit_claim, json};
 pub use summary::{prediction_table, summary};
-pub use svg::{render, render_narrow};
 pub use terminal::charts;
 pub use timings::{Around, PartSummary, TimingsSummary};

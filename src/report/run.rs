@@ -3,8 +3,8 @@
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
-    ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OptimalitySummary, OutcomeSummary,
-    PathSummary, Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
+    ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
+    Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
 };
 use super::known::Known;
 use super::measured;
@@ -17,7 +17,7 @@ use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
-    ActiveGroup, Attempt, Fit, Optimality, PathPoint, Solver, Status, WeightPath, WeightRule,
+    ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, WeightRule,
     active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
@@ -82,7 +82,7 @@ impl FittedModel<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             model: self.model_summary(),
             outcome: OutcomeSummary {
-                status: fit.outcome.status.name().into(),
+                status: fit.outcome.status,
                 reason: fit.outcome.reason.to_string(),
             },
             cost: CostSummary {
@@ -96,7 +96,7 @@ impl FittedModel<'_> {
                 initial_norm_squared: fit.initial_norm_squared,
                 final_norm_squared: fit.best.gradient.norm_squared,
             },
-            optimality: fit.optimality.as_ref().map(optimality_summary),
+            optimality: fit.optimality,
             counts: CountsSummary {
                 iterations: fit.history.len() as u64,
                 forward: fit.counts.forward,
@@ -121,9 +121,9 @@ impl FittedModel<'_> {
                 false => Vec::new(),
             },
             statistics: (self.known.assessment.as_ref())
-                .map(|a| measured::statistics(&a.statistics))
+                .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
-            half_step: self.known.step_check().map(measured::refined),
+            half_step: self.known.step_check().cloned(),
             remarks: model.remarks.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -304,16 +304,6 @@ fn active_summary(group: ActiveGroup) -> ActiveSummary {
     }
 }
 
-fn optimality_summary(measured: &Optimality) -> OptimalitySummary {
-    OptimalitySummary {
-        stationarity: measured.stationarity,
-        step: measured.step,
-        feasibility: measured.feasibility,
-        complementarity: measured.complementarity,
-        tolerance: measured.tolerance,
-    }
-}
-
 fn rung_summary(rung: &Attempt) -> RungSummary {
     let known = |x: f64| x.is_finite().then_some(x);
     RungSummary {
@@ -321,7 +311,7 @@ fn rung_summary(rung: &Attempt) -> RungSummary {
         initial_cost: known(rung.initial_cost),
         cost: known(rung.cost),
         iterations: rung.iterations,
-        status: rung.outcome.status.name().into(),
+        status: rung.outcome.status,
     }
 }
 

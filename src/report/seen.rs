@@ -1,7 +1,7 @@
 //! A channel beside what a model says of it.
 
+use super::chart::Figure;
 use super::csv::CsvTable;
-use super::figure::Figure;
 use super::figures;
 use crate::config::ChannelNote;
 use kmcfit_core::internals::assessment::diagnostics;

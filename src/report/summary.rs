@@ -1,11 +1,10 @@
 //! What a person reads in ten seconds.
 
 use super::advice::{self, Advice};
-use super::cost::CostKind;
-use super::document::ChannelSummary;
-use super::document::{Prediction, ResultDocument};
+use super::document::{ChannelSummary, Prediction, ResultDocument};
 use crate::digits::significant;
-use kmcfit_core::internals::identifiability::Verdict;
+use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::identifiability::VerdictKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
@@ -23,7 +22,8 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     writeln!(
         text,
         "{}: {}",
-        document.outcome.status, document.outcome.reason
+        document.outcome.status.name(),
+        document.outcome.reason
     )?;
     write_findings(text, document)?;
     write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
@@ -42,17 +42,12 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         counts.forward,
         document.seconds
     )?;
-    for experiment in &document.experiments {
-        for channel in &experiment.channels {
-            write_channel(text, &experiment.name, channel)?;
-        }
+    for (name, channel) in document.records() {
+        write_channel(text, &name, channel)?;
     }
-    for experiment in &document.held_out {
-        for channel in &experiment.channels {
-            write_channel(text, &format!("{} (held out)", experiment.name), channel)?;
-        }
-        if let Some(failure) = &experiment.failure {
-            writeln!(text, "{} (held out): no motion: {failure}", experiment.name)?;
+    for out in &document.held_out {
+        if let Some(failure) = &out.failure {
+            writeln!(text, "{}: no motion: {failure}", out.title())?;
         }
     }
     write_statistics(text, document)?;
@@ -73,13 +68,12 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
 
 /// What was found, how well, how sure, what stays open, what to try next: a line each.
 fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    let well = advice::worst_fit(document).map(|worst| {
-        let what = match channels().count() {
+    let well = document.worst_fit().map(|worst| {
+        let what = match document.channels().count() {
             1 => "the readings are",
             _ => "the worst channel is",
         };
-        let aside = match channels().map(|c| c.left_aside).sum::<usize>() {
+        let aside = match document.channels().map(|c| c.left_aside).sum::<usize>() {
             0 => String::new(),
             far => format!(", {} far off left aside", count(far, "reading")),
         };
@@ -122,18 +116,15 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
 /// The functions of the device with their units: `mass 0.6 to 2.3 kg; stiffness 1 N/m`. What readings do not show has no
 /// value, what they show at times has its values then.
 fn found(document: &ResultDocument) -> String {
-    let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
-    let function = |name: &str| {
-        let f = document.functions.get(name)?;
-        let is = |verdict: &str| f.verdict.as_deref() == Some(verdict);
+    let function = |(name, f): (&str, &FunctionSummary)| {
         if f.is_rounding {
-            return Some(format!("{name} 0 {}", f.unit));
+            return format!("{name} 0 {}", f.unit);
         }
-        if is(Verdict::NotSeen.name()) {
-            return Some(format!("{name} not seen"));
+        if f.verdict == Some(VerdictKind::NotSeen) {
+            return format!("{name} not seen");
         }
         let (range, seen) = match f.known_range {
-            Some(range) if is(Verdict::OnlyOn(Vec::new()).name()) => (range, " where it is seen"),
+            Some(range) if f.verdict == Some(VerdictKind::OnlyOn) => (range, " where it is seen"),
             _ => ([f.min, f.max], ""),
         };
         let [low, high] = range.map(short);
@@ -142,9 +133,9 @@ fn found(document: &ResultDocument) -> String {
             _ if low == high => low,
             _ => format!("{low} to {high}"),
         };
-        Some(format!("{name} {values} {}{seen}", f.unit))
+        format!("{name} {values} {}{seen}", f.unit)
     };
-    let found: Vec<String> = names.filter_map(function).collect();
+    let found: Vec<String> = document.terms().map(function).collect();
     let legend = match found.iter().any(|f| f.contains(" +- ")) {
         true => " (+- one standard error)",
         false => "",
@@ -217,7 +208,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
             "on half the step the model's readings change by at most {:.1e} of the largest one",
             half.change_per_reading
         ),
-        None if document.model.cost_kind == CostKind::EquationError => Ok(()),
+        None if !document.is_simulated() => Ok(()),
         None => writeln!(text, "on half the step there is no motion"),
     }
 }
@@ -256,16 +247,10 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
         .iter()
         .filter(|rung| rung.start != StartStrategy::Continued.name());
     let starts = count(starts.count(), "start");
-    match estimates_sigma(document) {
+    match document.estimates_sigma() {
         true => format!("{last} after {all} from {starts}"),
         false => format!("{last}, {all} in all from {starts}"),
     }
-}
-
-/// Whether the noise of a channel was estimated by a first fit, so that the last one has another cost.
-fn estimates_sigma(document: &ResultDocument) -> bool {
-    let mut channels = document.experiments.iter().flat_map(|e| &e.channels);
-    channels.any(|channel| channel.sigma_estimated)
 }
 
 /// A number of things, in the singular where there is one.
@@ -306,15 +291,7 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         write!(text, " {:>14} {:>14}", "largest error", "rms error")?;
     }
     writeln!(text)?;
-    // In the order of the equation of motion, then those of single experiments.
-    let main = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
-    let main: Vec<&str> = main.collect();
-    let own = document.functions.keys().map(String::as_str);
-    let own = own.filter(|name| !main.contains(name));
-    for name in main.iter().copied().chain(own) {
-        let Some(function) = document.functions.get(name) else {
-            continue;
-        };
+    for (name, function) in document.all_functions() {
         let [min, max] = match function.is_rounding {
             true => [0.0; 2].map(decimals),
             false => alike([function.min, function.max]),
@@ -323,7 +300,7 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        let is_seen = function.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        let is_seen = function.verdict != Some(VerdictKind::NotSeen);
         match function.standard_error.filter(|_| !function.is_rounding) {
             _ if !is_seen => write!(text, "  not seen")?,
             Some(error) => write!(text, "  +- {error:.2e}")?,
@@ -365,7 +342,7 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
     if document.rungs.len() < 2 {
         return Ok(());
     }
-    let with = match estimates_sigma(document) {
+    let with = match document.estimates_sigma() {
         true => " (sigma not estimated yet)",
         false => "",
     };
@@ -378,7 +355,7 @@ pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::
             "from the {}: {cost} after {} ({})",
             rung.start,
             count(rung.iterations as usize, "iteration"),
-            rung.status
+            rung.status.name()
         )?;
     }
     Ok(())

@@ -2,7 +2,6 @@
 
 use super::FittedModel;
 use super::csv::CsvTable;
-use super::drawn::ends;
 use kmcfit_core::internals::functions::{CoefficientKind, Ratios};
 use kmcfit_core::internals::solvers::IterationRecord;
 
@@ -51,7 +50,7 @@ impl FittedModel<'_> {
         if let Some(bands) = self.bands() {
             let times = self.model.problem.oscillator.grid.times();
             for list in [&bands.functions, &bands.ratios] {
-                for (band, [low, high]) in list.iter().zip(ends(bands, list, &times)) {
+                for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {
                     let name = band.name.replace([' ', '/', ','], "_");
                     table = table
                         .column(format!("{name}_low_95"), low)

@@ -43,25 +43,19 @@ pub fn charts(
     }
     let table = Columns::read(&folder.join("functions.csv"))?;
     let times = table.required("t_s")?;
-    let names = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
-    for quantity in
-        names.filter_map(|name| CoefficientKind::ALL.into_iter().find(|q| q.name() == name))
-    {
+    for (name, function) in document.terms() {
+        let Some(quantity) = CoefficientKind::ALL.into_iter().find(|q| q.name() == name) else {
+            continue;
+        };
         let values =
             (table.column(quantity.column())).or_else(|| table.column(quantity.angular_column()));
-        let (Some(values), Some(function)) = (values, document.functions.get(quantity.name()))
-        else {
+        let Some(values) = values else {
             continue;
         };
         let mut chart = Chart::new(width, LOW, &times);
         chart.scale(&[&values]);
         chart.line(&times, &values);
-        text += &format!(
-            "\n{} in {}\n{}",
-            quantity.name(),
-            function.unit,
-            chart.text()
-        );
+        text += &format!("\n{name} in {}\n{}", function.unit, chart.text());
     }
     Ok(text)
 }

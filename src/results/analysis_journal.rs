@@ -1,7 +1,7 @@
 //! A journal of finished analyses: a study or comparison that was killed goes on with the next one.
 
 use super::heading::Heading;
-use super::journal::{JournalFile, JournalText, path_in};
+use super::journal::{JournalFile, JournalText};
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
 use serde::de::DeserializeOwned;
@@ -47,7 +47,7 @@ impl AnalysisJournal {
     pub fn begin(folder: &Path, name: &str, heading: &Heading) -> io::Result<Self> {
         let work = WorkFolder::create_in(folder)?;
         Ok(Self {
-            file: JournalFile::begin(&work, &path_in(folder, name), heading)?,
+            file: JournalFile::begin(&work, &folder.join(name), heading)?,
             done: BTreeMap::new(),
         })
     }
@@ -57,7 +57,7 @@ impl AnalysisJournal {
     /// # Errors
     /// If there is none of this format.
     pub fn heading(folder: &Path, name: &str) -> Result<Heading, InputError> {
-        Ok(JournalText::read(&path_in(folder, name), WHAT)?.heading)
+        Ok(JournalText::read(&folder.join(name), WHAT)?.heading)
     }
 
     /// Resumes the journal of this name in a folder, up to the first line that is damaged.
@@ -65,7 +65,7 @@ impl AnalysisJournal {
     /// # Errors
     /// If there is none, or it was begun with other inputs or by another version.
     pub fn resume(folder: &Path, name: &str, heading: &Heading) -> Result<Self, InputError> {
-        let path = path_in(folder, name);
+        let path = folder.join(name);
         let text = JournalText::read(&path, WHAT)?;
         heading.check_same(&text.heading, &path)?;
         let mut done = BTreeMap::new();

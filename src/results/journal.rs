@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the journal of a fit.
 pub const FIT_JOURNAL: &str = "fit.journal";
@@ -66,16 +66,7 @@ pub(super) fn push_line(
     mark: Mark,
     entry: &impl Serialize,
 ) -> io::Result<Mark> {
-    let begin = text.len();
-    serde_json::to_writer(&mut *text, entry)?;
-    let mut chain = Chain::after(mark.chain);
-    chain.0.update(&text[begin..]);
-    let chain = chain.finish();
-    text.extend(format!("\t{chain:016x}\n").bytes());
-    Ok(Mark {
-        bytes: mark.bytes + (text.len() - begin) as u64,
-        chain,
-    })
+    write_line(text, mark, entry)
 }
 
 /// A writer that takes the checksum of what passes.
@@ -285,9 +276,4 @@ pub fn with_checksums(heading: &Heading, lines: &[u8]) -> io::Result<Vec<u8>> {
         text.extend(format!("\t{:016x}\n", mark.chain).bytes());
     }
     Ok(text)
-}
-
-/// Where a journal of this name stands in a folder.
-pub(super) fn path_in(folder: &Path, name: &str) -> PathBuf {
-    folder.join(name)
 }

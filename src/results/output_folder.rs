@@ -9,7 +9,7 @@ use super::lock::Lock;
 use super::manifest::{FileState, MANIFEST, Manifest};
 use super::system;
 use super::work_folder::{self, WorkFolder};
-use crate::error::{InputError, Place};
+use crate::error::InputError;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ impl OutputFolder {
     /// the file, and nothing in the folder has changed.
     pub fn prepare(path: &Path, claim: Claim) -> Result<Self, InputError> {
         let refuse = |problem: &str, folder: &Path, error: &io::Error| {
-            InputError::new(Place::Argument("--out".into()), problem)
+            InputError::argument("--out", problem)
                 .found(format!("{}: {error}", folder.display()))
                 .expected("a folder that can be written to")
         };
@@ -165,8 +165,8 @@ impl OutputFolder {
     /// A folder holds the results of one command.
     fn check_command(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
         match manifest {
-            Some(manifest) if manifest.command != self.claim.command => Err(InputError::new(
-                Place::Argument("--out".into()),
+            Some(manifest) if manifest.command != self.claim.command => Err(InputError::argument(
+                "--out",
                 "this folder holds the results of another command",
             )
             .found(format!(
@@ -303,13 +303,10 @@ fn existing(folder: &Path) -> &Path {
 }
 
 fn taken(path: &Path) -> InputError {
-    InputError::new(
-        Place::Argument("--out".into()),
-        "another run is writing to this folder",
-    )
-    .found(path.display())
-    .expected("a folder of its own for each run")
-    .hint("wait for the other run, or give another folder with --out")
+    InputError::argument("--out", "another run is writing to this folder")
+        .found(path.display())
+        .expected("a folder of its own for each run")
+        .hint("wait for the other run, or give another folder with --out")
 }
 
 fn a_link(path: &Path) -> InputError {

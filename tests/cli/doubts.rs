@@ -4,7 +4,7 @@ use crate::workbench::Workbench;
 use insta::assert_snapshot;
 use kmcfit::report::Run;
 use kmcfit::report::advice::{self, Advice};
-use kmcfit::report::document::PatternSummary;
+use kmcfit_core::internals::assessment::ResidualPattern;
 use serde_json::Value;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -128,10 +128,10 @@ fn what_to_try_next_helps() {
             panic!("{advised:?}");
         };
         let is_named = match pattern {
-            PatternSummary::FarOff { readings, .. } => *readings == 3 && cure.contains("huber"),
-            PatternSummary::Offset => !cure.contains("drift"),
-            PatternSummary::Drift => cure.contains("drift"),
-            PatternSummary::Tone { .. } => false,
+            ResidualPattern::Outliers { readings, .. } => *readings == 3 && cure.contains("huber"),
+            ResidualPattern::Offset => !cure.contains("drift"),
+            ResidualPattern::Drift => cure.contains("drift"),
+            ResidualPattern::Tone { .. } => false,
         };
         assert!(kind == "displacement" && is_named, "{pattern:?}");
         bench.write(

@@ -2,13 +2,14 @@
 
 use crate::workbench::{Workbench, column, paper_run};
 use kmcfit::Run;
+use kmcfit_core::internals::solvers::Status;
 
 #[test]
 fn a_run_is_what_its_files_say() {
     let (bench, _) = paper_run();
     let run = Run::open(bench.path("runs/paper")).expect("a run");
     let read = |table: &str, name: &str| column(&bench.read(&format!("runs/paper/{table}")), name);
-    assert_eq!(run.document.outcome.status, "completed");
+    assert_eq!(run.document.outcome.status, Status::Completed);
     assert_eq!(
         run.value["cost"]["final"].as_f64(),
         Some(run.document.cost.r#final)

@@ -139,7 +139,6 @@ fn required_keys_are_those_of_the_reader() {
         ("truth", "truth"),
         ("penalty", "functions.mass.penalty"),
         ("column", "functions.mass.start"),
-        ("variation", "functions.mass.variation"),
     ] {
         let model = base();
         match group {

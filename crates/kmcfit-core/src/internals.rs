@@ -3,9 +3,10 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, POOR, Plausibility,
-        ResidualPattern, StepCheck, Unidentified, constant_probability, diagnostics, outliers,
-        pattern, standard_error,
+        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, FunctionSummary, POOR,
+        Plausibility, RECOVERED, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        constant_probability, diagnostics, function_summaries, is_same_truth, outliers, pattern,
+        standard_error,
     };
 }
 pub mod builder {
@@ -38,12 +39,14 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
-        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, anchors, count, is_rounding,
-        is_unhindered, rank_experiments, verdicts,
+        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, VerdictKind, anchors, count,
+        is_rounding, is_unhindered, rank_experiments, residual_spread, verdicts,
     };
 }
 pub mod objective {
-    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
+    pub use crate::objective::{
+        Evaluation, GradientCheck, GradientKind, SimulatedRecord, state_scales,
+    };
 }
 pub mod problem {
     pub use crate::problem::{Problem, ProblemError, ProblemParts};
@@ -80,13 +83,14 @@ pub mod solvers {
         Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
         Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
         WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error, fit,
-        fit_from, fit_with_noise, fit_with_noise_watched, predict_held_out, states_from_readings,
-        timed, without_motion,
+        fit_from, fit_with_noise, fit_with_noise_watched, number_or_nan, predict_held_out,
+        states_from_readings, timed, without_motion,
     };
 }
 pub mod study {
     pub use crate::study::{
-        Linear, Profile, ProfileSettings, Target, bootstrap, equivalent, multistart, prediction,
+        Choice, EquivalentSystem, Linear, PredictedMotion, Prediction, Profile, ProfileSettings,
+        Target, bootstrap, equivalent, equivalent_systems, multistart, predict, prediction,
         profile, profiles, pull_apart, variation,
     };
 }

@@ -2,8 +2,8 @@
 
 mod wording;
 
-use super::document::{ChannelSummary, ExperimentSummary, PatternSummary, ResultDocument};
-use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR};
+use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
 use kmcfit_core::internals::system::Method;
@@ -16,15 +16,6 @@ const COARSE: f64 = 1e-3;
 const HARDLY: f64 = 50.0;
 /// So many things to try next are enough.
 const MOST: usize = 3;
-
-/// The worst fit of a channel, per cent.
-pub fn worst_fit(document: &ResultDocument) -> Option<f64> {
-    let channels = document.experiments.iter().flat_map(|e| &e.channels);
-    channels
-        .map(|c| c.fit_percent)
-        .filter(|x| x.is_finite())
-        .reduce(f64::min)
-}
 
 /// A recommendation.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +39,7 @@ pub enum Advice {
         /// Whether its sigma is known.
         has_sigma: bool,
         /// The pattern.
-        pattern: PatternSummary,
+        pattern: ResidualPattern,
     },
     /// A larger sigma.
     LargerSigma {
@@ -129,7 +120,7 @@ pub fn next(document: &ResultDocument) -> Vec<Advice> {
     }
     steps.extend(about_constants(document));
     let known = &document.identifiability;
-    if is_simulated(document) && document.model.parameters > 0 {
+    if document.is_simulated() && document.model.parameters > 0 {
         // Constraints may hold what the readings do not show.
         let is_open = known.seen < known.of && !known.open.is_empty();
         let is_smooth = document.cost.regularisation > 0.0;
@@ -145,10 +136,6 @@ pub fn next(document: &ResultDocument) -> Vec<Advice> {
     steps
 }
 
-fn is_simulated(document: &ResultDocument) -> bool {
-    document.model.method != Solver::EquationError.name()
-}
-
 /// A function that varies no more than noise lets a constant vary.
 fn about_constants(document: &ResultDocument) -> Option<Advice> {
     let functions = document.functions.iter();
@@ -162,15 +149,15 @@ fn about_constants(document: &ResultDocument) -> Option<Advice> {
 
 /// Whether the iterations ran out on a model that is wrong: where it is right, steps of Gauss and Newton need few.
 fn wanders(document: &ResultDocument) -> bool {
-    document.outcome.status == Status::MaxIterations.name()
+    document.outcome.status == Status::MaxIterations
         && document.model.method == Solver::GaussNewton.name()
-        && worst_fit(document).is_some_and(|worst| worst < POOR)
+        && document.worst_fit().is_some_and(|worst| worst < POOR)
 }
 
 /// Steps that are too long, with as many nodes as would do by the order of the stepper.
 fn about_steps(document: &ResultDocument) -> Option<Advice> {
     let half = document.half_step.as_ref()?;
-    let is_exact = worst_fit(document).is_some_and(|worst| worst > EXACT);
+    let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
     let beside_residuals = match is_exact {
         true => 0.0,
         false => half.change_per_residual,
@@ -223,7 +210,7 @@ fn changes_nothing(document: &ResultDocument) -> bool {
 
 /// What the residuals ask for.
 fn about_residuals(document: &ResultDocument) -> Option<Advice> {
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
+    let channels = || document.channels();
     let mut patterns = channels().filter_map(|c| Some((c, c.pattern.clone()?)));
     if let Some((channel, pattern)) = patterns.next() {
         return Some(Advice::Pattern {
@@ -232,7 +219,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Advice> {
             pattern,
         });
     }
-    let fit = worst_fit(document).unwrap_or(100.0);
+    let fit = document.worst_fit().unwrap_or(100.0);
     let times = document.statistics.reduced_chi_square.map(f64::sqrt);
     if let Some(times) = times.filter(|times| *times > BEYOND_SIGMA && fit > POOR) {
         return Some(Advice::LargerSigma { times, fit });
@@ -270,29 +257,24 @@ fn about_residuals(document: &ResultDocument) -> Option<Advice> {
     Some(Advice::Mismatch {
         channel: (channels().count() > 1).then(|| (kind, record.name.clone())),
         fit,
-        from_readings: !tried && is_simulated(document),
+        from_readings: !tried && document.is_simulated(),
         suspect: suspect(document, record),
         absent: absent(document),
     })
 }
 
 fn about_ending(document: &ResultDocument) -> Option<Advice> {
-    let status = document.outcome.status.as_str();
-    let is = |s: Status| s.name() == status;
-    Some(match () {
-        () if is(Status::MaxIterations) => {
-            Advice::MoreIterations(10 * document.counts.iterations.max(1))
-        }
-        () if is(Status::TimeLimit) => Advice::MoreTime,
-        () if is(Status::Interrupted) => Advice::Resume,
-        () if is(Status::Stalled) && document.model.method != Solver::GaussNewton.name() => {
-            Advice::AnotherMethod
-        }
-        () if is(Status::Stalled) || is(Status::Infeasible) || is(Status::Failed) => {
-            Advice::AnotherStart
-        }
-        () => return None,
-    })
+    let is_newton = document.model.method == Solver::GaussNewton.name();
+    match document.outcome.status {
+        Status::MaxIterations => Some(Advice::MoreIterations(
+            10 * document.counts.iterations.max(1),
+        )),
+        Status::TimeLimit => Some(Advice::MoreTime),
+        Status::Interrupted => Some(Advice::Resume),
+        Status::Stalled if !is_newton => Some(Advice::AnotherMethod),
+        Status::Stalled | Status::Infeasible | Status::Failed => Some(Advice::AnotherStart),
+        Status::Converged | Status::Completed => None,
+    }
 }
 
 /// A share in per cent; one far below zero in powers of ten.

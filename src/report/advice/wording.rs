@@ -2,7 +2,7 @@
 
 use super::{Advice, Suspect, percent};
 use crate::digits::significant;
-use crate::report::document::PatternSummary;
+use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
 
@@ -142,10 +142,10 @@ fn write_pattern(
     f: &mut fmt::Formatter<'_>,
     kind: &str,
     has_sigma: bool,
-    pattern: &PatternSummary,
+    pattern: &ResidualPattern,
 ) -> fmt::Result {
     match pattern {
-        PatternSummary::FarOff { readings, first } => {
+        ResidualPattern::Outliers { readings, first } => {
             match readings {
                 1 => write!(f, "one reading of the {kind} lies far off, at {first} s")?,
                 _ => write!(
@@ -162,11 +162,11 @@ fn write_pattern(
                 ": a robust loss (loss: {{{kind}: huber}}{sigma}) in the experiment"
             )
         }
-        PatternSummary::Offset => write!(
+        ResidualPattern::Offset => write!(
             f,
             "the residuals of the {kind} have an offset: sensors: {{{kind}: {{offset: estimate}}}} in the experiment"
         ),
-        PatternSummary::Tone { frequency, beside } => {
+        ResidualPattern::Tone { frequency, beside } => {
             let end = if frequency > beside { "max" } else { "min" };
             write!(
                 f,
@@ -177,7 +177,7 @@ fn write_pattern(
                 significant((frequency * beside).sqrt(), 2)
             )
         }
-        PatternSummary::Drift => write!(
+        ResidualPattern::Drift => write!(
             f,
             "the residuals of the {kind} drift: sensors: {{{kind}: {{offset: estimate, drift: estimate}}}} in the \
              experiment"

@@ -1,7 +1,8 @@
 //! What a row of runs comes to, computed from their numbers: change the data and it changes.
 
+use super::CLOSE;
 use super::measures::Measures;
-use super::{CLOSE, RECOVERED};
+use kmcfit_core::internals::assessment::TruthErrors;
 
 /// One sentence for each run, and one on what led to the true device.
 pub fn conclusions(runs: &[Measures]) -> Vec<String> {
@@ -24,20 +25,20 @@ pub fn conclusions(runs: &[Measures]) -> Vec<String> {
 
 /// What a run found.
 fn outcome(run: &Measures) -> String {
-    let matched = run.verdict.contains("matches the motion") && !run.verdict.contains("not match");
+    let matched = run.is_matched;
     let Some(errors) = &run.errors else {
         return match matched {
             true => "matches the motion; the truth is not known".into(),
             false => "does not match the motion; the truth is not known".into(),
         };
     };
-    let worst = errors.k_over_m_relative.max(errors.c_over_m_relative);
+    let worst = errors.worst_ratio();
     let percent = |share: f64| match share < 1e-4 {
         true => format!("{share:.0e} of their size"),
         false => format!("{:.2} %", 100.0 * share),
     };
     let scale = errors.mass_relative >= CLOSE;
-    match (worst < RECOVERED || worst < CLOSE, scale, matched) {
+    match (worst < CLOSE, scale, matched) {
         (true, false, _) => format!(
             "finds the true device: k/m and c/m to {}, m to {}",
             percent(worst),
@@ -61,8 +62,7 @@ fn outcome(run: &Measures) -> String {
 
 /// How near the ratios of a run are to the truth; `None` where it is not known.
 fn distance(run: &Measures) -> Option<f64> {
-    let errors = run.errors.as_ref()?;
-    Some(errors.k_over_m_relative.max(errors.c_over_m_relative))
+    run.errors.as_ref().map(TruthErrors::worst_ratio)
 }
 
 /// Whether a small misfit went with a wrong device, and which run of these is nearest to the truth.

@@ -4,37 +4,25 @@ use super::Comparison;
 use super::measures::Measures;
 use super::run::ComparedRun;
 use super::table::short;
-use crate::report::figure::{Axis, Figure, Panel};
-use crate::report::mark::{Colour, Dash, Mark, Style};
+use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use kmcfit_core::internals::assessment::is_same_truth;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
 
-/// The colours of runs; black and grey are left to the truth.
-const COLOURS: [Colour; 6] = [
-    Colour::Blue,
-    Colour::Vermillion,
-    Colour::Green,
-    Colour::Purple,
-    Colour::Orange,
-    Colour::Sky,
-];
-
-/// Truths that differ by less than this share of their size are one and the same on two grids.
-const SAME_TRUTH: f64 = 2e-3;
-
 /// The look of run `index` in all figures: 24 runs differ in colour or dash pattern.
 pub(super) fn style(index: usize) -> Style {
-    let colour = COLOURS[index % COLOURS.len()];
+    // Black and grey, the last two, are left to the truth.
+    let colour = Colour::nth(index % (Colour::ALL.len() - 2));
     let dash = Dash::nth(index + index / 12);
     // Dots need more ink to be seen.
     let width = if dash == Dash::Dotted { 2.2 } else { 1.6 };
     Style::new(colour).dash(dash).width(width)
 }
 
-/// All figures of a comparison.
 /// The names of the figures.
 pub(super) const NAMES: [&str; 4] = ["functions", "ratios", "residuals", "convergence"];
 
+/// All figures of a comparison.
 pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
     let runs = &comparison.runs;
     let mut figures = vec![
@@ -44,10 +32,6 @@ pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
     figures.extend(residuals(runs, &comparison.measures));
     figures.extend(convergence(runs, &comparison.measures));
     figures
-}
-
-fn time() -> Axis {
-    Axis::linear("time t", "s")
 }
 
 /// A curve of each device: its caption, its unit, its values.
@@ -118,25 +102,21 @@ fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> Stri
 
 fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     let truths = truths(runs);
-    curves.iter().fold(figure, |figure, (label, unit, of)| {
+    figure.panels(curves.iter().map(|(label, unit, of)| {
         let found: Vec<Vec<f64>> = runs.iter().map(|run| of(&run.finished.device)).collect();
         let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
-        let mut axis = Axis::linear(*label, *unit);
-        let mut beyond = String::new();
+        let mut panel = Panel::of_time(*label, *unit);
         if let Some((low, high)) = without_spikes(&real, &found) {
-            axis = axis.limits(low, high);
-            beyond = format!("cut off: {}", reaches(runs, &found, (low, high), unit));
+            panel.y = panel.y.limits(low, high);
+            panel.title = format!("cut off: {}", reaches(runs, &found, (low, high), unit));
         }
-        let mut panel = Panel::new(time(), axis).title(beyond);
-        for ((label, run, _), values) in truths.iter().zip(&real) {
-            let thick = Style::new(Colour::Grey).width(5.0);
-            panel = panel.mark(Mark::line(label, &run.times(), values, thick));
-        }
-        for (i, (run, values)) in runs.iter().zip(&found).enumerate() {
-            panel = panel.mark(Mark::line(&run.name, &run.times(), values, style(i)));
-        }
-        figure.panel(panel)
-    })
+        let thick = Style::new(Colour::Grey).width(5.0);
+        let truths = truths.iter().zip(&real);
+        let truths = truths.map(|((label, run, _), y)| Mark::line(label, &run.times(), y, thick));
+        let found = runs.iter().zip(&found).enumerate();
+        let found = found.map(|(i, (run, y))| Mark::line(&run.name, &run.times(), y, style(i)));
+        panel.marks(truths).marks(found)
+    }))
 }
 
 /// Share of the nodes at either end of the values of a run that may be spikes.
@@ -197,14 +177,15 @@ fn reaches(
 /// The true devices, each once, with its label and the run whose grid it is on.
 fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
     let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
-    for run in runs {
-        let Some(truth) = &run.finished.truth else {
-            continue;
+    let grid = |run: &'_ ComparedRun| run.finished.oscillator.grid;
+    for (run, truth) in runs
+        .iter()
+        .filter_map(|run| Some((run, run.finished.truth.as_ref()?)))
+    {
+        let is_same = |(other, known): &(&ComparedRun, &NodalCoefficients)| {
+            is_same_truth((known, &grid(other)), (truth, &grid(run)))
         };
-        if !found
-            .iter()
-            .any(|(other, known)| same(other, known, run, truth))
-        {
+        if !found.iter().any(is_same) {
             found.push((run, truth));
         }
     }
@@ -217,36 +198,6 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
         .into_iter()
         .map(|(run, truth)| (label(run), run, truth))
         .collect()
-}
-
-/// Whether two true devices agree at the nodes of the second that the first covers.
-fn same(
-    run: &ComparedRun,
-    one: &NodalCoefficients,
-    other_run: &ComparedRun,
-    other: &NodalCoefficients,
-) -> bool {
-    let grid = &run.finished.oscillator.grid;
-    let close = |f: &[f64], g: &[f64]| {
-        let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);
-        other_run.times().iter().zip(g).all(|(t, value)| {
-            let place = (t - grid.start()) / grid.step();
-            interpolate(f, place).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
-        })
-    };
-    one.functions()
-        .zip(other.functions())
-        .all(|(f, g)| close(f, g))
-}
-
-/// The value between two nodes; `None` outside.
-fn interpolate(f: &[f64], place: f64) -> Option<f64> {
-    let i = place.floor();
-    if i < 0.0 || i + 1.0 >= f.len() as f64 {
-        return None;
-    }
-    let (i, share) = (i as usize, place - i);
-    Some(f[i] + share * (f[i + 1] - f[i]))
 }
 
 /// The residuals of the measured motions, one panel for each name of an experiment.
@@ -264,19 +215,17 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
         format!("Fitted minus measured displacement of each run against time. {misfits}."),
     );
     let panels = names.iter().map(|name| {
-        let axis = Axis::linear("y − y_obs", "m");
         let title = if names.len() > 1 { *name } else { "" };
         let zero = Mark::horizontal("", 0.0, Style::new(Colour::Grey).width(0.8));
-        let panel = Panel::new(time(), axis).title(title).mark(zero);
-        runs.iter().enumerate().fold(panel, |panel, (i, run)| {
+        let runs = runs.iter().enumerate().flat_map(|(i, run)| {
             let motions = run.motions.iter().filter(|m| m.experiment == *name);
-            motions.fold(panel, |panel, m| {
-                let style = style(i).width(1.2);
-                panel.mark(Mark::line(&run.name, &m.times, &m.residual, style))
-            })
-        })
+            let style = style(i).width(1.2);
+            motions.map(move |m| Mark::line(&run.name, &m.times, &m.residual, style))
+        });
+        let panel = Panel::of_time("y − y_obs", "m").title(title);
+        panel.mark(zero).marks(runs)
     });
-    (!names.is_empty()).then(|| panels.fold(figure, Figure::panel))
+    (!names.is_empty()).then(|| figure.panels(panels))
 }
 
 /// `J/J0` against the iteration, both logarithmic, so that iteration 0 is not shown.
@@ -287,63 +236,15 @@ fn convergence(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
             m.cost_ratio, m.iterations
         ))
     });
-    let panel = Panel::new(Axis::log("iteration", ""), Axis::log("cost J/J₀", ""));
-    let panel = runs.iter().enumerate().fold(panel, |panel, (i, run)| {
-        panel.mark(Mark::line(
-            &run.name,
-            &run.iterations,
-            &run.cost_ratio,
-            style(i),
-        ))
-    });
+    let lines = runs.iter().enumerate();
+    let lines =
+        lines.map(|(i, run)| Mark::line(&run.name, &run.iterations, &run.cost_ratio, style(i)));
+    let panel = Panel::new(Axis::log("iteration", ""), Axis::log("cost J/J₀", "")).marks(lines);
+    let figure = Figure::new(
+        "convergence",
+        "Convergence of J/J₀",
+        format!("Cost over its first value against the iteration, both logarithmic. {ends}."),
+    );
     let some = runs.iter().any(|run| !run.iterations.is_empty());
-    some.then(|| {
-        Figure::new(
-            "convergence",
-            "Convergence of J/J₀",
-            format!("Cost over its first value against the iteration, both logarithmic. {ends}."),
-        )
-        .panel(panel)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn twenty_four_runs_look_different() {
-        let styles: Vec<Style> = (0..24).map(style).collect();
-        for (i, one) in styles.iter().enumerate() {
-            assert!(!styles[..i].contains(one), "{i}");
-        }
-    }
-
-    #[test]
-    fn spikes_do_not_hide_the_rest() {
-        let wave: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.1).sin()).collect();
-        let truth = vec![vec![0.5; 1000]];
-        assert_eq!(without_spikes(&truth, std::slice::from_ref(&wave)), None);
-        let mut spiked = wave.clone();
-        spiked[77] = 1e6;
-        let (low, high) = without_spikes(&truth, &[wave, spiked]).expect("a spike");
-        assert!(
-            (-1.6..=-0.9).contains(&low) && (1.0..2.0).contains(&high),
-            "{low} {high}"
-        );
-    }
-
-    #[test]
-    fn what_is_real_is_never_cut_off() {
-        let mut jump = vec![1.0; 1000];
-        jump[500] = 50.0;
-        assert_eq!(without_spikes(&[jump], &[vec![1.0; 1000]]), None);
-    }
-
-    #[test]
-    fn interpolation_keeps_inside() {
-        assert_eq!(interpolate(&[1.0, 3.0], 0.5), Some(2.0));
-        assert_eq!(interpolate(&[1.0, 3.0], 1.5), None);
-        assert_eq!(interpolate(&[1.0, 3.0], -0.5), None);
-    }
+    some.then(|| figure.panel(panel))
 }

@@ -1,12 +1,11 @@
 //! What is compared: the numbers of one run.
 
-use super::errors::Errors;
 use super::run::ComparedRun;
-use super::verdict;
-use crate::report::advice::worst_fit;
+use super::verdict::{Match, verdict};
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::system::NodalCoefficients;
+use kmcfit_core::internals::assessment::{RECOVERED, Roughness, TruthErrors};
+use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
 
 /// The numbers of one run, and what they mean in one line.
@@ -17,11 +16,14 @@ pub struct Measures {
     /// Title of the model.
     pub title: String,
     /// How the run ended, in one word.
-    pub status: String,
+    pub status: Status,
     /// How the run ended, in one sentence.
     pub reason: String,
     /// What the numbers mean, in one line.
     pub verdict: String,
+    /// Whether the measured motion is matched.
+    #[serde(skip)]
+    pub is_matched: bool,
     /// Whether the truth is known, and reached in `k/m` and `c/m`.
     pub true_device: Option<bool>,
     /// Solver.
@@ -47,7 +49,7 @@ pub struct Measures {
     /// Wall-clock time, s.
     pub seconds: f64,
     /// Distances from the truth, where it is known.
-    pub errors: Option<Errors>,
+    pub errors: Option<TruthErrors>,
     /// Smallest mass at a node, kg.
     pub smallest_mass: f64,
     /// Smallest damping at a node, N s/m.
@@ -71,14 +73,16 @@ impl Measures {
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let device = &run.finished.device;
-        let errors = (run.finished.truth.as_ref()).map(|truth| Errors::of(device, truth));
+        let matching = Match::of(run);
+        let errors = (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(device, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
-            status: document.outcome.status.clone(),
+            status: document.outcome.status,
             reason: document.outcome.reason.clone(),
-            verdict: verdict::verdict(run, errors.as_ref()),
-            true_device: errors.as_ref().map(Errors::within_truth),
+            verdict: verdict(&matching, errors.as_ref()),
+            is_matched: matching.is_matched(),
+            true_device: errors.as_ref().map(|e| e.within(RECOVERED)),
             method: document.model.method.clone(),
             nodes: document.model.nodes,
             parameters: document.model.parameters,
@@ -90,7 +94,7 @@ impl Measures {
                 (CostKind::Integral | CostKind::Mixed, false) => "m^2 s",
                 (CostKind::Integral | CostKind::Mixed, true) => "rad^2 s",
             },
-            worst_fit: worst_fit(document),
+            worst_fit: document.worst_fit(),
             is_rotation: document.is_rotation(),
             has_ratio: document.has_ratio(),
             cost_ratio: document.cost.ratio,
@@ -110,87 +114,6 @@ impl Measures {
     }
 }
 
-/// `integral (m'')^2 dt`, `integral (c')^2 dt`, `integral (k')^2 dt` by differences of the values at
-/// the nodes, whatever the basis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Roughness {
-    /// `integral (m'')^2 dt`, kg^2/s^3.
-    pub mass: f64,
-    /// `integral (c')^2 dt`, N^2 s/m^2.
-    pub damping: f64,
-    /// `integral (k')^2 dt`, N^2/(m^2 s).
-    pub stiffness: f64,
-}
-
-impl Roughness {
-    /// The roughness of a device on a grid with this step, s.
-    pub fn of(device: &NodalCoefficients, step: f64) -> Self {
-        let slope = |f: &[f64]| -> f64 {
-            let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
-            squares.sum::<f64>() * step
-        };
-        let curvature = |f: &[f64]| -> f64 {
-            let second = |w: &[f64]| ((w[0] - 2.0 * w[1] + w[2]) / step / step).powi(2);
-            f.windows(3).map(second).sum::<f64>() * step
-        };
-        Self {
-            mass: curvature(&device.mass),
-            damping: slope(&device.coefficients[0]),
-            stiffness: slope(&device.coefficients[1]),
-        }
-    }
-}
-
 fn smallest(f: &[f64]) -> f64 {
     f.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn device(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
-        let constant = |value| vec![value; mass.len()];
-        NodalCoefficients {
-            mass: mass.to_vec(),
-            coefficients: vec![constant(damping), constant(stiffness)],
-        }
-    }
-
-    /// m = t^2 on [0, 1]: (m'')^2 = 4, counted at the inner nodes.
-    #[test]
-    fn roughness_of_a_parabola() {
-        let step = 1e-3;
-        let mass: Vec<f64> = (0..=1000)
-            .map(|i| 1.0 + (i as f64 * step).powi(2))
-            .collect();
-        let found = Roughness::of(&device(&mass, 0.3, 1.0), step);
-        assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
-        assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
-    }
-
-    #[test]
-    fn a_common_factor_is_the_same_device() {
-        let truth = device(&[1.0, 0.5, 0.8], 0.1, 1.0);
-        let doubled = device(&[2.0, 1.0, 1.6], 0.2, 2.0);
-        let errors = Errors::of(&doubled, &truth);
-        assert!(errors.within_truth() && !errors.undamped);
-        assert_eq!(errors.mass_relative, 1.0);
-    }
-
-    #[test]
-    fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = Errors::of(&device(&[1.0, 1.0], 0.02, 1.0), &truth);
-        assert!(errors.undamped);
-        assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
-        assert!(!errors.within_truth());
-    }
-
-    #[test]
-    fn a_device_without_mass_is_no_true_device() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = Errors::of(&device(&[1.0, 0.0], 0.0, 1.0), &truth);
-        assert!(!errors.within_truth());
-    }
 }

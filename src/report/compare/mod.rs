@@ -5,7 +5,6 @@
 //! `compare.csv` and `compare.html` show the same ones.
 
 mod conclusions;
-mod errors;
 mod figures;
 mod measures;
 mod page;
@@ -14,18 +13,13 @@ mod table;
 mod text;
 mod verdict;
 
-pub use errors::Errors;
-pub use measures::{Measures, Roughness};
+pub use measures::Measures;
 pub use run::{ComparedRun, MatchedMotion};
 
 use super::render;
 use crate::results::{Claim, OutputFolder};
 use serde::Serialize;
 use std::io;
-
-/// Largest relative error of `k/m` and `c/m` below which a device counts as the true one: well above
-/// what steppers and stopping tests leave, well below what a reader could see in a figure.
-pub const RECOVERED: f64 = 1e-3;
 
 /// Largest relative error of `k/m` and `c/m` below which a device counts as close to the true one:
 /// what a smooth fit of a record with a few per cent of noise can be asked for.
@@ -47,7 +41,7 @@ pub struct Comparison {
     runs: Vec<ComparedRun>,
     measures: Vec<Measures>,
     left_out: Vec<LeftOut>,
-    story: Option<String>,
+    sequence: Option<String>,
 }
 
 /// A run that was asked for and left nothing to compare.
@@ -79,15 +73,15 @@ impl Comparison {
             measures: runs.iter().map(Measures::of).collect(),
             runs,
             left_out,
-            story: None,
+            sequence: None,
         }
     }
 
-    /// The same as a story with a title: the order of the runs matters, and what each adds to those
+    /// The same as a sequence with a title: the order of the runs matters, and what each adds to those
     /// before it is told.
     #[must_use]
     pub fn told_as(mut self, title: impl Into<String>) -> Self {
-        self.story = Some(title.into());
+        self.sequence = Some(title.into());
         self
     }
 

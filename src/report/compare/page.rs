@@ -4,26 +4,23 @@ use super::conclusions::conclusions;
 use super::figures::{self, style};
 use super::measures::Measures;
 use super::table::{Row, known_rows};
-use super::{CLOSE, Comparison, MATCHED, RECOVERED};
-use crate::report::mark::Style;
+use super::{CLOSE, Comparison, MATCHED};
+use crate::report::chart::{Style, sample};
 use crate::report::page as shell;
-use crate::report::svg::sample;
 use crate::report::text::{escape, prose};
+use kmcfit_core::internals::assessment::RECOVERED;
 
 pub(super) fn page(comparison: &Comparison) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
-    let title = match (&comparison.story, count) {
+    let title = match (&comparison.sequence, count) {
         (Some(title), _) => title.clone(),
         (None, 1) => "One run".to_string(),
         (None, count) => format!("Comparison of {count} runs"),
     };
     let mut body = format!("<p>{}</p>\n", prose(&lead(comparison)));
-    if comparison.story.is_some() {
-        body += "<h2>What it comes to</h2>\n<ul>\n";
-        for conclusion in conclusions(&comparison.measures) {
-            body += &format!("<li>{}</li>\n", prose(&conclusion));
-        }
-        body += "</ul>\n";
+    if comparison.sequence.is_some() {
+        body += "<h2>What it comes to</h2>\n";
+        body += &shell::list(&conclusions(&comparison.measures));
     }
     body += "<h2>What each run means</h2>\n";
     for (i, run) in comparison.measures.iter().enumerate() {
@@ -90,7 +87,7 @@ fn card(run: &Measures, look: Style) -> String {
         escape(&run.name),
         escape(&run.title),
         prose(&capital(&run.verdict)),
-        escape(&run.status),
+        run.status.name(),
         prose(&run.reason),
     );
     if !run.knowledge.is_empty() {

@@ -1,9 +1,9 @@
 //! The table: one row per quantity, one cell per run; terminal, CSV and page show the same rows.
 
 use super::ROUNDING;
-use super::errors::Errors;
 use super::measures::Measures;
 use crate::report::document::Prediction;
+use kmcfit_core::internals::assessment::TruthErrors;
 
 /// One quantity of all runs.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,9 +123,9 @@ impl<'a> Rows<'a> {
 fn rows(runs: &[Measures]) -> Vec<Row> {
     let units = Units::of(runs);
     let metre = units.metre;
-    let error = |of: fn(&Errors) -> f64| move |m: &Measures| m.errors.as_ref().map(of);
+    let error = |of: fn(&TruthErrors) -> f64| move |m: &Measures| m.errors.as_ref().map(of);
     let mut t = Rows::of(runs);
-    t.add("status", "status", |m| m.status.clone());
+    t.add("status", "status", |m| m.status.name().to_owned());
     t.add("method", "method", |m| m.method.clone());
     t.add("nodes", "nodes", |m| m.nodes as u64);
     t.add("free values", "parameters", |m| m.parameters as u64);
@@ -185,7 +185,7 @@ pub(super) fn known_rows(runs: &[Measures]) -> Vec<Row> {
 
 /// The rows of the CSV file: what the page and the terminal say elsewhere comes with it.
 pub(super) fn csv_rows(runs: &[Measures]) -> Vec<Row> {
-    let error = |of: fn(&Errors) -> f64| move |m: &Measures| (m.errors.as_ref().map(of),);
+    let error = |of: fn(&TruthErrors) -> f64| move |m: &Measures| (m.errors.as_ref().map(of),);
     let mut all = Rows::of(runs);
     all.add("", "name", |m| m.name.clone());
     all.add("", "title", |m| m.title.clone());

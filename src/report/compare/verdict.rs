@@ -1,87 +1,132 @@
 //! What the numbers of a run mean, in one line.
 
-use super::errors::Errors;
 use super::run::ComparedRun;
-use super::{CLOSE, MATCHED, RECOVERED, ROUNDING};
+use super::{CLOSE, MATCHED, ROUNDING};
 use crate::report::cost::CostKind;
-use crate::report::document::ResultDocument;
+use kmcfit_core::internals::assessment::{RECOVERED, TruthErrors};
+use std::fmt;
 
 /// Fit in per cent from which a motion whose noise was estimated counts as matched.
 const FITTED: f64 = 90.0;
 
+/// How well the measured motion is matched.
+pub(super) enum Match {
+    /// The noise was estimated from the motion, and the fit of the worst channel is so many per cent: chi-square is then
+    /// what it is by construction.
+    Fit(f64),
+    /// Chi-square of so many readings.
+    ChiSquare { misfit: f64, readings: f64 },
+    /// The motion of the run is the measured one; `J/J0`.
+    Equation(f64),
+    /// The share of the motion that is left, and `J/J0`.
+    Left { share: f64, ratio: f64 },
+}
+
+impl Match {
+    /// How well a run matches its motion.
+    pub fn of(run: &ComparedRun) -> Self {
+        let document = &run.finished.document;
+        let ratio = document.cost.ratio;
+        if document.estimates_sigma() {
+            return Self::Fit(
+                document
+                    .channels()
+                    .map(|c| c.fit_percent)
+                    .fold(100.0, f64::min),
+            );
+        }
+        match document.model.cost_kind {
+            CostKind::ChiSquare => Self::ChiSquare {
+                misfit: document.cost.misfit,
+                readings: document.experiments.iter().map(|e| e.readings as f64).sum(),
+            },
+            CostKind::EquationError => Self::Equation(ratio),
+            CostKind::Integral | CostKind::Mixed => Self::Left {
+                share: residual_share(run),
+                ratio,
+            },
+        }
+    }
+
+    /// Whether it is matched. For a chi-square by the discrepancy rule: mean and twice the standard deviation.
+    pub fn is_matched(&self) -> bool {
+        match *self {
+            Self::Fit(percent) => percent >= FITTED,
+            Self::ChiSquare {
+                misfit,
+                readings: n,
+            } => misfit <= n + 2.0 * (2.0 * n).sqrt(),
+            Self::Equation(_) => false,
+            Self::Left { share, .. } => share <= MATCHED,
+        }
+    }
+}
+
+impl fmt::Display for Match {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verb = match self.is_matched() {
+            true => "matches the motion",
+            false => "does not match the motion",
+        };
+        match self {
+            Self::Fit(percent) => {
+                write!(
+                    f,
+                    "{verb} (fit {percent:.1} %; its noise was estimated from it)"
+                )
+            }
+            Self::ChiSquare { misfit, readings } => write!(
+                f,
+                "{verb} within its noise (chi-square {misfit:.0} of {readings} readings)"
+            ),
+            Self::Equation(ratio) => {
+                write!(
+                    f,
+                    "fits the equation of motion, not a motion (J/J0 {ratio:.1e})"
+                )
+            }
+            Self::Left { ratio, .. } if self.is_matched() => write!(f, "{verb} (J/J0 {ratio:.1e})"),
+            Self::Left { share, ratio } => {
+                write!(
+                    f,
+                    "{verb} (J/J0 {ratio:.1e}, {} of it is left)",
+                    percent(*share)
+                )
+            }
+        }
+    }
+}
+
 /// The line: whether the motion is matched, and whether the device is the true one.
-pub(super) fn verdict(run: &ComparedRun, errors: Option<&Errors>) -> String {
-    let (matched, how) = matching(run);
+pub(super) fn verdict(matching: &Match, errors: Option<&TruthErrors>) -> String {
+    let matched = matching.is_matched();
     let Some(errors) = errors else {
-        return format!("{how}; the truth is not known");
+        return format!("{matching}; the truth is not known");
     };
     if errors.within(RECOVERED) {
-        let digits = errors.k_over_m_relative.max(errors.c_over_m_relative);
-        let mut text = format!("the true device: k/m and c/m to {}", size(digits));
+        let mut text = format!(
+            "the true device: k/m and c/m to {}",
+            size(errors.worst_ratio())
+        );
         if errors.mass_relative >= RECOVERED {
             let off = percent(errors.mass_relative);
             text += &format!(", but m, c and k off by a common factor (m by {off})");
         }
         return match matched {
             true => text,
-            false => format!("{text}; {how}"),
+            false => format!("{text}; {matching}"),
         };
     }
     let off = distances(errors);
     match (matched, errors.within(CLOSE)) {
         (_, true) if errors.mass_relative >= CLOSE => format!(
             "close to the true device in k/m and c/m: {off}; m, c and k off by a common factor (m by \
-             {}); {how}",
+             {}); {matching}",
             percent(errors.mass_relative)
         ),
-        (_, true) => format!("close to the true device: {off}; {how}"),
-        (true, false) => format!("{how} but is another device: {off}"),
-        (false, false) => format!("{how}; another device: {off}"),
-    }
-}
-
-/// Whether the measured motion is matched, and in words how well.
-fn matching(run: &ComparedRun) -> (bool, String) {
-    let document = &run.finished.document;
-    let ratio = document.cost.ratio;
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    if channels().any(|c| c.sigma_estimated) {
-        // Chi-square is then what it is by construction.
-        let least = channels().map(|c| c.fit_percent).fold(100.0, f64::min);
-        let verb = match least >= FITTED {
-            true => "matches",
-            false => "does not match",
-        };
-        let how = format!("{verb} the motion (fit {least:.1} %; its noise was estimated from it)");
-        return (least >= FITTED, how);
-    }
-    if is_chi_square(document) {
-        let n = document
-            .experiments
-            .iter()
-            .map(|e| e.readings)
-            .sum::<usize>() as f64;
-        let misfit = document.cost.misfit;
-        // The discrepancy rule: mean and twice the standard deviation of a chi-square.
-        let matched = misfit <= n + 2.0 * (2.0 * n).sqrt();
-        let verb = if matched { "matches" } else { "does not match" };
-        let how =
-            format!("{verb} the motion within its noise (chi-square {misfit:.0} of {n} readings)");
-        return (matched, how);
-    }
-    if document.model.cost_kind == CostKind::EquationError {
-        // The motion of such a run is the measured one.
-        let how = format!("fits the equation of motion, not a motion (J/J0 {ratio:.1e})");
-        return (false, how);
-    }
-    let left = residual_share(run);
-    match left <= MATCHED {
-        true => (true, format!("matches the motion (J/J0 {ratio:.1e})")),
-        false => {
-            let left = percent(left);
-            let how = format!("does not match the motion (J/J0 {ratio:.1e}, {left} of it is left)");
-            (false, how)
-        }
+        (_, true) => format!("close to the true device: {off}; {matching}"),
+        (true, false) => format!("{matching} but is another device: {off}"),
+        (false, false) => format!("{matching}; another device: {off}"),
     }
 }
 
@@ -99,13 +144,8 @@ fn residual_share(run: &ComparedRun) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// The misfit is a chi-square: every record has a sigma.
-pub(super) fn is_chi_square(document: &ResultDocument) -> bool {
-    document.model.cost_kind == CostKind::ChiSquare
-}
-
 /// How far `k/m` and `c/m` are from the truth; only the one that is off, if the other is not.
-fn distances(errors: &Errors) -> String {
+fn distances(errors: &TruthErrors) -> String {
     let stiffness = format!("k/m off by {}", percent(errors.k_over_m_relative));
     let of = if errors.undamped {
         " of critical damping"

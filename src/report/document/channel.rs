@@ -1,6 +1,7 @@
-//! Parts of the document about channels, scalars, statistics and the step-size check.
+//! Parts of the document about channels and scalars.
 
-use super::number_or_null;
+use kmcfit_core::internals::assessment::ResidualPattern;
+use kmcfit_core::internals::solvers::number_or_nan;
 use serde::{Deserialize, Serialize};
 
 /// One channel of an experiment at the best point, in its own unit.
@@ -20,10 +21,10 @@ pub struct ChannelSummary {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub left_aside: usize,
     /// Root-mean-square residual.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
     /// `100 (1 - |residual| / |reading - mean|)`.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub fit_percent: f64,
     /// Standard deviation of a reading, where there is one for all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -36,9 +37,9 @@ pub struct ChannelSummary {
     pub robust: bool,
     /// What the residuals have that is neither noise nor motion, if there is anything of the kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pattern: Option<PatternSummary>,
+    pub pattern: Option<ResidualPattern>,
     /// What the channel adds to J.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub cost: f64,
     /// Whether the residuals look white, in words.
     pub whiteness: String,
@@ -47,37 +48,13 @@ pub struct ChannelSummary {
     /// Autocorrelation of the residuals at lags 0, 1, ...
     pub autocorrelation: Vec<f64>,
     /// That of white noise lies below this in 95 of 100 lags.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub autocorrelation_band: f64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
-}
-
-/// What residuals have that is neither noise nor motion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PatternSummary {
-    /// Single readings far off ([`kmcfit_core::internals::diagnostics::far_off`]), under least squares.
-    FarOff {
-        /// How many.
-        readings: usize,
-        /// Time of the first, s.
-        first: f64,
-    },
-    /// Their mean holds more than half of their squares.
-    Offset,
-    /// The straight line through what their mean leaves holds more than half of their squares.
-    Drift,
-    /// They swing at a frequency of their own, far from that of the readings.
-    Tone {
-        /// That frequency, Hz.
-        frequency: f64,
-        /// That of the readings, Hz.
-        beside: f64,
-    },
 }
 
 /// Readings that are not used, and why.
@@ -89,23 +66,6 @@ pub struct IgnoredSummary {
     pub reason: String,
 }
 
-/// All readings together.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StatisticsSummary {
-    /// Number of readings.
-    pub readings: usize,
-    /// Number of parameters of functions and scalars.
-    pub parameters: usize,
-    /// `J / (n - p)` for a chi-square of readings with known sigma; `null` where that means nothing.
-    pub reduced_chi_square: Option<f64>,
-    /// Akaike's criterion.
-    pub aic: Option<f64>,
-    /// The same corrected for small records.
-    pub aicc: Option<f64>,
-    /// Schwarz's criterion.
-    pub bic: Option<f64>,
-}
-
 /// A number that was fitted beside the functions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScalarSummary {
@@ -114,27 +74,11 @@ pub struct ScalarSummary {
     /// SI unit.
     pub unit: String,
     /// Value found.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub value: f64,
     /// Standard error from the linearised fit, without constraints, penalties and priors; `null`
     /// where the readings do not determine all parameters.
     pub standard_error: Option<f64>,
-}
-
-/// The optimum on a grid of half the step.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RefinedSummary {
-    /// Half the step, s.
-    pub step: f64,
-    /// Misfit there; that of the fit's own grid is `cost.misfit`.
-    #[serde(deserialize_with = "number_or_null")]
-    pub misfit: f64,
-    /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
-    #[serde(deserialize_with = "number_or_null")]
-    pub change_per_residual: f64,
-    /// Largest change of a prediction as a share of the largest reading, over the channels.
-    #[serde(deserialize_with = "number_or_null")]
-    pub change_per_reading: f64,
 }
 
 /// An experiment that took no part in the fit.
@@ -150,4 +94,11 @@ pub struct HoldOutSummary {
     /// Why there is no prediction, if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+}
+
+impl HoldOutSummary {
+    /// Its name in tables.
+    pub(in crate::report) fn title(&self) -> String {
+        format!("{} (held out)", self.name)
+    }
 }

@@ -3,27 +3,21 @@
 mod channel;
 mod search;
 
-pub use channel::{
-    ChannelSummary, HoldOutSummary, IgnoredSummary, PatternSummary, RefinedSummary, ScalarSummary,
-    StatisticsSummary,
-};
+pub use channel::{ChannelSummary, HoldOutSummary, IgnoredSummary, ScalarSummary};
 pub use search::{PathSummary, RungSummary, WeightSummary};
 
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
+use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
+pub use kmcfit_core::internals::study::Prediction;
 use kmcfit_core::internals::system::Grid;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the document's format.
 pub const FORMAT: u32 = 1;
-
-/// A number that left the range of floating-point numbers stands as `null` in JSON, which has no word
-/// for it: it is read back as not a number.
-pub(super) fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
 
 /// The whole document.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +39,7 @@ pub struct ResultDocument {
     /// How far the best point is from the first-order condition of a minimum under the constraints; absent where the fit did not
     /// come to an end, where J is zero, and where the linearised problem could not be solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub optimality: Option<OptimalitySummary>,
+    pub optimality: Option<Optimality>,
     /// Work done; one count is one pass over all experiments.
     pub counts: CountsSummary,
     /// Wall-clock time of the fit, s. Two runs of one model differ in this and in `timings` only.
@@ -77,10 +71,10 @@ pub struct ResultDocument {
     pub scalars: Vec<ScalarSummary>,
     /// All readings together.
     #[serde(default)]
-    pub statistics: StatisticsSummary,
+    pub statistics: FitStatistics,
     /// The optimum on a grid of half the step; `null` where it has no motion there.
     #[serde(default)]
-    pub half_step: Option<RefinedSummary>,
+    pub half_step: Option<StepCheck>,
     /// The motion of the found device from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
@@ -140,8 +134,8 @@ impl ModelSummary {
 /// How the run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutcomeSummary {
-    /// One of the words of [`kmcfit_core::internals::solvers::Status`].
-    pub status: String,
+    /// In one word.
+    pub status: Status,
     /// In one sentence.
     pub reason: String,
 }
@@ -150,19 +144,19 @@ pub struct OutcomeSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CostSummary {
     /// At the start.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub initial: f64,
     /// At the best point.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub r#final: f64,
     /// `final / initial`.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub ratio: f64,
     /// Part of `final` from the readings.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub misfit: f64,
     /// Part of `final` from the regularisation.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub regularisation: f64,
 }
 
@@ -170,33 +164,11 @@ pub struct CostSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GradientSummary {
     /// At the start.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub initial_norm_squared: f64,
     /// At the best point.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub final_norm_squared: f64,
-}
-
-/// The first-order condition of a minimum under the constraints, measured at the best point by the linearised problem
-/// ([`kmcfit_core::internals::solvers::Optimality`]). All numbers have no unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OptimalitySummary {
-    /// The share of J by which the solution of the linearised problem promises to lower it.
-    #[serde(deserialize_with = "number_or_null")]
-    pub stationarity: f64,
-    /// The largest change of a function that this solution asks for, relative to its size.
-    #[serde(deserialize_with = "number_or_null")]
-    pub step: f64,
-    /// Largest violation of a constraint relative to its row's scale.
-    #[serde(deserialize_with = "number_or_null")]
-    pub feasibility: f64,
-    /// Sum of the multipliers' sizes times the distances from the bounds, as a share of J.
-    #[serde(deserialize_with = "number_or_null")]
-    pub complementarity: f64,
-    /// A fit that says `converged` by its last steps has a `complementarity` and a `stationarity` or `step` of at most this, and
-    /// a `feasibility` of at most 1e-9. One that ended by a limit on J/J0 or G^2/G0^2 may have any.
-    #[serde(deserialize_with = "number_or_null")]
-    pub tolerance: f64,
 }
 
 /// Work done.
@@ -221,11 +193,56 @@ fn linear_terms() -> Vec<String> {
 }
 
 impl ResultDocument {
+    /// The channels of the experiments that were fitted.
+    pub(super) fn channels(&self) -> impl Iterator<Item = &ChannelSummary> {
+        self.experiments.iter().flat_map(|e| &e.channels)
+    }
+
+    /// The channels of all records with the names of these, those that were held out last.
+    pub(super) fn records(&self) -> impl Iterator<Item = (String, &ChannelSummary)> {
+        let fitted = self.experiments.iter();
+        let fitted = fitted.map(|e| (e.name.clone(), &e.channels));
+        let held = self.held_out.iter();
+        let held = held.map(|e| (e.title(), &e.channels));
+        let named = fitted.chain(held);
+        named.flat_map(|(name, channels)| channels.iter().map(move |c| (name.clone(), c)))
+    }
+
+    /// The functions in the order of the equation of motion.
+    pub(super) fn terms(&self) -> impl Iterator<Item = (&str, &FunctionSummary)> {
+        let names = std::iter::once("mass").chain(self.model.terms.iter().map(String::as_str));
+        names.filter_map(|name| Some((name, self.functions.get(name)?)))
+    }
+
+    /// All functions: those of the equation of motion, then those of single experiments.
+    pub(super) fn all_functions(&self) -> impl Iterator<Item = (&str, &FunctionSummary)> {
+        let own = self.functions.iter().map(|(name, f)| (name.as_str(), f));
+        let own =
+            own.filter(|(name, _)| *name != "mass" && !self.model.terms.iter().any(|t| t == name));
+        self.terms().chain(own)
+    }
+
+    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.model.cost_kind != CostKind::EquationError
+    }
+
+    /// Whether the standard deviation of the readings of a channel was estimated by a first fit, so that the last one has
+    /// another cost.
+    pub(super) fn estimates_sigma(&self) -> bool {
+        self.channels().any(|c| c.sigma_estimated)
+    }
+
     /// Whether `J/J0` says how much better the optimum is than the start: where the standard deviation of the readings
     /// is estimated, J is taken with that of the optimum.
     pub(super) fn has_ratio(&self) -> bool {
-        let mut channels = self.experiments.iter().flat_map(|e| &e.channels);
-        !channels.any(|c| c.sigma_estimated)
+        !self.estimates_sigma()
+    }
+
+    /// The fit of the channel that is matched worst, per cent.
+    pub(super) fn worst_fit(&self) -> Option<f64> {
+        let fits = self.channels().map(|c| c.fit_percent);
+        fits.filter(|x| x.is_finite()).reduce(f64::min)
     }
 
     /// Whether the motion is a rotation, in rad: then the mass is a moment of inertia.
@@ -233,48 +250,6 @@ impl ResultDocument {
         let mass = self.functions.get(CoefficientKind::Mass.name());
         mass.is_some_and(|mass| mass.unit == CoefficientKind::Mass.angular_unit())
     }
-}
-
-/// One function at the best point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FunctionSummary {
-    /// SI unit.
-    #[serde(default)]
-    pub unit: String,
-    /// Smallest value at a node.
-    #[serde(deserialize_with = "number_or_null")]
-    pub min: f64,
-    /// Largest value at a node.
-    #[serde(deserialize_with = "number_or_null")]
-    pub max: f64,
-    /// For a polynomial the factors `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i`
-    /// in the unit of the function per s^i.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub powers: Option<Vec<f64>>,
-    /// Whether it is zero but for rounding, beside the size at which it would matter.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub is_rounding: bool,
-    /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
-    /// whose errors can be believed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<String>,
-    /// Its smallest and largest value at the nodes where it is known, if there are any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known_range: Option<[f64; 2]>,
-    /// For a constant its standard error from the linearised fit, without constraints, penalties and
-    /// priors, where the readings determine all parameters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub standard_error: Option<f64>,
-    /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
-    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub constant_p_value: Option<f64>,
-    /// Largest distance from the truth at a node, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truth_max_error: Option<f64>,
-    /// Root-mean-square distance from the truth over the nodes, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truth_rms_error: Option<f64>,
 }
 
 /// One experiment at the best point.
@@ -288,7 +263,7 @@ pub struct ExperimentSummary {
     /// Number of readings of all channels.
     pub readings: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.
-    #[serde(deserialize_with = "number_or_null")]
+    #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
     /// How well each channel is matched.
     #[serde(default)]
@@ -311,30 +286,6 @@ pub struct IdentifiabilitySummary {
     pub open: Vec<String>,
     /// What the model says besides the readings, in words.
     pub knowledge: Vec<String>,
-}
-
-/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
-    /// Initial displacement, m.
-    pub displacement: f64,
-    /// Initial velocity, m/s.
-    pub velocity: f64,
-    /// `integral (y - y_true)^2 dt`, m^2 s, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cost: Option<f64>,
-    /// `integral y_true^2 dt`, m^2 s, where the truth is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub energy: Option<f64>,
-    /// Largest distance of the motion from zero, m; `None` where there is no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub largest: Option<f64>,
-    /// Displacement at the last node, m; `None` where there is no motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub last: Option<f64>,
-    /// Why there is no motion from there, if there is none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<String>,
 }
 
 /// The constraints at the best point.
@@ -399,9 +350,7 @@ impl FailureDocument {
             title: title.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             outcome: OutcomeSummary {
-                status: kmcfit_core::internals::solvers::Status::Failed
-                    .name()
-                    .into(),
+                status: Status::Failed,
                 reason: reason.into(),
             },
         }

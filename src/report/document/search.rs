@@ -1,5 +1,6 @@
 //! The way of a fit to its optimum: attempts from several starting points, the path of a weight.
 
+use kmcfit_core::internals::solvers::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -17,7 +18,7 @@ pub struct RungSummary {
     /// Iterations it took.
     pub iterations: u64,
     /// How it ended.
-    pub status: String,
+    pub status: Status,
 }
 
 /// How the weight of the smoothness was chosen.

@@ -4,8 +4,8 @@
 use super::table::{list, paragraph};
 use super::{figures, figures_without, help, opening, page as shell, repeat, settings};
 use crate::report::FittedModel;
+use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
-use crate::report::figure::Figure;
 use crate::report::figures::weight_path;
 use crate::report::summary::{
     prediction_table, write_constraints, write_rungs, write_scalars, write_statistics,

@@ -5,19 +5,17 @@
 //! The page forbids itself everything but its own style sheet and script, which it names by their
 //! SHA-256: a title or a name that were taken for a script by mistake could not run.
 
-mod chart;
 mod fit;
 mod opening;
 mod repeat;
 mod settings;
-mod shrink;
 mod table;
 
 pub(super) use fit::page as fit_page;
 pub(crate) use repeat::quoted as shell_quoted;
+pub(super) use table::list;
 
-use super::figure::Figure;
-use super::render;
+use super::chart::{Figure, data, render};
 use super::text::escape;
 use data_encoding::BASE64;
 use sha2::{Digest, Sha256};
@@ -76,7 +74,7 @@ fn hash(text: &str) -> String {
 /// A figure with its caption: a drawing, and its numbers for the chart. Title and description of the
 /// figure are its text for readers who cannot see it.
 fn figure(figure: &Figure, off: &[&str]) -> String {
-    let drawn = chart::chart(figure, off);
+    let drawn = data(figure, off);
     let thinned = match drawn.thinned {
         true => {
             " Long series are thinned for display: every peak is kept; all values are in the tables."

@@ -2,55 +2,45 @@
 
 use super::table::{list, number, table};
 use crate::report::advice::{self, Advice};
-use crate::report::cost::CostKind;
-use crate::report::document::ChannelSummary;
-use crate::report::document::{FunctionSummary, ResultDocument};
+use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use kmcfit_core::internals::identifiability::Verdict;
+use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::identifiability::VerdictKind;
 use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
 pub(super) fn opening(document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let mut text = state(document) + &facts(document) + &found(document);
-    if !known.settled.is_empty() {
-        text += "<h3>How sure</h3>\n";
-        text += &list(&known.settled);
-    }
-    if !known.open.is_empty() {
-        text += "<h3>What stays open</h3>\n";
-        text += &list(&known.open);
-    }
-    let next: Vec<String> = advice::next(document)
-        .iter()
-        .map(Advice::to_string)
-        .collect();
-    if !next.is_empty() {
-        text += "<h3>What to try next</h3>\n";
-        text += &list(&next);
-    }
-    let notes: Vec<String> = (document.warnings.iter().map(|w| format!("warning: {w}")))
-        .chain(document.remarks.iter().map(|r| format!("note: {r}")))
-        .collect();
-    if !notes.is_empty() {
-        text += "<h3>Notes</h3>\n";
-    }
-    text + &list(&notes)
+    let next = advice::next(document);
+    let notes = (document.warnings.iter().map(|w| format!("warning: {w}")))
+        .chain(document.remarks.iter().map(|r| format!("note: {r}")));
+    let lists = [
+        ("How sure", known.settled.clone()),
+        ("What stays open", known.open.clone()),
+        (
+            "What to try next",
+            next.iter().map(Advice::to_string).collect(),
+        ),
+        ("Notes", notes.collect()),
+    ];
+    let lists = lists.iter().filter(|(_, sentences)| !sentences.is_empty());
+    let lists =
+        lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
+    state(document) + &facts(document) + &found(document) + &lists.collect::<String>()
 }
 
 /// How it ended, as a coloured word and a reason.
 fn state(document: &ResultDocument) -> String {
     let outcome = &document.outcome;
-    let is = |status: Status| outcome.status == status.name();
-    let colour = match () {
-        () if is(Status::Converged) || is(Status::Completed) => "good",
-        () if is(Status::Failed) || is(Status::Infeasible) => "bad",
-        () => "warn",
+    let colour = match outcome.status {
+        Status::Converged | Status::Completed => "good",
+        Status::Failed | Status::Infeasible => "bad",
+        _ => "warn",
     };
     format!(
         "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
-        escape(&outcome.status),
+        outcome.status.name(),
         prose(&outcome.reason)
     )
 }
@@ -62,9 +52,8 @@ fn facts(document: &ResultDocument) -> String {
     if document.has_ratio() {
         facts.push(("misfit left, J/J0", number(document.cost.ratio)));
     }
-    let channels = || document.experiments.iter().flat_map(|e| &e.channels);
-    if let Some(worst) = advice::worst_fit(document) {
-        let name = match channels().count() {
+    if let Some(worst) = document.worst_fit() {
+        let name = match document.channels().count() {
             1 => "fit of the readings",
             _ => "fit of the worst channel",
         };
@@ -76,8 +65,7 @@ fn facts(document: &ResultDocument) -> String {
     facts.push(("readings", readings.to_string()));
     facts.push(("free values", document.model.parameters.to_string()));
     let known = &document.identifiability;
-    let is_simulated = document.model.cost_kind != CostKind::EquationError;
-    if known.seen < known.of && is_simulated {
+    if known.seen < known.of && document.is_simulated() {
         facts.push((
             "directions that can be seen",
             format!("{} at most", known.seen),
@@ -96,17 +84,7 @@ fn facts(document: &ResultDocument) -> String {
 
 /// The functions in the order of the equation of motion, then those of single experiments.
 fn found(document: &ResultDocument) -> String {
-    let all = &document.functions;
-    let main = std::iter::once("mass").chain(document.model.terms.iter().map(String::as_str));
-    let main: Vec<&str> = main.collect();
-    let own = all
-        .keys()
-        .map(String::as_str)
-        .filter(|name| !main.contains(name));
-    let named = main.iter().copied().chain(own);
-    let functions: Vec<(&str, &FunctionSummary)> = named
-        .filter_map(|name| Some((name, all.get(name)?)))
-        .collect();
+    let functions: Vec<(&str, &FunctionSummary)> = document.all_functions().collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
     let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
     let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
@@ -118,7 +96,7 @@ fn found(document: &ResultDocument) -> String {
     }
     let known = |x: Option<f64>| x.map_or(String::new(), number);
     let row = |(name, f): &(&str, &FunctionSummary)| {
-        let is_seen = f.verdict.as_deref() != Some(Verdict::NotSeen.name());
+        let is_seen = f.verdict != Some(VerdictKind::NotSeen);
         let [low, high] = match (is_seen, f.is_rounding) {
             (false, _) => [String::new(), String::new()],
             (true, true) => [number(0.0), number(0.0)],
@@ -127,7 +105,7 @@ fn found(document: &ResultDocument) -> String {
         let error = f.standard_error.filter(|_| is_seen && !f.is_rounding);
         let mut cells = vec![name.to_string(), low, high, f.unit.clone()];
         cells.extend(has_error.then(|| known(error)));
-        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict.as_deref()).to_owned()));
+        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict).to_owned()));
         if has_truth {
             cells.extend([known(f.truth_max_error), known(f.truth_rms_error)]);
         }
@@ -137,44 +115,36 @@ fn found(document: &ResultDocument) -> String {
     table(&headings, &rows)
 }
 
-/// A verdict's name as a word of a table.
-fn verdict_in_words(verdict: Option<&str>) -> &'static str {
+/// A verdict as a word of a table.
+fn verdict_in_words(verdict: Option<VerdictKind>) -> &'static str {
     match verdict {
-        Some("identified") => "yes",
-        Some("only-ratio") => "only a ratio",
-        Some("only-on") => "at times",
-        Some("not-seen") => "not seen",
-        Some("fixed") => "given",
-        _ => "",
+        Some(VerdictKind::Identified) => "yes",
+        Some(VerdictKind::OnlyRatio) => "only a ratio",
+        Some(VerdictKind::OnlyOn) => "at times",
+        Some(VerdictKind::NotSeen) => "not seen",
+        Some(VerdictKind::Fixed) => "given",
+        None => "",
     }
 }
 
 /// How well each record is matched, those that were held out included.
 pub(super) fn records(document: &ResultDocument) -> String {
-    let fitted = document
-        .experiments
-        .iter()
-        .map(|e| (e.name.clone(), &e.channels));
-    let held = document.held_out.iter();
-    let held = held.map(|e| (format!("{} (held out)", e.name), &e.channels));
     let mut rows = Vec::new();
     let mut notes = Vec::new();
-    for (name, channels) in fitted.chain(held) {
-        for channel in channels {
-            rows.push(record(&name, channel));
-            let about = format!("{name}, {}", channel.kind);
-            if channel.sigma.is_some() {
-                notes.push(format!("{about}: {}", channel.whiteness));
-            }
-            notes.extend(channel.ignored.iter().map(|ignored| {
-                let readings = count(ignored.readings, "reading");
-                format!("{about}: {readings} not used: {}", ignored.reason)
-            }));
+    for (name, channel) in document.records() {
+        rows.push(record(&name, channel));
+        let about = format!("{name}, {}", channel.kind);
+        if channel.sigma.is_some() {
+            notes.push(format!("{about}: {}", channel.whiteness));
         }
+        notes.extend(channel.ignored.iter().map(|ignored| {
+            let readings = count(ignored.readings, "reading");
+            format!("{about}: {readings} not used: {}", ignored.reason)
+        }));
     }
     for out in &document.held_out {
         let failure = out.failure.as_ref();
-        notes.extend(failure.map(|f| format!("{} (held out): no motion: {f}", out.name)));
+        notes.extend(failure.map(|f| format!("{}: no motion: {f}", out.title())));
     }
     let headings = [
         "record",

@@ -40,7 +40,7 @@ pub(super) fn pairs(rows: &[(&str, String)]) -> String {
 }
 
 /// Sentences as a list; nothing where there are none.
-pub(super) fn list(sentences: &[String]) -> String {
+pub(in crate::report) fn list(sentences: &[String]) -> String {
     if sentences.is_empty() {
         return String::new();
     }

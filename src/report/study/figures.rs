@@ -1,10 +1,9 @@
 //! The figures of a study.
 
-use super::{BandRecord, Numbers, StudyDocument};
-use crate::report::figure::{Axis, Figure, Panel};
-use crate::report::mark::{Colour, Dash, Mark, Style};
+use super::{BandRecord, BandsPiece, DirectionRecord, EquivalentRecord, Numbers, StudyDocument};
+use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use crate::report::figures::truth;
 
-/// All that the study has something for.
 /// The names of the figures, some with a suffix.
 pub const NAMES: [&str; 8] = [
     "bands",
@@ -17,6 +16,7 @@ pub const NAMES: [&str; 8] = [
     "study-predictions",
 ];
 
+/// All that the study has something for.
 pub fn all(study: &StudyDocument) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(bands(study));
@@ -28,10 +28,6 @@ pub fn all(study: &StudyDocument) -> Vec<Figure> {
     figures.extend(waterfall(study));
     figures.extend(predictions(study));
     figures
-}
-
-fn time() -> Axis {
-    Axis::linear("time t", "s")
 }
 
 /// Missing numbers as gaps.
@@ -47,275 +43,207 @@ fn bands(study: &StudyDocument) -> Option<Figure> {
         "What was found against time, with the band of the stated confidence at each time; wider the \
          band that holds at all times at once. Marks: turning points fix k/m, zero crossings c/m.",
     );
-    let figure = bands.bands.iter().fold(figure.columns(2), |figure, band| {
-        figure.panel(band_panel(&bands.times, band, bands))
-    });
-    Some(figure)
+    let panels = bands.bands.iter().map(|band| band_panel(band, bands));
+    Some(figure.columns(2).panels(panels))
 }
 
-fn band_panel(times: &[f64], band: &BandRecord, all: &super::BandsPiece) -> Panel {
+/// The area between the ends of a band; where it has none it is not drawn: its note says so.
+fn area(
+    times: &[f64],
+    (low, high): (&Numbers, &Numbers),
+    label: &str,
+    colour: Colour,
+) -> Option<Mark> {
+    let ends = times.iter().zip(low).zip(high);
+    let ends = ends.filter_map(|((t, low), high)| Some((*t, ((*low)?, (*high)?))));
+    let (times, (low, high)): (Vec<f64>, (Vec<f64>, Vec<f64>)) = ends.unzip();
+    (times.len() > 1).then(|| Mark::band(label, &times, &low, &high, colour))
+}
+
+fn band_panel(band: &BandRecord, all: &BandsPiece) -> Panel {
+    let times = &all.times;
     let values = gaps(&band.values);
-    let known = |low: &Numbers, high: &Numbers| {
-        let pairs = low
-            .iter()
-            .zip(high)
-            .filter(|(l, h)| l.is_some() && h.is_some());
-        pairs.count() > 1
-    };
-    // Where a band has no end it is not drawn: its note says so.
-    let area = |low: &Numbers, high: &Numbers, label: &str, colour| {
-        known(low, high).then(|| {
-            let mut kept: [Vec<f64>; 3] = [Vec::new(), Vec::new(), Vec::new()];
-            for ((t, l), h) in times.iter().zip(low).zip(high) {
-                if let (Some(l), Some(h)) = (l, h) {
-                    kept[0].push(*t);
-                    kept[1].push(*l);
-                    kept[2].push(*h);
-                }
-            }
-            Mark::band(label, &kept[0], &kept[1], &kept[2], colour)
-        })
-    };
     let anchors: &[f64] = match band.name.as_str() {
         "k/m" => &all.turning_points,
         "c/m" => &all.zero_crossings,
         _ => &[],
     };
-    let at = |t: &f64| {
-        let i = times.partition_point(|x| x < t).min(times.len() - 1);
-        values[i]
-    };
+    let at = |t: &f64| values[times.partition_point(|x| x < t).min(times.len() - 1)];
     let anchored: Vec<f64> = anchors.iter().map(at).collect();
-    let truth = gaps(&band.truth);
-    Panel::new(time(), Axis::linear(&band.name, &band.unit))
-        .maybe(area(
-            &band.simultaneous_low,
-            &band.simultaneous_high,
-            "at all times at once",
-            Colour::Grey,
-        ))
-        .maybe(area(&band.low, &band.high, "at each time", Colour::Sky))
+    let real = gaps(&band.truth);
+    let whole = (&band.simultaneous_low, &band.simultaneous_high);
+    let each = (&band.low, &band.high);
+    Panel::of_time(&band.name, &band.unit)
+        .marks(area(times, whole, "at all times at once", Colour::Grey))
+        .marks(area(times, each, "at each time", Colour::Sky))
         .mark(Mark::line(
             "found",
             times,
             &values,
             Style::new(Colour::Blue).width(1.6),
         ))
-        .maybe((!truth.is_empty()).then(|| {
-            let style = Style::new(Colour::Vermillion).dash(Dash::Dashed);
-            Mark::line("truth", times, &truth, style)
-        }))
-        .maybe((!anchors.is_empty()).then(|| {
+        .marks((!real.is_empty()).then(|| truth(times, &real)))
+        .marks((!anchors.is_empty()).then(|| {
             let style = Style::new(Colour::Black).width(4.0);
             Mark::points("fixed by the data", anchors, &anchored, style)
         }))
+}
+
+/// Numbers from 1.
+fn ranks(count: usize) -> Vec<f64> {
+    (1..=count).map(|i| i as f64).collect()
 }
 
 fn spectrum(study: &StudyDocument) -> Option<Figure> {
     let spectrum = study.spectrum.as_ref()?;
     let values = &spectrum.singular_values;
     let largest = values.first().copied().filter(|s| *s > 0.0)?;
-    let index: Vec<f64> = (1..=values.len()).map(|i| i as f64).collect();
     let relative: Vec<f64> = values.iter().map(|s| (s / largest).max(1e-20)).collect();
-    Some(
-        Figure::new(
-            "spectrum",
-            "What the readings see",
-            spectrum.sentence.clone(),
-        )
-        .panel(
-            Panel::new(
-                Axis::linear("direction, best first", ""),
-                Axis::log("singular value relative to the largest", ""),
-            )
-            .mark(Mark::line("", &index, &relative, Style::new(Colour::Blue)))
-            .mark(Mark::vertical(
-                "last direction that is seen",
-                spectrum.rank as f64,
-                Style::new(Colour::Vermillion).dash(Dash::Dashed),
-            )),
-        ),
+    let dashed = Style::new(Colour::Vermillion).dash(Dash::Dashed);
+    let rank = spectrum.rank as f64;
+    let panel = Panel::new(
+        Axis::linear("direction, best first", ""),
+        Axis::log("singular value relative to the largest", ""),
     )
+    .marks([
+        Mark::line(
+            "",
+            &ranks(values.len()),
+            &relative,
+            Style::new(Colour::Blue),
+        ),
+        Mark::vertical("last direction that is seen", rank, dashed),
+    ]);
+    let sentence = spectrum.sentence.as_str();
+    Some(Figure::new("spectrum", "What the readings see", sentence).panel(panel))
 }
 
 fn directions(study: &StudyDocument) -> Vec<Figure> {
     let Some(spectrum) = &study.spectrum else {
         return Vec::new();
     };
-    let sets = [
-        ("best", "The directions that are seen best", &spectrum.best),
-        (
-            "worst",
-            "The directions that are seen worst",
-            &spectrum.worst,
-        ),
-    ];
-    let drawn = sets.into_iter().filter(|(_, _, set)| !set.is_empty());
-    drawn
-        .map(|(name, title, set)| {
-            let figure = Figure::new(
-                format!("directions-{name}"),
-                title,
-                "Changes of the functions against time, one panel for each function.",
-            );
-            let count = set[0].functions.len();
-            (0..count).fold(figure, |figure, f| {
-                let name = &set[0].functions[f].0;
-                let panel = Panel::new(time(), Axis::linear(format!("change of {name}"), ""));
-                let panel = set.iter().enumerate().fold(panel, |panel, (k, direction)| {
-                    let label = format!("{:.1e}", direction.singular_value);
-                    let values = &direction.functions[f].1;
-                    panel.mark(Mark::line(label, &spectrum.times, values, Style::nth(k)))
-                });
-                figure.panel(panel)
-            })
-        })
-        .collect()
+    let figure = |(name, set): (&str, &[DirectionRecord])| {
+        let names = set.first()?.functions.iter().enumerate();
+        let panels = names.map(|(f, (name, _))| {
+            let line = |(k, direction): (usize, &DirectionRecord)| {
+                let label = format!("{:.1e}", direction.singular_value);
+                Mark::line(
+                    label,
+                    &spectrum.times,
+                    &direction.functions[f].1,
+                    Style::nth(k),
+                )
+            };
+            Panel::of_time(format!("change of {name}"), "").marks(set.iter().enumerate().map(line))
+        });
+        let figure = Figure::new(
+            format!("directions-{name}"),
+            format!("The directions that are seen {name}"),
+            "Changes of the functions against time, one panel for each function.",
+        );
+        Some(figure.panels(panels))
+    };
+    let sets = [("best", &spectrum.best[..]), ("worst", &spectrum.worst)];
+    sets.into_iter().filter_map(figure).collect()
+}
+
+/// A figure with a panel for each record, if there are any.
+fn each<T>(records: &[T], figure: Figure, panel: impl Fn(&T) -> Panel) -> Option<Figure> {
+    (!records.is_empty()).then(|| figure.panels(records.iter().map(panel)))
 }
 
 fn profiles(study: &StudyDocument) -> Option<Figure> {
-    if study.profiles.is_empty() {
-        return None;
-    }
     let figure = Figure::new(
         "profiles",
         "Profiles",
         "The least cost with one number held, above the optimum's, against that number.",
     );
-    let figure = study.profiles.iter().fold(figure.columns(2), |figure, p| {
+    each(&study.profiles, figure.columns(2), |p| {
         let least = p.costs.iter().copied().fold(f64::INFINITY, f64::min);
         let rise: Vec<f64> = p.costs.iter().map(|c| c - least).collect();
-        let style = Style::new(Colour::Blue);
-        let mut panel = Panel::new(
-            Axis::linear(&p.name, &p.unit),
-            Axis::linear("rise of the cost", ""),
-        )
-        .title(p.verdict.clone())
-        .mark(Mark::line("", &p.values, &rise, style));
-        for end in p.interval.iter().flatten() {
-            let style = Style::new(Colour::Vermillion).dash(Dash::Dashed);
-            panel = panel.mark(Mark::vertical("interval", *end, style));
-        }
-        for (value, _) in &p.marks {
-            let style = Style::new(Colour::Grey).dash(Dash::Dotted);
-            panel = panel.mark(Mark::vertical("another bound", *value, style));
-        }
-        figure.panel(panel)
-    });
-    Some(figure)
+        let dashed = Style::new(Colour::Vermillion).dash(Dash::Dashed);
+        let dotted = Style::new(Colour::Grey).dash(Dash::Dotted);
+        let ends = p.interval.iter().flatten();
+        let x = Axis::linear(&p.name, &p.unit);
+        Panel::new(x, Axis::linear("rise of the cost", ""))
+            .title(&p.verdict)
+            .mark(Mark::line("", &p.values, &rise, Style::new(Colour::Blue)))
+            .marks(ends.map(|end| Mark::vertical("interval", *end, dashed)))
+            .marks((p.marks.iter()).map(|(x, _)| Mark::vertical("another bound", *x, dotted)))
+    })
 }
 
 fn tubes(study: &StudyDocument) -> Option<Figure> {
-    if study.tubes.is_empty() {
-        return None;
-    }
     let figure = Figure::new(
         "tubes",
         "The widest tubes",
         "Smallest and largest values among all devices that fit as well as stated, at chosen times.",
     );
-    let figure = study.tubes.iter().fold(figure.columns(2), |figure, tube| {
-        let panel = Panel::new(time(), Axis::linear(&tube.name, &tube.unit))
-            .mark(Mark::band(
-                "",
-                &tube.times,
-                &tube.low,
-                &tube.high,
-                Colour::Sky,
-            ))
-            .mark(Mark::points(
-                "smallest",
-                &tube.times,
-                &tube.low,
-                Style::new(Colour::Blue).width(4.0),
-            ))
-            .mark(Mark::points(
-                "largest",
-                &tube.times,
-                &tube.high,
-                Style::new(Colour::Vermillion).width(4.0),
-            ));
-        figure.panel(panel)
-    });
-    Some(figure)
+    let dots = |colour| Style::new(colour).width(4.0);
+    each(&study.tubes, figure.columns(2), |tube| {
+        let (t, low, high) = (&tube.times, &tube.low, &tube.high);
+        Panel::of_time(&tube.name, &tube.unit).marks([
+            Mark::band("", t, low, high, Colour::Sky),
+            Mark::points("smallest", t, low, dots(Colour::Blue)),
+            Mark::points("largest", t, high, dots(Colour::Vermillion)),
+        ])
+    })
 }
 
 fn equivalents(study: &StudyDocument) -> Option<Figure> {
-    if study.equivalents.is_empty() {
-        return None;
-    }
     let figure = Figure::new(
         "equivalents",
         "Several devices, same motion",
         "Mass, damping and stiffness of devices that all move like the fit.",
     );
-    type Pick = fn(&super::EquivalentRecord) -> &Vec<f64>;
+    type Pick = fn(&EquivalentRecord) -> &Vec<f64>;
     let parts: [(&str, &str, Pick); 3] = [
         ("mass m", "kg", |e| &e.mass),
         ("damping c", "N s/m", |e| &e.damping),
         ("stiffness k", "N/m", |e| &e.stiffness),
     ];
-    let figure = parts
-        .into_iter()
-        .fold(figure, |figure, (label, unit, pick)| {
-            let panel = Panel::new(time(), Axis::linear(label, unit));
-            let devices = study.equivalents.iter().enumerate();
-            figure.panel(devices.fold(panel, |panel, (k, e)| {
-                panel.mark(Mark::line(&e.name, &e.times, pick(e), Style::nth(k)))
-            }))
-        });
-    Some(figure)
+    let panels = parts.into_iter().map(|(label, unit, pick)| {
+        let devices = study.equivalents.iter().enumerate();
+        Panel::of_time(label, unit)
+            .marks(devices.map(|(k, e)| Mark::line(&e.name, &e.times, pick(e), Style::nth(k))))
+    });
+    (!study.equivalents.is_empty()).then(|| figure.panels(panels))
 }
 
 fn waterfall(study: &StudyDocument) -> Option<Figure> {
     let multistart = study.multistart.as_ref()?;
     let costs: Vec<f64> = multistart.costs.iter().map(|c| c.max(1e-300)).collect();
-    let index: Vec<f64> = (1..=costs.len()).map(|i| i as f64).collect();
-    (!costs.is_empty()).then(|| {
-        Figure::new(
-            "waterfall",
-            "Fits from many starts",
-            "Costs of all fits in rising order: steps are optima.",
-        )
-        .panel(
-            Panel::new(Axis::linear("fit, best first", ""), Axis::log("cost J", "")).mark(
-                Mark::points("", &index, &costs, Style::new(Colour::Blue).width(4.0)),
-            ),
-        )
-    })
+    let dots = Style::new(Colour::Blue).width(4.0);
+    let panel = Panel::new(Axis::linear("fit, best first", ""), Axis::log("cost J", ""));
+    let panel = panel.mark(Mark::points("", &ranks(costs.len()), &costs, dots));
+    let figure = Figure::new(
+        "waterfall",
+        "Fits from many starts",
+        "Costs of all fits in rising order: steps are optima.",
+    );
+    (!costs.is_empty()).then(|| figure.panel(panel))
 }
 
 fn predictions(study: &StudyDocument) -> Option<Figure> {
-    if study.predictions.is_empty() {
-        return None;
-    }
     let figure = Figure::new(
         "study-predictions",
         "Motions from elsewhere",
         "The displacement of the fitted device, with its band, and the envelope over the extreme devices.",
     );
-    let figure = study.predictions.iter().fold(figure, |figure, p| {
-        let area = |ends: &Vec<[f64; 2]>, label: &str, colour| {
-            let low: Vec<f64> = ends.iter().map(|e| e[0]).collect();
-            let high: Vec<f64> = ends.iter().map(|e| e[1]).collect();
+    each(&study.predictions, figure, |p| {
+        let area = |ends: &Option<Vec<[f64; 2]>>, label: &str, colour| {
+            let ends = ends.iter().flatten().map(|[low, high]| (*low, *high));
+            let (low, high): (Vec<f64>, Vec<f64>) = ends.unzip();
             Mark::band(label, &p.times, &low, &high, colour)
         };
-        figure.panel(
-            Panel::new(time(), Axis::linear("displacement y", "m"))
-                .title(p.name.clone())
-                .maybe(
-                    p.worst
-                        .as_ref()
-                        .map(|e| area(e, "worst case", Colour::Orange)),
-                )
-                .maybe(p.band.as_ref().map(|e| area(e, "band", Colour::Sky)))
-                .mark(Mark::line(
-                    "found",
-                    &p.times,
-                    &p.displacement,
-                    Style::new(Colour::Blue),
-                )),
-        )
-    });
-    Some(figure)
+        let worst = p
+            .worst
+            .is_some()
+            .then(|| area(&p.worst, "worst case", Colour::Orange));
+        let band = p.band.is_some().then(|| area(&p.band, "band", Colour::Sky));
+        let found = Mark::line("found", &p.times, &p.displacement, Style::new(Colour::Blue));
+        Panel::of_time("displacement y", "m")
+            .title(&p.name)
+            .marks(worst.into_iter().chain(band).chain([found]))
+    })
 }

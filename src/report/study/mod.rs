@@ -1,8 +1,10 @@
 //! What a study found: pieces that are kept as they are finished, one document, figures, one page.
 
 mod figures;
+mod fit;
 mod page;
 mod pieces;
+mod records;
 mod text;
 
 pub use pieces::{
@@ -11,7 +13,7 @@ pub use pieces::{
     PredictionRecord, ProfilePiece, SpectrumPiece, StudyDocument, TubeRecord, VariesRecord,
 };
 
-pub use text::ENDED;
+pub use records::*;
 
 use super::{json, render};
 use crate::results::{Claim, OutputFolder};

@@ -4,17 +4,13 @@ use super::StudyDocument;
 use super::figures;
 use super::text::sections;
 use crate::report::page as shell;
-use crate::report::text::{escape, prose};
+use crate::report::text::escape;
 
 /// One file, nothing to load.
 pub fn page(study: &StudyDocument) -> String {
     let mut body = String::new();
     for (heading, sentences) in sections(study) {
-        body += &format!("<h2>{}</h2>\n<ul>\n", escape(heading));
-        for sentence in sentences {
-            body += &format!("<li>{}</li>\n", prose(&sentence));
-        }
-        body += "</ul>\n";
+        body += &format!("<h2>{}</h2>\n{}", escape(heading), shell::list(&sentences));
     }
     body += "<h2>In pictures</h2>\n";
     body += &shell::help();

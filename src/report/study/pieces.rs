@@ -1,5 +1,6 @@
 //! The pieces of a study, as they are kept and read back.
 
+use kmcfit_core::internals::solvers::Status;
 use serde::{Deserialize, Serialize};
 
 /// Numbers of which some may be infinite or missing: `null` in JSON.
@@ -55,7 +56,7 @@ pub struct StudyDocument {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitPiece {
     /// How it ended.
-    pub status: String,
+    pub status: Status,
     /// The same in words.
     pub reason: String,
     /// J.

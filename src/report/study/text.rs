@@ -30,7 +30,12 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
         (
             "The fit",
             lines(study.fit.as_slice(), |fit| {
-                format!("{}: {}; J = {:.6e}", fit.status, fit.reason, fit.cost)
+                format!(
+                    "{}: {}; J = {:.6e}",
+                    fit.status.name(),
+                    fit.reason,
+                    fit.cost
+                )
             }),
         ),
         (

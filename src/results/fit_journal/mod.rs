@@ -9,7 +9,7 @@ mod read;
 
 use super::atomic::replace_with;
 use super::heading::Heading;
-use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, path_in, push_line, write_line};
+use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, push_line, write_line};
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
@@ -114,7 +114,7 @@ impl FitJournal {
     pub fn begin(folder: &Path, heading: &Heading) -> io::Result<Self> {
         Self::clear(folder)?;
         let work = WorkFolder::create_in(folder)?;
-        let file = JournalFile::begin(&work, &path_in(folder, FIT_JOURNAL), heading)?;
+        let file = JournalFile::begin(&work, &folder.join(FIT_JOURNAL), heading)?;
         Ok(Self::new(
             folder,
             heading,
@@ -128,7 +128,7 @@ impl FitJournal {
     /// # Errors
     /// If it is not the journal of a fit of this format.
     pub fn heading(folder: &Path) -> Result<Option<Heading>, InputError> {
-        match path_in(folder, FIT_JOURNAL).exists() {
+        match folder.join(FIT_JOURNAL).exists() {
             true => Reader::open(folder).map(|reader| Some(reader.text.heading)),
             false => Ok(None),
         }
@@ -139,7 +139,7 @@ impl FitJournal {
     /// # Errors
     /// If there is none, or it was begun with another model, other data or by another version.
     pub fn resume(folder: &Path, heading: &Heading) -> Result<Self, InputError> {
-        let path = path_in(folder, FIT_JOURNAL);
+        let path = folder.join(FIT_JOURNAL);
         let reader = Reader::open(folder)?;
         heading.check_same(&reader.text.heading, &path)?;
         let (before, end) = reader.contents();
@@ -183,7 +183,7 @@ impl FitJournal {
     /// What the file system says.
     pub fn clear(folder: &Path) -> io::Result<()> {
         for name in [CHECKPOINT, FIT_JOURNAL] {
-            system::remove_file(&path_in(folder, name))?;
+            system::remove_file(&folder.join(name))?;
         }
         Ok(())
     }
@@ -239,7 +239,7 @@ impl FitJournal {
         // The iterations before it must not be lost when it is not.
         self.write();
         self.file.sync()?;
-        let path = path_in(&self.folder, CHECKPOINT);
+        let path = self.folder.join(CHECKPOINT);
         replace_with(self.work.path(), &path, |out| {
             let begin = write_line(&mut *out, Mark::default(), &self.heading)?;
             write_line(out, begin, &(self.unit, standing))?;

@@ -2,7 +2,7 @@
 
 use super::{Entry, Line};
 use crate::error::InputError;
-use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark, path_in};
+use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark};
 use kmcfit_core::internals::solvers::{CheckpointUnit, IterationRecord, SolverState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -95,7 +95,7 @@ impl Reader {
     pub fn open(folder: &Path) -> Result<Self, InputError> {
         Ok(Self {
             folder: folder.to_path_buf(),
-            text: JournalText::read(&path_in(folder, FIT_JOURNAL), WHAT)?,
+            text: JournalText::read(&folder.join(FIT_JOURNAL), WHAT)?,
         })
     }
 
@@ -127,7 +127,7 @@ impl Reader {
 
     /// The checkpoint, if it is of this fit and undamaged.
     fn standing(&self) -> Option<(u64, SolverState)> {
-        let checkpoint = JournalText::read(&path_in(&self.folder, CHECKPOINT), WHAT).ok()?;
+        let checkpoint = JournalText::read(&self.folder.join(CHECKPOINT), WHAT).ok()?;
         let is_of_this_fit = checkpoint.heading == self.text.heading;
         let (standing, _) = checkpoint.lines().next()?;
         is_of_this_fit.then_some(standing)

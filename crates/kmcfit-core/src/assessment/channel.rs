@@ -3,6 +3,7 @@
 use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift};
 use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
+use serde::{Deserialize, Serialize};
 
 /// Residuals below this share of the largest reading are rounding.
 const ROUNDING: f64 = 1e-6;
@@ -16,9 +17,11 @@ const MULTIPLE: f64 = 0.1;
 const HALF: f64 = 0.5;
 
 /// A pattern of residuals that is neither noise nor response.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ResidualPattern {
     /// Single outliers ([`far_off`]) under least squares.
+    #[serde(rename = "far-off")]
     Outliers {
         /// Number of outliers.
         readings: usize,

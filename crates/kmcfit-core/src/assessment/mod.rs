@@ -2,13 +2,17 @@
 
 mod channel;
 mod constancy;
+mod function;
 mod plausibility;
+mod recovery;
 mod statistics;
 mod step_check;
 
 pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
 pub use constancy::{constant_probability, standard_error};
+pub use function::{FunctionSummary, function_summaries};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
+pub use recovery::{RECOVERED, Roughness, TruthErrors, is_same_truth};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 

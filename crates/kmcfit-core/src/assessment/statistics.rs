@@ -4,9 +4,10 @@ use crate::diagnostics::{InformationCriteria, with_estimated_sigma, with_known_s
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Loss, Weighting};
+use serde::{Deserialize, Serialize};
 
 /// Goodness of fit and information criteria of a fit.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitStatistics {
     /// Number of readings.
     pub readings: usize,

@@ -4,17 +4,22 @@ use crate::diagnostics::rms;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
+use crate::solvers::number_or_nan;
+use serde::{Deserialize, Serialize};
 
 /// The optimum on a grid of half the step.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StepCheck {
     /// Half the step, s.
     pub step: f64,
     /// Misfit there.
+    #[serde(deserialize_with = "number_or_nan")]
     pub misfit: f64,
     /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
+    #[serde(deserialize_with = "number_or_nan")]
     pub change_per_residual: f64,
     /// Largest change of a prediction as a share of the largest reading, over the channels.
+    #[serde(deserialize_with = "number_or_nan")]
     pub change_per_reading: f64,
 }
 

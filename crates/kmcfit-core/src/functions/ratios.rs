@@ -3,7 +3,7 @@
 use crate::system::NodalCoefficients;
 
 /// Ratios of stiffness and damping to mass at the nodes, and what engineers call them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ratios {
     /// `k/m`, 1/s^2.
     pub k_over_m: Vec<f64>,

@@ -15,6 +15,7 @@ use super::covariance::{Information, stacked};
 use super::gauge::Gauge;
 use super::linear::right_svd;
 use super::sensitivity::{Sensitivity, rank_of};
+use crate::diagnostics::rms;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -41,6 +42,18 @@ pub struct Candidate {
     pub excitation: Option<Excitation>,
     /// What is measured.
     pub channels: Vec<CandidateChannel>,
+}
+
+/// Root-mean-square residual of the first channel: the noise of candidates without a sigma.
+pub fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let pairs = problem
+        .channels()
+        .zip(evaluation.predictions.iter().flatten());
+    let mut spreads = pairs.map(|(channel, predicted)| {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        rms(&residuals)
+    });
+    spreads.next().unwrap_or(1.0).max(f64::MIN_POSITIVE.sqrt())
 }
 
 /// What a candidate adds.

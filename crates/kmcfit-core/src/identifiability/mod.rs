@@ -12,6 +12,7 @@
 mod active;
 mod anchors;
 mod band;
+mod band_curves;
 mod bands;
 mod components;
 mod counting;
@@ -35,7 +36,9 @@ pub use anchors::anchors;
 pub use band::{Band, Side};
 pub use bands::{BandSettings, Bands};
 pub use counting::{Symmetry, count};
-pub use experiments::{Candidate, CandidateChannel, Gain, Ranked, rank_experiments};
+pub use experiments::{
+    Candidate, CandidateChannel, Gain, Ranked, rank_experiments, residual_spread,
+};
 pub use gauge::Gauge;
 pub use sensitivity::{Seen, Sensitivity, Spectrum};
-pub use verdict::{Judgement, Verdict, verdicts};
+pub use verdict::{Judgement, Verdict, VerdictKind, verdicts};

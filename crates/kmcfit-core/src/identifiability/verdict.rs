@@ -7,6 +7,7 @@ use crate::diagnostics::{NORMAL_975, median_size};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::Term;
+use serde::{Deserialize, Serialize};
 
 /// A function is identified where the half-width of its 95 % band is at most this share of its
 /// size at most times ([`Problem::natural_scales`] with the median of its values in place of the largest): a quarter
@@ -37,6 +38,17 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Its kind.
+    pub fn kind(&self) -> VerdictKind {
+        match self {
+            Self::Identified { .. } => VerdictKind::Identified,
+            Self::OnlyRatio(_) => VerdictKind::OnlyRatio,
+            Self::OnlyOn(_) => VerdictKind::OnlyOn,
+            Self::NotSeen => VerdictKind::NotSeen,
+            Self::Fixed => VerdictKind::Fixed,
+        }
+    }
+
     /// Its name in files.
     pub fn name(&self) -> &'static str {
         match self {
@@ -47,6 +59,18 @@ impl Verdict {
             Self::Fixed => "fixed",
         }
     }
+}
+
+/// The kind of a [`Verdict`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum VerdictKind {
+    Identified,
+    OnlyRatio,
+    OnlyOn,
+    NotSeen,
+    Fixed,
 }
 
 /// A verdict on one function or ratio.

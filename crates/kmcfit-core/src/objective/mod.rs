@@ -2,6 +2,7 @@
 
 mod cost_and_gradient;
 mod gradient;
+mod gradient_check;
 mod jacobian;
 mod node_aligned;
 mod prediction;
@@ -11,6 +12,7 @@ mod simulated_record;
 mod verify;
 
 pub use gradient::{Gradient, GradientKind};
+pub use gradient_check::GradientCheck;
 pub use refine::Refined;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};

@@ -159,6 +159,6 @@ pub(super) fn ratio(value: f64, reference: f64) -> f64 {
 }
 
 /// JSON has no word for a number that is not finite.
-fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -35,7 +35,7 @@ pub use checkpoint::{
 pub use counts::Counts;
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
-pub use history::IterationRecord;
+pub use history::{IterationRecord, number_or_nan};
 pub use iterate::Iterate;
 pub(crate) use linearization::{add_penalties, add_priors, linear_readings, weighted_jacobian};
 pub use methods::equation_error::{Measurements, equation_error};

@@ -4,6 +4,7 @@
 //! linearised once more at the point that is returned, and solved under its constraints; how much of J that solution promises is
 //! what the point is short of a minimum.
 
+use super::history::number_or_nan;
 use super::iterate::Iterate;
 use super::linearization::{Linearization, linearise};
 use super::reason::{ConditionFailure, Reason};
@@ -13,6 +14,7 @@ use crate::constraints::TOLERANCE;
 use crate::host;
 use crate::problem::Problem;
 use crate::qp::{Solution, Subproblem};
+use serde::{Deserialize, Serialize};
 
 /// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
 /// measurements.
@@ -35,20 +37,25 @@ const BYTES_PER_NODE: u64 = 4000;
 /// much as J, so that directions that the readings do not show promise nothing. Without constraints
 /// the decrease is `g' (4 H)^-1 g` with the gradient `g` and the Gauss-Newton Hessian `2 H`, penalties and `J |.|^2` included.
 /// It is zero exactly where the conditions of Karush, Kuhn and Tucker hold.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Optimality {
     /// `(J - min L) / J`, less the rounding of the response: the share of J that the linearised problem promises. With the
     /// residuals of the optimality conditions of the program that it was solved by, if there was one.
+    #[serde(deserialize_with = "number_or_nan")]
     pub stationarity: f64,
     /// The largest change of a function by that step, relative to its size. In a fit without residuals it is this
     /// that goes to zero.
+    #[serde(deserialize_with = "number_or_nan")]
     pub step: f64,
     /// Largest violation of a constraint, relative to its scale.
+    #[serde(deserialize_with = "number_or_nan")]
     pub feasibility: f64,
     /// `sum |multiplier| distance / J` of all bounds at the point, with the multipliers of the linearised problem.
+    #[serde(deserialize_with = "number_or_nan")]
     pub complementarity: f64,
     /// What `complementarity` and one of `stationarity` and `step` may be at a minimum: the tolerance of the stopping test,
     /// or [`Optimality::LEAST`].
+    #[serde(deserialize_with = "number_or_nan")]
     pub tolerance: f64,
 }
 

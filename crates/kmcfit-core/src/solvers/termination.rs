@@ -8,6 +8,7 @@ use std::time::Duration;
 
 /// How a fit ended, in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// A stopping test of the model was met.
     Converged,

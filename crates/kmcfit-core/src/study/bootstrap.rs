@@ -30,6 +30,57 @@ pub enum Noise {
     Residual,
 }
 
+/// Why there are no refits.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoRefits {
+    /// The readings do not determine all parameters, or these are too many: refits from the optimum would not move along
+    /// the others.
+    Undetermined,
+    /// The optimum has no response.
+    NoResponse(SimulationError),
+}
+
+impl From<SimulationError> for NoRefits {
+    fn from(error: SimulationError) -> Self {
+        Self::NoResponse(error)
+    }
+}
+
+/// The interval of a number; `None` where too few refits ended well.
+pub type NumberInterval = (Linear, Option<[f64; 2]>);
+
+/// The intervals of all constants and scalars and of further numbers, each once, from refits.
+///
+/// # Errors
+/// Why there are none.
+pub fn intervals(
+    problem: &Problem,
+    optimum: &[f64],
+    further: impl Iterator<Item = Linear>,
+    (noise, count, seed): (Noise, usize, u64),
+    level: f64,
+    threads: usize,
+) -> Result<Vec<NumberInterval>, NoRefits> {
+    let evaluation = problem.evaluate(optimum)?;
+    if problem.covariance(&evaluation).is_none() {
+        return Err(NoRefits::Undetermined);
+    }
+    let found = bootstrap(problem, optimum, noise, count, seed, threads)?;
+    let constants = problem.functions.iter().enumerate();
+    let constants = constants.filter(|(_, f)| f.parameters() == 1);
+    let constants = constants.map(|(f, _)| Linear::mean(problem, f));
+    let scalars = 0..problem.functions.scalars().len();
+    let scalars = scalars.map(|i| Linear::scalar(problem, i));
+    let mut intervals: Vec<NumberInterval> = Vec::new();
+    for of in constants.chain(scalars).chain(further) {
+        if intervals.iter().all(|(other, _)| other.name != of.name) {
+            let interval = found.interval(&of, level);
+            intervals.push((of, interval));
+        }
+    }
+    Ok(intervals)
+}
+
 /// The refits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bootstrap {

@@ -3,7 +3,7 @@
 //! * [`Linear`]: a number that is linear in the parameters, the thing asked about;
 //! * [`profile()`]: which values of it the readings allow, by fits with it held fixed;
 //! * [`pull_apart`]: the extreme devices among all that explain the readings as well as stated;
-//! * [`equivalent`]: other devices with the very same motion;
+//! * [`equivalent`]: other devices with the very same motion; [`equivalent_systems`] finds and checks those of a fit;
 //! * [`multistart`]: fits from many starts, their clusters, and whether two optima share a valley;
 //! * [`variation`]: whether a function varies at all;
 //! * [`bootstrap`]: intervals from fits to simulated readings;
@@ -14,6 +14,8 @@
 
 pub mod bootstrap;
 pub mod equivalent;
+mod equivalent_systems;
+mod free_response;
 mod functional;
 pub mod multistart;
 mod parallel;
@@ -24,5 +26,7 @@ mod refit;
 mod simulate;
 pub mod variation;
 
+pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
+pub use free_response::{PredictedMotion, Prediction, predict};
 pub use functional::{Linear, Target};
 pub use profile::{Profile, ProfileSettings, profile, profiles};

@@ -65,7 +65,7 @@ const bandPath = (mark, view) => {
   };
   const [from, to] = inSight(mark, view);
   for (let i = from; to > i; i += 1) {
-    const [px, bottom, top] = [view.px(mark.x[i]), view.py(mark.low[i]), view.py(mark.high[i])];
+    const [px, bottom, top] = [view.px(mark.x[i]), view.py(mark.y[i]), view.py(mark.high[i])];
     if (Number.isFinite(px + bottom + top)) {
       low.push(`${fixed(px)} ${fixed(view.near(bottom))}`);
       high.push(`${fixed(px)} ${fixed(view.near(top))}`);
@@ -81,10 +81,10 @@ const pathOf = (mark, view) => {
     case "line": return linePath(mark, mark.y, view);
     case "points": return dotPath(mark, view);
     case "band": return bandPath(mark, view);
-    case "across": return `M${left} ${fixed(view.near(view.py(mark.at)))}h${width}`;
-    case "upright": return `M${fixed(view.px(mark.at))} ${top}v${height}`;
+    case "across": return `M${left} ${fixed(view.near(view.py(mark.y[0])))}h${width}`;
+    case "upright": return `M${fixed(view.px(mark.x[0]))} ${top}v${height}`;
     default: {
-      const [from, to] = [view.px(mark.from), view.px(mark.to)];
+      const [from, to] = mark.x.map(view.px);
       return `M${fixed(from)} ${top}H${fixed(to)}v${height}H${fixed(from)}Z`;
     }
   }

@@ -18,13 +18,12 @@ class Panel {
   }
 
   prepared(mark) {
-    const rising = !mark.x || mark.x.every((value, i) => i === 0 || value >= mark.x[i - 1]);
+    const rising = mark.x.every((value, i) => i === 0 || value >= mark.x[i - 1]);
     return { ...mark, rising };
   }
 
   xExtent() {
-    const all = this.marks.flatMap((mark) => [mark.x ?? [], mark.kind === "upright" ? [mark.at] : [], mark.kind === "span" ? [mark.from, mark.to] : []]);
-    return all.reduce((range, values) => union(range, extent(this.x.log, values)), null);
+    return this.marks.reduce((range, mark) => union(range, extent(this.x.log, mark.x)), null);
   }
 
   build(parent) {
@@ -54,8 +53,8 @@ class Panel {
     const { log, limits } = this.y;
     if (limits) return limits.map((value) => even(log, value));
     const shown = this.marks.filter((mark) => this.isShown(mark));
-    const lists = shown.flatMap((mark) => [mark.y, mark.low, mark.high, mark.kind === "across" ? [mark.at] : null]);
-    const range = lists.filter(Boolean).reduce((all, values) => union(all, extent(log, values)), null);
+    const lists = shown.flatMap((mark) => [mark.y, mark.high]);
+    const range = lists.reduce((all, values) => union(all, extent(log, values)), null);
     return padded(range ?? [0, 1], 0.05);
   }
 
@@ -134,9 +133,9 @@ class Panel {
 
   values(view, x) {
     const found = [];
-    for (const mark of this.marks.filter((mark) => mark.x && this.isShown(mark))) {
+    for (const mark of this.marks.filter((mark) => mark.x.length && mark.y.length && this.isShown(mark))) {
       if (mark.kind === "band") {
-        const [low, high] = [mark.low, mark.high].map((ys) => valueAt(mark, ys, view, x));
+        const [low, high] = [mark.y, mark.high].map((ys) => valueAt(mark, ys, view, x));
         if (low && high) found.push({ mark, y: NaN, text: `${number(low.y, 5)} to ${number(high.y, 5)} ${this.y.unit}`.trim() });
       } else {
         const value = valueAt(mark, mark.y, view, x);

@@ -6,10 +6,7 @@ const spread = (xs) => (Array.isArray(xs) ? xs : Array.from({ length: xs.count }
 const begin = () => {
   const charts = [...document.querySelectorAll("figure.chart")].map((figure, index) => {
     const data = JSON.parse(figure.querySelector("script").textContent);
-    const xs = data.xs.map(spread);
-    for (const panel of data.panels) {
-      for (const mark of panel.marks) if (mark.x !== undefined) mark.x = xs[mark.x];
-    }
+    for (const mark of data.panels.flatMap((panel) => panel.marks)) mark.x = spread(mark.x);
     const chart = new Chart(figure, data, index);
     figure.classList.add("ready");
     return chart;

@@ -7,9 +7,11 @@
 //! reached to different accuracy.
 
 mod cluster;
+mod finding;
 mod path;
 
 pub use cluster::{Cluster, Distance, distance};
+pub use finding::Finding;
 pub use path::{Paths, between};
 
 use super::parallel::map;

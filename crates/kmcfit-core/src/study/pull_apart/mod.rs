@@ -22,7 +22,10 @@
 //! N. I. M. Gould, P. L. Toint, *Trust-Region Methods*, SIAM 2000, chapter 15, second-order
 //! corrections included.
 
+mod envelope;
 mod search;
+
+pub use envelope::{Envelope, envelopes};
 
 use super::functional::{Linear, Target};
 use super::parallel::map;

@@ -3,9 +3,9 @@
 use super::axis::Ruler;
 use super::curve;
 use super::figure::Panel;
-use super::mark::{Colour, Dash, Mark, Style};
+use super::mark::{Kind, Mark, Style};
 use super::shape::{Anchor, Frame, Ink, Point, Shape, Stroke, Words};
-use super::text;
+use crate::report::text;
 
 /// Font size of labels and ticks, in pixels.
 pub(super) const SIZE: f64 = 12.0;
@@ -86,21 +86,18 @@ impl Placed<'_> {
 
     /// Spans lie behind the grid, whatever their order among the marks.
     fn spans(&self, shapes: &mut Vec<Shape>) {
-        for mark in &self.panel.marks {
-            if let Mark::Span { from, to, .. } = mark {
-                let (from, to) = (self.x.share(*from), self.x.share(*to));
-                if from.is_nan() || to.is_nan() {
-                    continue;
-                }
-                let left = self.x_pixel(from.min(to).clamp(0.0, 1.0));
-                let width = self.x_pixel(from.max(to).clamp(0.0, 1.0)) - left;
-                let area = Frame {
-                    left,
-                    width,
-                    ..self.frame
-                };
-                shapes.push(Shape::Area(area.corners(), SPAN));
+        for mark in (self.panel.marks.iter()).filter(|mark| mark.kind == Kind::Span) {
+            let [from, to] = [0, 1].map(|end| self.x.share(mark.x[end]));
+            if from.is_nan() || to.is_nan() {
+                continue;
             }
+            let left = self.x_pixel(from.min(to).clamp(0.0, 1.0));
+            let area = Frame {
+                left,
+                width: self.x_pixel(from.max(to).clamp(0.0, 1.0)) - left,
+                ..self.frame
+            };
+            shapes.push(Shape::Area(area.corners(), SPAN));
         }
     }
 
@@ -125,33 +122,28 @@ impl Placed<'_> {
     }
 
     fn mark(&self, mark: &Mark, shapes: &mut Vec<Shape>) {
-        match mark {
-            Mark::Line { x, y, style, .. } => self.line(x, y, style, shapes),
-            Mark::Points { x, y, style, .. } => self.points(x, y, style, shapes),
-            Mark::Band {
-                x,
-                low,
-                high,
-                colour,
-                ..
-            } => self.band(x, low, high, *colour, shapes),
-            Mark::Span { .. } => {}
-            Mark::HorizontalLine { y, style, .. } => {
-                let share = self.y.share(*y);
-                if (0.0..=1.0).contains(&share) {
-                    shapes.push(self.rule_at_y(share, Stroke::of(style)));
-                }
+        let stroke = Stroke::of(&mark.style);
+        let is_inside = |share: &f64| (0.0..=1.0).contains(share);
+        match mark.kind {
+            Kind::Points if mark.x.len().min(mark.y.len()) <= MOST_DOTS => {
+                let dots = self.pixels(&mark.x, &mark.y);
+                dots.for_each(|dot| self.dot(dot, &mark.style, shapes));
             }
-            Mark::VerticalLine { x, style, .. } => {
-                let share = self.x.share(*x);
-                if (0.0..=1.0).contains(&share) {
-                    shapes.push(self.rule_at_x(share, Stroke::of(style)));
-                }
+            Kind::Line | Kind::Points => self.line(mark, shapes),
+            Kind::Band => self.band(mark, shapes),
+            Kind::Span => {}
+            Kind::Across => {
+                let share = mark.y.iter().map(|y| self.y.share(*y)).find(is_inside);
+                shapes.extend(share.map(|share| self.rule_at_y(share, stroke)));
+            }
+            Kind::Upright => {
+                let share = mark.x.iter().map(|x| self.x.share(*x)).find(is_inside);
+                shapes.extend(share.map(|share| self.rule_at_x(share, stroke)));
             }
         }
     }
 
-    fn line(&self, x: &[f64], y: &[f64], style: &Style, shapes: &mut Vec<Shape>) {
+    fn line(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Shape>) {
         for run in curve::runs(self.pixels(x, y)) {
             // A reading between two gaps has no segment to show it.
             if let [alone] = run[..] {
@@ -163,17 +155,6 @@ impl Placed<'_> {
         }
     }
 
-    fn points(&self, x: &[f64], y: &[f64], style: &Style, shapes: &mut Vec<Shape>) {
-        if x.len().min(y.len()) > MOST_DOTS {
-            return self.line(x, y, &style.dash(Dash::Solid), shapes);
-        }
-        for run in curve::runs(self.pixels(x, y)) {
-            for point in run {
-                self.dot(point, style, shapes);
-            }
-        }
-    }
-
     fn dot(&self, point: Point, style: &Style, shapes: &mut Vec<Shape>) {
         if curve::inside(point, &self.frame) {
             let stroke = Stroke::of(style);
@@ -181,68 +162,57 @@ impl Placed<'_> {
         }
     }
 
-    fn band(&self, x: &[f64], low: &[f64], high: &[f64], colour: Colour, shapes: &mut Vec<Shape>) {
-        let ink = Ink::of(colour).opacity(BAND_OPACITY);
-        let edges = self
-            .pixels(x, low)
-            .zip(self.pixels(x, high))
-            .collect::<Vec<_>>();
+    fn band(&self, mark: &Mark, shapes: &mut Vec<Shape>) {
+        let ink = Ink::of(mark.style.colour).opacity(BAND_OPACITY);
+        let low = self.pixels(&mark.x, &mark.y);
+        let edges: Vec<_> = low.zip(self.pixels(&mark.x, &mark.high)).collect();
         let drawable = |(low, high): &(Point, Point)| (low.0 + low.1 + high.1).is_finite();
-        for run in edges
-            .split(|edge| !drawable(edge))
-            .filter(|run| run.len() > 1)
-        {
+        let runs = edges.split(|edge| !drawable(edge));
+        for run in runs.filter(|run| run.len() > 1) {
             let edge = |of: fn(&(Point, Point)) -> Point| {
-                let path = run.iter().map(of).collect::<Vec<_>>();
-                let path = curve::thin(&path).into_iter();
-                path.map(|point| curve::clamp(point, &self.frame))
-                    .collect::<Vec<_>>()
+                let path = curve::thin(&run.iter().map(of).collect::<Vec<_>>());
+                path.into_iter()
+                    .map(|point| curve::clamp(point, &self.frame))
             };
-            let mut outline = edge(|edge| edge.0);
-            outline.extend(edge(|edge| edge.1).into_iter().rev());
-            shapes.push(Shape::Area(outline, ink));
+            let outline = edge(|edge| edge.0).chain(edge(|edge| edge.1).rev());
+            shapes.push(Shape::Area(outline.collect(), ink));
         }
     }
 
     fn axes(&self, shapes: &mut Vec<Shape>) {
+        let stroke = Stroke::solid(AXIS, 0.8);
         let mut outline = self.frame.corners();
         outline.push(outline[0]);
-        shapes.push(Shape::Path(outline, Stroke::solid(AXIS, 0.8)));
+        shapes.push(Shape::Path(outline, stroke));
+        let Frame { left, .. } = self.frame;
+        let bottom = self.frame.bottom();
+        let x_tick = |share: f64, length: f64| {
+            let x = self.x_pixel(share);
+            Shape::Path(vec![(x, bottom), (x, bottom + length)], stroke)
+        };
+        let y_tick = |share: f64, length: f64| {
+            let y = self.y_pixel(share);
+            Shape::Path(vec![(left, y), (left - length, y)], stroke)
+        };
         for tick in &self.x.major {
-            self.x_tick(tick.share, TICK, shapes);
+            shapes.push(x_tick(tick.share, TICK));
             if self.x_labels {
-                let y = self.frame.bottom() + TICK + GAP + TICK_SIZE / 2.0;
-                let at = (self.x_pixel(tick.share), y);
+                let at = (
+                    self.x_pixel(tick.share),
+                    bottom + TICK + GAP + TICK_SIZE / 2.0,
+                );
                 shapes.push(words(at, &tick.label, TICK_SIZE, Anchor::Middle));
             }
         }
         for tick in &self.y.major {
-            self.y_tick(tick.share, TICK, shapes);
+            shapes.push(y_tick(tick.share, TICK));
             if self.y_labels {
-                let at = (self.frame.left - TICK - GAP, self.y_pixel(tick.share));
+                let at = (left - TICK - GAP, self.y_pixel(tick.share));
                 shapes.push(words(at, &tick.label, TICK_SIZE, Anchor::End));
             }
         }
-        self.x
-            .minor
-            .iter()
-            .for_each(|&share| self.x_tick(share, MINOR_TICK, shapes));
-        self.y
-            .minor
-            .iter()
-            .for_each(|&share| self.y_tick(share, MINOR_TICK, shapes));
-    }
-
-    fn x_tick(&self, share: f64, length: f64, shapes: &mut Vec<Shape>) {
-        let (x, y) = (self.x_pixel(share), self.frame.bottom());
-        let path = vec![(x, y), (x, y + length)];
-        shapes.push(Shape::Path(path, Stroke::solid(AXIS, 0.8)));
-    }
-
-    fn y_tick(&self, share: f64, length: f64, shapes: &mut Vec<Shape>) {
-        let (x, y) = (self.frame.left, self.y_pixel(share));
-        let path = vec![(x, y), (x - length, y)];
-        shapes.push(Shape::Path(path, Stroke::solid(AXIS, 0.8)));
+        shapes.extend(self.x.minor.iter().map(|share| x_tick(*share, MINOR_TICK)));
+        shapes.extend(self.y.minor.iter().map(|share| y_tick(*share, MINOR_TICK)));
     }
 
     /// Axis labels and heading; smaller where they would run into a neighbour.

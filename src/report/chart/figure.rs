@@ -4,15 +4,19 @@
 //! Where `x` and `y` differ in length, the shorter one counts.
 
 use super::mark::Mark;
+use serde::{Serialize, Serializer};
 
 /// One figure: a grid of panels with a common legend above them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     /// File stem, as in `convergence` for `convergence.svg`.
+    #[serde(skip)]
     pub name: String,
     /// Title; part of the file, not of the picture, because captions belong to the text around it.
+    #[serde(skip)]
     pub title: String,
     /// What the picture shows, for readers who cannot see it.
+    #[serde(skip)]
     pub description: String,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
@@ -45,14 +49,20 @@ impl Figure {
 
     /// Adds a panel.
     #[must_use]
-    pub fn panel(mut self, panel: Panel) -> Self {
-        self.panels.push(panel);
+    pub fn panel(self, panel: Panel) -> Self {
+        self.panels([panel])
+    }
+
+    /// Adds panels.
+    #[must_use]
+    pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
+        self.panels.extend(panels);
         self
     }
 }
 
 /// One pair of axes with its marks; later marks lie on top of earlier ones.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Panel {
     /// Heading above the panel; none where empty.
     pub title: String,
@@ -82,17 +92,21 @@ impl Panel {
         self
     }
 
-    /// Adds a mark.
-    #[must_use]
-    pub fn mark(mut self, mark: Mark) -> Self {
-        self.marks.push(mark);
-        self
+    /// An empty panel of a quantity against time.
+    pub fn of_time(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self::new(Axis::linear("time t", "s"), Axis::linear(label, unit))
     }
 
-    /// Adds a mark where there is one.
+    /// Adds a mark.
     #[must_use]
-    pub fn maybe(mut self, mark: Option<Mark>) -> Self {
-        self.marks.extend(mark);
+    pub fn mark(self, mark: Mark) -> Self {
+        self.marks([mark])
+    }
+
+    /// Adds marks, or the one that there may be.
+    #[must_use]
+    pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
+        self.marks.extend(marks);
         self
     }
 }
@@ -106,18 +120,23 @@ pub enum Scale {
     Log,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_log<S: Serializer>(scale: &Scale, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bool(*scale == Scale::Log)
+}
+
 /// An axis: what it shows, in which unit, and how far.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
     /// Quantity and symbol, as in `time t`.
     pub label: String,
     /// Unit, as in `s`; empty for a pure number.
     pub unit: String,
     /// Linear or logarithmic.
+    #[serde(rename = "log", serialize_with = "is_log")]
     pub scale: Scale,
     /// Lowest and highest value shown, in the unit of the axis; otherwise as the data need.
-    /// Limits that make no range (not finite, not increasing, not positive on a logarithmic axis)
-    /// are taken as absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<(f64, f64)>,
 }
 
@@ -140,10 +159,13 @@ impl Axis {
         }
     }
 
-    /// Sets the lowest and the highest value shown.
+    /// Sets the lowest and the highest value shown, unless they make no range (not finite, not increasing, not positive on a
+    /// logarithmic axis).
     #[must_use]
     pub fn limits(mut self, low: f64, high: f64) -> Self {
-        self.limits = Some((low, high));
+        let is_range = low.is_finite() && high.is_finite() && low < high;
+        let is_drawable = self.scale == Scale::Linear || low > 0.0;
+        self.limits = (is_range && is_drawable).then_some((low, high));
         self
     }
 

@@ -1,7 +1,11 @@
 //! What a panel shows: curves, dots, bands, lines across, and how they look.
 
+use super::numbers::{places, rounded};
+use serde::Serialize;
+
 /// The colours of Okabe and Ito, which readers with any colour vision can tell apart, and a grey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 #[allow(missing_docs)]
 pub enum Colour {
     Black,
@@ -48,16 +52,36 @@ impl Dash {
     pub fn nth(index: usize) -> Self {
         [Self::Solid, Self::Dashed, Self::DashDot, Self::Dotted][index % 4]
     }
+
+    /// Lengths of dashes and gaps in tenths of a pixel.
+    pub(super) fn lengths(self) -> &'static [u16] {
+        match self {
+            Dash::Solid => &[],
+            Dash::Dashed => &[60, 32],
+            Dash::Dotted => &[16, 22],
+            Dash::DashDot => &[70, 26, 16, 26],
+        }
+    }
+}
+
+impl Serialize for Dash {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let lengths = self.lengths().iter();
+        let pixels: Vec<String> = lengths
+            .map(|l| (f64::from(*l) / 10.0).to_string())
+            .collect();
+        serializer.serialize_str(&pixels.join(" "))
+    }
 }
 
 /// How a line is drawn, or points, of which `width` is the diameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Style {
     /// Colour.
     pub colour: Colour,
     /// Dash pattern; points ignore it.
     pub dash: Dash,
-    /// Width in pixels; a figure is 680 pixels (180 mm) wide.
+    /// Width in pixels, from 0.1 to 20; a figure is 680 pixels (180 mm) wide.
     pub width: f64,
 }
 
@@ -86,65 +110,71 @@ impl Style {
     /// Sets the width in pixels.
     #[must_use]
     pub fn width(mut self, width: f64) -> Self {
-        self.width = width;
+        self.width = width.clamp(0.1, 20.0);
         self
     }
 }
 
+/// What a mark is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A curve through the points in their order.
+    Line,
+    /// A dot at each point.
+    Points,
+    /// The area between two curves over the same x.
+    Band,
+    /// A shaded interval of x over the full height.
+    Span,
+    /// A line across the panel at one y.
+    Across,
+    /// A line from bottom to top at one x.
+    Upright,
+}
+
 /// Something drawn in a panel. A mark with a label appears in the legend; equal labels with equal
 /// looks, in any panel, appear there once.
-#[derive(Debug, Clone, PartialEq)]
-#[allow(missing_docs)]
-pub enum Mark {
-    /// A curve through the points in their order.
-    Line {
-        label: String,
-        x: Vec<f64>,
-        y: Vec<f64>,
-        style: Style,
-    },
-    /// A dot at each point.
-    Points {
-        label: String,
-        x: Vec<f64>,
-        y: Vec<f64>,
-        style: Style,
-    },
-    /// The area between two curves over the same x.
-    Band {
-        label: String,
-        x: Vec<f64>,
-        low: Vec<f64>,
-        high: Vec<f64>,
-        colour: Colour,
-    },
-    /// A shaded interval of x over the full height.
-    Span { label: String, from: f64, to: f64 },
-    /// A line across the panel at one y.
-    HorizontalLine { label: String, y: f64, style: Style },
-    /// A line from bottom to top at one x.
-    VerticalLine { label: String, x: f64, style: Style },
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mark {
+    /// What it is.
+    pub kind: Kind,
+    /// The label for the legend; empty for none.
+    pub label: String,
+    /// How it looks; a span has one look only.
+    #[serde(flatten)]
+    pub style: Style,
+    /// The x values that the axis should reach; none of a line across.
+    #[serde(serialize_with = "places")]
+    pub x: Vec<f64>,
+    /// The y values that the axis should reach, of a band those of its lower edge; none of a span or an upright line.
+    #[serde(serialize_with = "rounded")]
+    pub y: Vec<f64>,
+    /// The upper edge of a band.
+    #[serde(serialize_with = "rounded")]
+    pub high: Vec<f64>,
 }
 
 impl Mark {
-    /// A curve.
-    pub fn line(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
-        Self::Line {
+    fn new(kind: Kind, label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self {
+            kind,
             label: label.into(),
+            style,
             x: x.to_vec(),
             y: y.to_vec(),
-            style,
+            high: Vec::new(),
         }
+    }
+
+    /// A curve.
+    pub fn line(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self::new(Kind::Line, label, x, y, style)
     }
 
     /// Dots.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
-        Self::Points {
-            label: label.into(),
-            x: x.to_vec(),
-            y: y.to_vec(),
-            style,
-        }
+        Self::new(Kind::Points, label, x, y, style.dash(Dash::Solid))
     }
 
     /// The area between `low` and `high`.
@@ -155,71 +185,30 @@ impl Mark {
         high: &[f64],
         colour: Colour,
     ) -> Self {
-        Self::Band {
-            label: label.into(),
-            x: x.to_vec(),
-            low: low.to_vec(),
+        Self {
             high: high.to_vec(),
-            colour,
+            ..Self::new(Kind::Band, label, x, low, Style::new(colour))
         }
     }
 
     /// A shaded interval of x.
     pub fn span(label: impl Into<String>, from: f64, to: f64) -> Self {
-        Self::Span {
-            label: label.into(),
-            from,
-            to,
-        }
+        Self::new(
+            Kind::Span,
+            label,
+            &[from, to],
+            &[],
+            Style::new(Colour::Grey),
+        )
     }
 
     /// A line at one y.
     pub fn horizontal(label: impl Into<String>, y: f64, style: Style) -> Self {
-        Self::HorizontalLine {
-            label: label.into(),
-            y,
-            style,
-        }
+        Self::new(Kind::Across, label, &[], &[y], style)
     }
 
     /// A line at one x.
     pub fn vertical(label: impl Into<String>, x: f64, style: Style) -> Self {
-        Self::VerticalLine {
-            label: label.into(),
-            x,
-            style,
-        }
-    }
-
-    /// The label for the legend; empty for none.
-    pub fn label(&self) -> &str {
-        match self {
-            Self::Line { label, .. }
-            | Self::Points { label, .. }
-            | Self::Band { label, .. }
-            | Self::Span { label, .. }
-            | Self::HorizontalLine { label, .. }
-            | Self::VerticalLine { label, .. } => label,
-        }
-    }
-
-    /// The x values that the axis should reach.
-    pub(super) fn x_values(&self) -> Vec<f64> {
-        match self {
-            Self::Line { x, .. } | Self::Points { x, .. } | Self::Band { x, .. } => x.clone(),
-            Self::Span { from, to, .. } => vec![*from, *to],
-            Self::VerticalLine { x, .. } => vec![*x],
-            Self::HorizontalLine { .. } => Vec::new(),
-        }
-    }
-
-    /// The y values that the axis should reach.
-    pub(super) fn y_values(&self) -> Vec<f64> {
-        match self {
-            Self::Line { y, .. } | Self::Points { y, .. } => y.clone(),
-            Self::Band { low, high, .. } => [low.as_slice(), high].concat(),
-            Self::HorizontalLine { y, .. } => vec![*y],
-            Self::Span { .. } | Self::VerticalLine { .. } => Vec::new(),
-        }
+        Self::new(Kind::Upright, label, &[x], &[], style)
     }
 }

@@ -3,7 +3,7 @@
 //! Ranges live in the space in which the axis is even: the value itself, or its decimal logarithm.
 
 use super::figure::{Axis, Scale};
-use super::text;
+use crate::report::text;
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.
 const LARGEST: f64 = 1e300;

@@ -1,7 +1,7 @@
 //! Fewer points for the same picture: a page of a long record stays small.
 
-use crate::report::axis::{even, extent};
-use crate::report::figure::Scale;
+use super::axis::{even, extent};
+use super::figure::Scale;
 
 /// So many points of a curve are kept as they are.
 const FEW: usize = 4000;

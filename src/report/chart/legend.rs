@@ -1,10 +1,10 @@
 //! The legend: one line or more above the panels, where it covers no data.
 
 use super::figure::Figure;
-use super::mark::Mark;
+use super::mark::{Kind, Mark};
 use super::panel::{BAND_OPACITY, SIZE, SPAN};
-use super::shape::{Anchor, Frame, Ink, Point, Shape, Stroke, Words};
-use super::text;
+use super::shape::{Anchor, Frame, Point, Shape, Stroke, Words};
+use crate::report::text;
 
 /// Length of the sample beside a label.
 const SAMPLE: f64 = 28.0;
@@ -16,7 +16,7 @@ const ROW: f64 = 18.0;
 pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     let mut entries: Vec<&Mark> = Vec::new();
     let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
-    for mark in marks.filter(|mark| !mark.label().is_empty()) {
+    for mark in marks.filter(|mark| !mark.label.is_empty()) {
         if !entries.iter().any(|entry| alike(entry, mark)) {
             entries.push(mark);
         }
@@ -26,7 +26,7 @@ pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
 
 /// Whether two marks have the same label and the same sample.
 fn alike(one: &Mark, other: &Mark) -> bool {
-    one.label() == other.label() && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
+    one.label == other.label && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
 }
 
 /// Draws the legend from `left`, `top` on, within a width; returns the shapes and their height.
@@ -38,8 +38,8 @@ pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<S
         shapes.extend(sample(mark, (x, y)));
         let room = width - SAMPLE - SAMPLE_GAP;
         let at = (x + SAMPLE + SAMPLE_GAP, y);
-        let size = text::fit(mark.label(), SIZE, room);
-        let words = Words::new(at, mark.label(), size, Anchor::Start);
+        let size = text::fit(&mark.label, SIZE, room);
+        let words = Words::new(at, mark.label.as_str(), size, Anchor::Start);
         shapes.push(Shape::Text(words));
     }
     let rows = places.last().map_or(0, |(_, row)| row + 1);
@@ -48,7 +48,7 @@ pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<S
 
 /// Horizontal place and row of each entry: side by side if that fits, or else in even columns.
 fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
-    let need = |mark: &&Mark| SAMPLE + SAMPLE_GAP + text::width(mark.label(), SIZE) + ENTRY_GAP;
+    let need = |mark: &&Mark| SAMPLE + SAMPLE_GAP + text::width(&mark.label, SIZE) + ENTRY_GAP;
     let needs: Vec<f64> = entries.iter().map(need).collect();
     if needs.iter().sum::<f64>() <= width + ENTRY_GAP {
         let starts = needs.iter().scan(0.0, |end, need| {
@@ -80,16 +80,14 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
         };
         vec![Shape::Area(frame.corners(), ink)]
     };
-    match mark {
-        Mark::Line { style, .. }
-        | Mark::HorizontalLine { style, .. }
-        | Mark::VerticalLine { style, .. } => vec![Shape::Path(line, Stroke::of(style))],
-        Mark::Points { style, .. } => {
-            let stroke = Stroke::of(style);
+    let stroke = Stroke::of(&mark.style);
+    match mark.kind {
+        Kind::Line | Kind::Across | Kind::Upright => vec![Shape::Path(line, stroke)],
+        Kind::Points => {
             let dot = |share| Shape::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
             vec![dot(0.2), dot(0.5), dot(0.8)]
         }
-        Mark::Band { colour, .. } => block(Ink::of(*colour).opacity(BAND_OPACITY)),
-        Mark::Span { .. } => block(SPAN),
+        Kind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
+        Kind::Span => block(SPAN),
     }
 }

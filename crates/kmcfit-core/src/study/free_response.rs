@@ -1,9 +1,33 @@
-//! The motion of a found device from other initial states, against the true device's.
+//! Free responses of a system from other initial states, beside those of the true system.
 
-use super::document::Prediction;
-use kmcfit_core::internals::simulate::{SimulationError, Trajectory};
-use kmcfit_core::internals::system::quadrature::trapezoid;
-use kmcfit_core::internals::system::{NodalCoefficients, State, System};
+use crate::simulate::{SimulationError, Trajectory};
+use crate::system::quadrature::trapezoid;
+use crate::system::{NodalCoefficients, State, System};
+use serde::{Deserialize, Serialize};
+
+/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Initial displacement, m.
+    pub displacement: f64,
+    /// Initial velocity, m/s.
+    pub velocity: f64,
+    /// `integral (y - y_true)^2 dt`, m^2 s, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<f64>,
+    /// `integral y_true^2 dt`, m^2 s, where the truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub energy: Option<f64>,
+    /// Largest distance of the motion from zero, m; `None` where there is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest: Option<f64>,
+    /// Displacement at the last node, m; `None` where there is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub last: Option<f64>,
+    /// Why there is no motion from there, if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
 
 /// A prediction and the motions that it sums up.
 #[derive(Debug, Clone)]

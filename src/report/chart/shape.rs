@@ -55,7 +55,7 @@ impl Stroke {
     pub fn of(style: &Style) -> Self {
         Self {
             ink: Ink::of(style.colour),
-            width: style.width.clamp(0.1, 20.0),
+            width: style.width,
             dash: style.dash,
         }
     }

@@ -1,15 +1,13 @@
 //! Places the panels and the legend on the sheet.
 
 use super::axis::{self, Range, Ruler};
-use super::figure::{Figure, Panel};
+use super::figure::{Axis, Figure, Panel, Scale};
 use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
 use super::shape::{Frame, Sheet};
 
 /// Width of a figure in pixels: 180 mm, two columns of a journal.
-pub(super) const WIDTH: f64 = 680.0;
-/// Width of a figure for a phone, where the wide one would be too small to read.
-pub(super) const NARROW: f64 = 380.0;
+const WIDTH: f64 = 680.0;
 /// Blank edge around everything.
 const EDGE: f64 = 8.0;
 /// Room right of the last column, for a tick label that reaches beyond its axis.
@@ -25,14 +23,14 @@ const ALONE: f64 = 320.0;
 const BESIDE: f64 = 260.0;
 const STACKED: f64 = 165.0;
 
-/// Draws a figure, `width` pixels wide.
-pub(super) fn sheet(figure: &Figure, width: f64) -> Sheet {
-    let grid = Grid::new(figure, width);
+/// Draws a figure.
+pub(super) fn sheet(figure: &Figure) -> Sheet {
+    let grid = Grid::new(figure);
     let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
     let columns = grid.columns(&rulers);
     let left = columns.first().map_or(EDGE, |column| column.left);
     let entries = legend::entries(figure);
-    let (mut shapes, height) = legend::draw(&entries, left, EDGE, width - RIGHT - EDGE - left);
+    let (mut shapes, height) = legend::draw(&entries, left, EDGE, WIDTH - RIGHT - EDGE - left);
     let mut top = EDGE + height + if height > 0.0 { 6.0 } else { 0.0 };
     for row in 0..grid.rows() {
         top += grid.title_height(row);
@@ -47,7 +45,7 @@ pub(super) fn sheet(figure: &Figure, width: f64) -> Sheet {
         .last()
         .map_or(0.0, |column| column.left + column.width);
     Sheet {
-        width: (right + RIGHT + EDGE).max(width).ceil(),
+        width: (right + RIGHT + EDGE).max(WIDTH).ceil(),
         height: (top + EDGE).ceil(),
         shapes,
     }
@@ -65,7 +63,6 @@ struct Column {
 
 /// The panels in rows and columns, with their ranges.
 struct Grid<'a> {
-    width: f64,
     panels: &'a [Panel],
     columns: usize,
     x: Vec<Option<Range>>,
@@ -73,24 +70,28 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(figure: &'a Figure, width: f64) -> Self {
+    fn new(figure: &'a Figure) -> Self {
         let panels = figure.panels.as_slice();
-        let x =
-            |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.x_values()).collect() };
-        let y =
-            |panel: &Panel| -> Vec<f64> { panel.marks.iter().flat_map(|m| m.y_values()).collect() };
+        let extents = |of: &dyn Fn(&'a Panel) -> (Scale, Vec<f64>)| {
+            let extent = |panel| {
+                let (scale, values) = of(panel);
+                axis::extent(scale, &values)
+            };
+            panels.iter().map(extent).collect()
+        };
         Self {
-            width,
             panels,
             columns: figure.columns.clamp(1, panels.len().max(1)),
-            x: panels
-                .iter()
-                .map(|p| axis::extent(p.x.scale, &x(p)))
-                .collect(),
-            y: panels
-                .iter()
-                .map(|p| axis::extent(p.y.scale, &y(p)))
-                .collect(),
+            x: extents(&|p| {
+                (
+                    p.x.scale,
+                    p.marks.iter().flat_map(|m| &m.x).copied().collect(),
+                )
+            }),
+            y: extents(&|p| {
+                let values = p.marks.iter().flat_map(|m| m.y.iter().chain(&m.high));
+                (p.y.scale, values.copied().collect())
+            }),
         }
     }
 
@@ -116,26 +117,15 @@ impl<'a> Grid<'a> {
         let axis = &self.panels[index].x;
         let column = (index % self.columns..self.panels.len()).step_by(self.columns);
         let alike = column.filter(|&i| self.panels[i].x == *axis);
-        let extent = alike.filter_map(|i| self.x[i]);
-        axis::range(
-            axis,
-            extent.fold(None, |sum, one| Some(axis::union(sum, one))),
-            false,
-        )
+        common(axis, alike.filter_map(|i| self.x[i]), false)
     }
 
     /// The common range of the panels in the row that have the same vertical axis.
     fn y_range(&self, index: usize) -> Range {
         let axis = &self.panels[index].y;
-        let alike = self
-            .row(index / self.columns)
-            .filter(|(_, panel)| panel.y == *axis);
-        let extent = alike.filter_map(|(i, _)| self.y[i]);
-        axis::range(
-            axis,
-            extent.fold(None, |sum, one| Some(axis::union(sum, one))),
-            true,
-        )
+        let row = self.row(index / self.columns);
+        let alike = row.filter(|(_, panel)| panel.y == *axis);
+        common(axis, alike.filter_map(|(i, _)| self.y[i]), true)
     }
 
     fn y_ruler(&self, index: usize) -> Ruler {
@@ -162,7 +152,7 @@ impl<'a> Grid<'a> {
             *label = label.max(label_width(ruler, self.y_labels(index)));
         }
         let gaps = COLUMN_GAP * (self.columns - 1) as f64;
-        let room = self.width - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
+        let room = WIDTH - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
         let width = (room / self.columns as f64).max(NARROWEST);
         let mut left = EDGE;
         let mut columns = Vec::new();
@@ -206,4 +196,10 @@ impl<'a> Grid<'a> {
             label_width: column.labels,
         }
     }
+}
+
+/// The range of an axis for data of these extents.
+fn common(axis: &Axis, extents: impl Iterator<Item = Range>, pad: bool) -> Range {
+    let all = extents.fold(None, |sum, one| Some(axis::union(sum, one)));
+    axis::range(axis, all, pad)
 }

@@ -1,0 +1,111 @@
+//! Equivalent systems of a fit: those with chosen masses, each checked by a simulation of its own.
+
+use super::equivalent::{Motion, Wish, equivalent};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::system::{NodalCoefficients, State};
+
+/// Least stiffness of an equivalent system, as a share of the fit's largest.
+const LEAST_STIFFNESS: f64 = 1e-3;
+/// Largest distance between the response of an equivalent system and that of the fit, as a share of the largest displacement.
+const SAME_MOTION: f64 = 0.1;
+
+/// The mass, and possibly the damping, of an equivalent system at the nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// Name.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: Vec<f64>,
+    /// Damping, N s/m; the fit's where `None`.
+    pub damping: Option<Vec<f64>>,
+}
+
+/// An equivalent system.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EquivalentSystem {
+    /// Name of the choice, or `the fit`.
+    pub name: String,
+    /// Its coefficients.
+    pub device: NodalCoefficients,
+    /// Largest distance of its response from the fit's, as a share of the largest displacement.
+    pub motion_error: f64,
+}
+
+/// The fit itself and the equivalent systems of the choices, or of some masses that are the fit's times a factor over time;
+/// none for nonlinear systems, for records that end before the grid, and where no system is found.
+pub fn equivalent_systems(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    choices: &[Choice],
+) -> Vec<EquivalentSystem> {
+    let Some(experiment) = problem.experiments.first() else {
+        return Vec::new();
+    };
+    let is_linear = problem.oscillator.terms.iter().all(|t| t.is_linear());
+    if !is_linear || experiment.nodes != problem.oscillator.grid.nodes() {
+        return Vec::new();
+    }
+    let motion = Motion::of(problem, evaluation, 0);
+    let device = evaluation.device_of(experiment.device);
+    let initial = State {
+        displacement: motion.displacement[0],
+        velocity: motion.velocity[0],
+    };
+    let least = LEAST_STIFFNESS * device.coefficients[1].iter().copied().fold(0.0, f64::max);
+    let find = |choice: Choice| {
+        let damping = choice.damping;
+        let damping = damping.unwrap_or_else(|| device.coefficients[0].clone());
+        let found = equivalent(&choice.mass, &motion, &Wish::near(damping, least)).ok()?;
+        let excitation = experiment.excitation.as_ref();
+        let moved = problem
+            .oscillator
+            .forward(&found, initial, excitation)
+            .ok()?;
+        let largest = (motion.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
+        let pairs = moved.displacement.iter().zip(&motion.displacement);
+        let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        // Steps that are too long for the system change its response.
+        let motion_error = if off == 0.0 { 0.0 } else { off / largest };
+        (motion_error <= SAME_MOTION).then_some(EquivalentSystem {
+            name: choice.name,
+            device: found,
+            motion_error,
+        })
+    };
+    let choices = match choices {
+        [] => factors(&device.mass),
+        choices => choices.to_vec(),
+    };
+    let found: Vec<EquivalentSystem> = choices.into_iter().filter_map(find).collect();
+    if found.is_empty() {
+        return found;
+    }
+    let fit = EquivalentSystem {
+        name: "the fit".into(),
+        device: device.clone(),
+        motion_error: 0.0,
+    };
+    std::iter::once(fit).chain(found).collect()
+}
+
+/// Masses that grow, fall and swing away from the fit's.
+fn factors(mass: &[f64]) -> Vec<Choice> {
+    let last = (mass.len() - 1) as f64;
+    type Factor = fn(f64) -> f64;
+    let choices: [(&str, Factor); 3] = [
+        ("mass that grows by a half", |x| 1.0 + 0.5 * x),
+        ("mass that falls by a third", |x| 1.0 - x / 3.0),
+        ("mass that swings by a fifth", |x| {
+            1.0 + 0.2 * (12.0 * x).sin()
+        }),
+    ];
+    let choice = |(name, factor): (&str, Factor)| Choice {
+        name: name.into(),
+        mass: (mass.iter().enumerate())
+            .map(|(i, m)| m * factor(i as f64 / last))
+            .collect(),
+        damping: None,
+    };
+    choices.map(choice).into()
+}

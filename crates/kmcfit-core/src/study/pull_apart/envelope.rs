@@ -1,0 +1,99 @@
+//! Envelopes of all coefficient functions and of their ratios to the mass, within a misfit that the confidence allows.
+
+use super::{Band, Ended, Extreme, Level, ratios_at, tube, values_at};
+use crate::diagnostics::chi_square_one;
+use crate::functions::CoefficientKind;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+
+/// Roughness of a system in an envelope, as a multiple of the optimum's.
+const BUDGET: f64 = 2.0;
+/// A misfit of this share of the level is at it.
+const AT_LEVEL: f64 = 0.999;
+
+/// The extremes of one function or ratio at several times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Envelope {
+    /// Name of the function or ratio.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The extremes at each time.
+    pub bands: Vec<Band>,
+}
+
+impl Level {
+    /// The misfit `asked` for, or the one that a confidence allows, with budgets of roughness where the fit has penalties.
+    pub fn at(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        asked: Option<f64>,
+        confidence: f64,
+    ) -> Self {
+        let quantile = chi_square_one(confidence);
+        let has_sigma = problem.channels().all(|c| c.weighting().is_sigma());
+        let mut level = Self::of(asked.unwrap_or_else(|| match has_sigma {
+            true => evaluation.misfit + quantile,
+            // n ln J rises by the quantile.
+            false => evaluation.misfit * (quantile / problem.reading_count() as f64).exp(),
+        }));
+        level.budgets = (problem.penalties.iter())
+            .map(|penalty| {
+                let range = problem.functions.ranges()[penalty.function].clone();
+                let now = penalty.roughness(&theta[range]);
+                (penalty.clone(), BUDGET * now.max(f64::MIN_POSITIVE))
+            })
+            .collect();
+        level
+    }
+}
+
+impl Extreme {
+    /// How the search ended; one that was stuck at the level has nothing left to gain.
+    pub fn ended_at(&self, level: &Level) -> Ended {
+        match self.ended {
+            Ended::Stuck if self.misfit >= AT_LEVEL * level.misfit => Ended::Settled,
+            ended => ended,
+        }
+    }
+}
+
+/// The envelopes of all functions that are fitted and of k/m and c/m at `times`; none where the optimum itself is not within
+/// the level and the constraints.
+pub fn envelopes(
+    problem: &Problem,
+    theta: &[f64],
+    level: &Level,
+    times: &[f64],
+    threads: usize,
+) -> Vec<Envelope> {
+    let main = problem.functions.assembly(0);
+    let mut jobs = Vec::new();
+    for &f in main {
+        let function = problem.functions.get(f);
+        if function.parameters() > 0 {
+            let targets = values_at(problem, f, times);
+            jobs.push((function.name(), function.quantity.unit(), targets));
+        }
+    }
+    let of = |q: CoefficientKind| {
+        main.iter()
+            .find(|f| problem.functions.get(**f).quantity == q)
+    };
+    let ratios = [
+        ("k/m", CoefficientKind::Stiffness, "1/s^2"),
+        ("c/m", CoefficientKind::Damping, "1/s"),
+    ];
+    for (name, over, unit) in ratios {
+        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::Mass)) {
+            jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));
+        }
+    }
+    let starts = [theta.to_vec()];
+    let envelopes = jobs.into_iter().filter_map(|(name, unit, targets)| {
+        let bands = tube(problem, &starts, &targets, level, threads)?;
+        Some(Envelope { name, unit, bands })
+    });
+    envelopes.collect()
+}

@@ -1,0 +1,99 @@
+//! The numbers of a figure for the script of the page.
+
+use super::figure::Figure;
+use super::mark::{Kind, Mark};
+use super::thin::kept;
+use crate::report::text::clean;
+use serde::Serialize;
+
+/// A figure as text that may stand in a script element.
+pub(in crate::report) struct Data {
+    pub json: String,
+    /// Whether points were left out that could be seen when zoomed.
+    pub thinned: bool,
+}
+
+/// The numbers of a figure; the chart begins without the curves of the labels `off`.
+pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
+    #[derive(Serialize)]
+    struct Chart<'a> {
+        off: &'a [&'a str],
+        #[serde(flatten)]
+        figure: &'a Figure,
+    }
+    let mut figure = figure.clone();
+    let mut thinned = false;
+    for panel in &mut figure.panels {
+        for mark in &mut panel.marks {
+            if !matches!(mark.kind, Kind::Line | Kind::Points | Kind::Band) {
+                continue;
+            }
+            let mut ys = vec![(mark.y.as_slice(), panel.y.scale)];
+            ys.extend((mark.kind == Kind::Band).then_some((&mark.high[..], panel.y.scale)));
+            let joined = mark.kind != Kind::Points;
+            let (points, is_thinned) = kept((&mark.x, panel.x.scale), &ys, joined);
+            thinned |= is_thinned;
+            let Mark { x, y, high, .. } = mark;
+            for values in [x, y, high].into_iter().filter(|values| !values.is_empty()) {
+                *values = points.iter().map(|i| values[*i]).collect();
+            }
+        }
+    }
+    let figure = &figure;
+    // Plain structs with text keys always serialise.
+    let json = serde_json::to_string(&Chart { off, figure }).unwrap_or_default();
+    Data {
+        json: inert(&json),
+        thinned,
+    }
+}
+
+/// JSON without the letters that could end a script or begin markup; in JSON they only stand in texts.
+fn inert(json: &str) -> String {
+    clean(json)
+        .replace('<', "\\u003c")
+        .replace('>', "\\u003e")
+        .replace('&', "\\u0026")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::chart::{Axis, Colour, Panel, Style};
+
+    #[test]
+    fn any_data_give_numbers() {
+        let ugly = [
+            vec![],
+            vec![1.0],
+            vec![f64::NAN; 3],
+            vec![f64::INFINITY, 1.0, f64::NEG_INFINITY],
+            vec![f64::MAX, f64::MIN, 1.0],
+            vec![5e-324, 0.0, -0.0],
+            vec![1e15, 1e15 + 1.0],
+        ];
+        for (x, y) in ugly.iter().flat_map(|x| ugly.iter().map(move |y| (x, y))) {
+            for axis in [Axis::linear("", ""), Axis::log("", "")] {
+                let style = Style::nth(0);
+                let panel = Panel::new(axis.clone(), axis)
+                    .mark(Mark::line("", x, y, style))
+                    .mark(Mark::points("", y, x, style))
+                    .mark(Mark::band("", x, y, x, Colour::Blue))
+                    .mark(Mark::span("", f64::NAN, f64::INFINITY));
+                let json = data(&Figure::new("", "", "").panel(panel), &[]).json;
+                let read: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+                assert_eq!(read["panels"][0]["marks"].as_array().map(Vec::len), Some(4));
+            }
+        }
+    }
+
+    #[test]
+    fn no_text_ends_the_script() {
+        let hostile = "</script><!-- & ]]>\u{ffff}";
+        let panel = Panel::new(Axis::linear(hostile, ""), Axis::log("", hostile)).title(hostile);
+        let drawn = data(&Figure::new("", "", "").panel(panel), &[hostile]);
+        assert!(!drawn.json.contains(['<', '>', '&', '\u{ffff}']));
+        let read: serde_json::Value = serde_json::from_str(&drawn.json).expect("JSON");
+        assert_eq!(read["panels"][0]["title"], "</script><!-- & ]]>");
+    }
+}

@@ -1,0 +1,23 @@
+//! Charts: the data model of a figure, and its two renderers.
+//!
+//! [`figure`] and [`mark`] describe what a figure shows. `layout`, `panel`, `legend`, `axis` and `curve` turn it into plain
+//! shapes in pixels, which [`svg`] writes; `data` writes the same description as numbers for the script of a page.
+
+mod axis;
+mod curve;
+mod data;
+pub mod figure;
+mod layout;
+mod legend;
+pub mod mark;
+mod numbers;
+mod panel;
+mod shape;
+pub mod svg;
+mod thin;
+
+pub(super) use data::data;
+pub use figure::{Axis, Figure, Panel, Scale};
+pub use mark::{Colour, Dash, Mark, Style};
+pub use svg::render;
+pub(super) use svg::sample;

@@ -1,0 +1,138 @@
+//! Writes a figure as SVG.
+//!
+//! The drawing is ten times as large as the picture: a unit is a tenth of a pixel, `viewBox` scales it back, and all places
+//! are whole numbers. Neighbouring shapes of one look stand in a group that has the look.
+
+use super::figure::Figure;
+use super::layout;
+use super::mark::{Dash, Style};
+use super::shape::{Anchor, Ink, Point, Shape, Words};
+use crate::report::text::escape;
+
+/// Units of the drawing in one pixel of the picture.
+const UNITS: f64 = 10.0;
+
+/// The figure as an SVG document: white background, generic sans-serif, no scripts, no links.
+///
+/// The same figure always gives the same bytes. Title and description stand in `<title>` and
+/// `<desc>`; all text is escaped.
+pub fn render(figure: &Figure) -> String {
+    let sheet = layout::sheet(figure);
+    let (width, height) = (sheet.width, sheet.height);
+    let (across, down) = (units(width), units(height));
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{width}\" \
+         height=\"{height}\" viewBox=\"0 0 {across} {down}\">\n\
+         <title>{}</title>\n<desc>{}</desc>\n\
+         <rect width=\"{across}\" height=\"{down}\" fill=\"#FFFFFF\"/>\n",
+        escape(&figure.title),
+        escape(&figure.description),
+    );
+    for group in sheet.shapes.chunk_by(|a, b| common(a) == common(b)) {
+        svg += &format!("<g stroke-linejoin=\"round\"{}>\n", common(&group[0]));
+        svg.extend(group.iter().map(draw));
+        svg += "</g>\n";
+    }
+    svg + "</svg>\n"
+}
+
+/// The attributes of the group to which a shape belongs: its dash pattern, and the colour of dots,
+/// which would be most of the file if each dot said it again.
+fn common(shape: &Shape) -> String {
+    match shape {
+        Shape::Path(_, stroke) => pattern(stroke.dash),
+        Shape::Dot(_, _, ink) => format!(" fill=\"{}\"", hex(ink)),
+        _ => String::new(),
+    }
+}
+
+fn pattern(dash: Dash) -> String {
+    let lengths: Vec<String> = dash.lengths().iter().map(u16::to_string).collect();
+    match lengths.is_empty() {
+        true => String::new(),
+        false => format!(" stroke-dasharray=\"{}\"", lengths.join(" ")),
+    }
+}
+
+fn draw(shape: &Shape) -> String {
+    match shape {
+        Shape::Path(points, stroke) => format!(
+            "<polyline fill=\"none\"{} stroke=\"{}\" stroke-width=\"{}\" points=\"{}\"/>\n",
+            opacity(&stroke.ink),
+            hex(&stroke.ink),
+            units(stroke.width),
+            places(points)
+        ),
+        Shape::Area(points, ink) => format!(
+            "<polygon{} fill=\"{}\" points=\"{}\"/>\n",
+            opacity(ink),
+            hex(ink),
+            places(points)
+        ),
+        Shape::Dot((x, y), radius, ink) => format!(
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}/>\n",
+            units(*x),
+            units(*y),
+            units(*radius).max(1),
+            opacity(ink)
+        ),
+        Shape::Text(words) if words.text.is_empty() => String::new(),
+        Shape::Text(words) => text(words),
+    }
+}
+
+fn text(words: &Words) -> String {
+    let (x, y) = (units(words.at.0), units(words.at.1));
+    let anchor = match words.anchor {
+        Anchor::Start => "start",
+        Anchor::Middle => "middle",
+        Anchor::End => "end",
+    };
+    let weight = match words.bold {
+        true => " font-weight=\"bold\"",
+        false => "",
+    };
+    let turn = match words.upward {
+        true => format!(" transform=\"rotate(270, {x}, {y})\""),
+        false => String::new(),
+    };
+    format!(
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.5ex\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
+         font-size=\"{}\" fill=\"#000000\"{weight}{turn}>\n{}\n</text>\n",
+        units(words.size),
+        escape(&words.text)
+    )
+}
+
+fn units(pixels: f64) -> i32 {
+    (pixels * UNITS).round() as i32
+}
+
+fn places(points: &[Point]) -> String {
+    let places = points
+        .iter()
+        .map(|(x, y)| format!("{},{}", units(*x), units(*y)));
+    places.collect::<Vec<_>>().join(" ")
+}
+
+fn hex(ink: &Ink) -> String {
+    let (r, g, b) = ink.rgb;
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+fn opacity(ink: &Ink) -> String {
+    match ink.opacity {
+        1.0 => String::new(),
+        opacity => format!(" opacity=\"{opacity}\""),
+    }
+}
+
+/// A short line in a style as a small drawing for the text of a page, where it stands for a run.
+pub(in crate::report) fn sample(style: &Style) -> String {
+    format!(
+        "<svg aria-hidden=\"true\" viewBox=\"0 0 400 100\"><path d=\"M0 50H400\" fill=\"none\" \
+         stroke=\"{}\" stroke-width=\"26\"{}/></svg>",
+        hex(&Ink::of(style.colour)),
+        pattern(style.dash)
+    )
+}

@@ -1,0 +1,54 @@
+//! The record of the fit that is studied, and the problem as it was fitted.
+
+use super::FitPiece;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Channel, Weighting};
+use kmcfit_core::internals::solvers::Fit;
+
+impl FitPiece {
+    /// The fit that is studied.
+    pub fn of(problem: &Problem, fit: &Fit) -> Self {
+        let sigma = |c: &Channel| match c.weighting() {
+            Weighting::Estimated { sigma } => Some(*sigma),
+            _ => None,
+        };
+        Self {
+            status: fit.outcome.status,
+            reason: fit.outcome.reason.to_string(),
+            cost: fit.best.evaluation.cost,
+            misfit: fit.best.evaluation.misfit,
+            parameters: fit.best.parameters.clone(),
+            weights: problem.penalties.iter().map(|p| p.weight).collect(),
+            sigmas: problem.channels().map(sigma).collect(),
+        }
+    }
+
+    /// Whether a fit that was kept has the shape of this problem's: a journal may be damaged.
+    pub fn is_of(&self, problem: &Problem) -> bool {
+        let lengths = [self.parameters.len(), self.weights.len(), self.sigmas.len()];
+        let expected = [
+            problem.parameters(),
+            problem.penalties.len(),
+            problem.channels().count(),
+        ];
+        let is_positive = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
+        lengths == expected && self.sigmas.iter().flatten().all(is_positive)
+    }
+
+    /// The problem with the sigmas that the fit estimated and the weights that it chose.
+    pub fn problem(&self, problem: &Problem) -> Problem {
+        let fitted = problem.clone().with(|parts| {
+            for (penalty, weight) in parts.penalties.iter_mut().zip(&self.weights) {
+                penalty.weight = *weight;
+            }
+            let channels = parts.experiments.iter_mut().flat_map(|e| &mut e.channels);
+            for (channel, sigma) in channels.zip(&self.sigmas) {
+                if let Some(sigma) = *sigma {
+                    let weighting = Weighting::Estimated { sigma };
+                    *channel = channel.clone().with_weighting(weighting);
+                }
+            }
+        });
+        fitted.expect("weights and sigmas change no length")
+    }
+}

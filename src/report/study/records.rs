@@ -1,0 +1,401 @@
+//! The records of a study from the analyses of the core.
+
+use super::pieces::*;
+use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
+use crate::report::findings;
+use kmcfit_core::internals::assessment::Plausibility;
+use kmcfit_core::internals::diagnostics::{chi_square_one, normal_half_width};
+use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::identifiability::{
+    self, Band, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, anchors,
+    rank_experiments, residual_spread, verdicts,
+};
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::study::bootstrap::{NoRefits, Noise, NumberInterval, intervals};
+use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
+use kmcfit_core::internals::study::profile::{Interval, ProfileSettings};
+use kmcfit_core::internals::study::pull_apart::{Ended, Extreme, Level, envelopes};
+use kmcfit_core::internals::study::variation::{Asking, Varies, variation};
+use kmcfit_core::internals::study::{
+    Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
+};
+use kmcfit_core::internals::system::NodalCoefficients;
+
+/// Directions that are drawn of each end of the spectrum.
+const DIRECTIONS: usize = 3;
+/// Unseen directions that are named one by one.
+const NAMED: usize = 400;
+/// Draws of the simultaneous bands.
+const DRAWS: usize = 10_000;
+
+/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation there.
+#[derive(Debug, Clone, Copy)]
+pub struct Optimum<'a> {
+    /// The problem.
+    pub problem: &'a Problem,
+    /// The parameters.
+    pub theta: &'a [f64],
+    /// The evaluation.
+    pub evaluation: &'a Evaluation,
+}
+
+fn known(values: &[f64]) -> Numbers {
+    let finite = |x: &f64| x.is_finite().then_some(*x);
+    values.iter().map(finite).collect()
+}
+
+/// What the readings see.
+pub fn spectrum(at: Optimum) -> SpectrumPiece {
+    let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
+    let unseen = Gauge::at(at.problem, at.theta).unseen(&spectrum);
+    let unseen = unseen.into_iter().take(NAMED);
+    let records = |list: Vec<identifiability::Seen>| {
+        let record = |seen: identifiability::Seen| DirectionRecord {
+            singular_value: seen.singular_value,
+            functions: seen.functions,
+        };
+        list.into_iter().map(record).collect()
+    };
+    SpectrumPiece {
+        sentence: spectrum.sentence(),
+        rank: spectrum.rank,
+        of: spectrum.of(),
+        unseen: unseen
+            .map(|named| NamedRecord {
+                name: named.name,
+                share: named.share,
+            })
+            .collect(),
+        times: at.problem.oscillator.grid.times(),
+        best: records(spectrum.best(at.problem, DIRECTIONS)),
+        worst: records(spectrum.worst(at.problem, DIRECTIONS)),
+        singular_values: spectrum.singular_values,
+    }
+}
+
+/// Bands, verdicts and anchors.
+pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -> BandsPiece {
+    let (problem, evaluation) = (at.problem, at.evaluation);
+    let settings = BandSettings {
+        draws: DRAWS,
+        seed: plan.seed,
+    };
+    let bands = Bands::at(problem, at.theta, evaluation, &settings);
+    let factor = normal_half_width(plan.confidence);
+    let plausibility = Plausibility::at(problem, evaluation);
+    let judged = match plausibility.errors_hold {
+        true => verdicts(problem, evaluation, &bands),
+        false => Vec::new(),
+    };
+    let mut notes = bands.notes.clone();
+    notes.extend(plausibility.unidentified.iter().map(findings::unidentified));
+    notes.extend(plausibility.warnings.iter().map(findings::warning));
+    let ratios = truth.map(Ratios::of);
+    let of_ratio = |part: fn(&Ratios) -> &Vec<f64>| ratios.as_ref().map(|r| part(r).as_slice());
+    let list = bands.functions.iter().chain(&bands.ratios);
+    let records = list.enumerate().map(|(i, band)| {
+        let real = match band.name.as_str() {
+            "k/m" => of_ratio(|r| &r.k_over_m),
+            "c/m" => of_ratio(|r| &r.c_over_m),
+            "natural frequency" => of_ratio(|r| &r.frequency),
+            "damping ratio" => of_ratio(|r| &r.damping_ratio),
+            _ => truth.and_then(|t| t.functions().nth(i)),
+        };
+        band_record(band, factor, real)
+    });
+    let grid = &problem.oscillator.grid;
+    let fixed = evaluation.trajectories.first().map(|m| anchors(grid, m));
+    let [turning_points, zero_crossings] =
+        fixed.map_or_else(Default::default, |a| [a.turning_points, a.zero_crossings]);
+    BandsPiece {
+        times: bands.times.clone(),
+        bands: records.collect(),
+        notes,
+        verdicts: (judged.into_iter())
+            .map(|j| JudgementRecord {
+                verdict: j.verdict.name().into(),
+                name: j.name,
+                sentence: j.sentence,
+            })
+            .collect(),
+        turning_points,
+        zero_crossings,
+    }
+}
+
+fn band_record(band: &Band, factor: f64, truth: Option<&[f64]>) -> BandRecord {
+    let ends = |factor: f64| -> [Numbers; 2] {
+        let each = (0..band.values.len()).map(|t| band.ends(t, factor));
+        let (low, high): (Vec<f64>, Vec<f64>) = each.map(|[low, high]| (low, high)).unzip();
+        [known(&low), known(&high)]
+    };
+    let [low, high] = ends(factor);
+    let [simultaneous_low, simultaneous_high] = band.simultaneous.map(ends).unwrap_or_default();
+    BandRecord {
+        name: band.name.clone(),
+        unit: band.unit.clone(),
+        values: known(&band.values),
+        low,
+        high,
+        simultaneous_low,
+        simultaneous_high,
+        truth: truth.map(known).unwrap_or_default(),
+        notes: band.notes.clone(),
+    }
+}
+
+/// The number that a target asks about.
+pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
+    match target {
+        StudyTarget::Value { function, time } => Linear::value(problem, *function, *time),
+        StudyTarget::Mean { function } => Some(Linear::mean(problem, *function)),
+        StudyTarget::Scalar { index } => Some(Linear::scalar(problem, *index)),
+    }
+}
+
+/// One profile.
+///
+/// # Errors
+/// Why there is none.
+pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfilePiece, String> {
+    let how = ProfileSettings {
+        quantile: chi_square_one(plan.confidence),
+        ..ProfileSettings::default()
+    };
+    let found = profile(at.problem, at.theta, of, &how).map_err(|error| error.to_string())?;
+    let marks = found.marks.iter();
+    Ok(ProfilePiece {
+        sentence: found.sentence(),
+        verdict: match found.verdict {
+            Interval::Identified => "identified",
+            Interval::OneSided => "one-sided",
+            Interval::Flat => "flat",
+        }
+        .into(),
+        marks: marks.map(|m| (m.value, m.constraint.clone())).collect(),
+        name: found.name,
+        unit: found.unit,
+        optimum: found.optimum,
+        values: found.values,
+        costs: found.costs,
+        interval: found.interval,
+    })
+}
+
+/// The candidates, best first.
+pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
+    let spread = residual_spread(at.problem, at.evaluation);
+    let described = list.iter().map(|c| identifiability::Candidate {
+        name: c.name.clone(),
+        initial: c.experiment.initial,
+        excitation: c.experiment.excitation.clone(),
+        channels: (c.experiment.channels.iter().take(1))
+            .map(|channel| CandidateChannel {
+                kind: channel.kind(),
+                sigma: channel.weighting().sigma(0).unwrap_or(spread),
+            })
+            .collect(),
+    });
+    let described: Vec<_> = described.collect();
+    let ranked = rank_experiments(at.problem, at.theta, at.evaluation, &described, false);
+    let finite = |ratio: f64| ratio.is_finite().then_some(ratio);
+    let record = |r: identifiability::Ranked| {
+        let gain = r.gain.as_ref().ok();
+        CandidateRecord {
+            sentence: r.sentence(),
+            new_directions: gain.map(|g| g.new_directions),
+            volume: gain.and_then(|g| finite(g.volume)),
+            average: gain.and_then(|g| finite(g.average)),
+            worst: gain.and_then(|g| finite(g.worst)),
+            name: r.name,
+        }
+    };
+    ranked.into_iter().map(record).collect()
+}
+
+/// Devices with the same motion as the fit's.
+pub fn equivalents(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentRecord> {
+    let choice = |asked: &Equivalent| Choice {
+        name: asked.name.clone(),
+        mass: asked.mass.clone(),
+        damping: asked.damping.clone(),
+    };
+    let choices: Vec<Choice> = asked.iter().map(choice).collect();
+    let record = |found: EquivalentSystem| {
+        let mut coefficients = found.device.coefficients.into_iter();
+        EquivalentRecord {
+            name: found.name,
+            times: at.problem.oscillator.grid.times(),
+            mass: found.device.mass,
+            damping: coefficients.next().unwrap_or_default(),
+            stiffness: coefficients.next().unwrap_or_default(),
+            motion_error: found.motion_error,
+        }
+    };
+    let found = equivalent_systems(at.problem, at.evaluation, &choices);
+    found.into_iter().map(record).collect()
+}
+
+/// Fits from many starts.
+pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartPiece {
+    let (plan, problem) = (&model.study, at.problem);
+    let how = Multistart {
+        // Between the bounds, where all functions have them on both sides.
+        ranges: Ranges::of_bounds(problem)
+            .unwrap_or_else(|| Ranges::around_starts(&problem.functions, plan.spread)),
+        starts: plan.starts,
+        seed: plan.seed,
+        threads,
+        attempts: false,
+        settings: model.settings.clone(),
+    };
+    let waterfall = multistart::multistart(problem, &how);
+    let tolerance = multistart::Distance {
+        ratios: plan.same,
+        motions: plan.same,
+    };
+    let clusters = waterfall.clusters(problem, tolerance);
+    let findings = waterfall.findings(problem, at.theta, &clusters);
+    let failed = waterfall.runs.iter().filter(|run| run.found.is_none());
+    let cluster = |c: &multistart::Cluster| ClusterRecord {
+        starts: c.members.len(),
+        cost: c.cost,
+    };
+    MultistartPiece {
+        costs: waterfall.costs(),
+        failures: failed.map(|run| run.reason.clone()).collect(),
+        clusters: clusters.iter().map(cluster).collect(),
+        sentences: (findings.iter())
+            .map(|finding| findings::of_starts(finding, plan.starts))
+            .collect(),
+    }
+}
+
+/// Whether each function varies.
+///
+/// # Errors
+/// Why it cannot be said.
+pub fn varies(at: Optimum, plan: &StudyPlan, threads: usize) -> Result<Vec<VariesRecord>, String> {
+    let asking = Asking {
+        level: 1.0 - plan.confidence,
+        seed: plan.seed,
+        threads,
+        ..Asking::default()
+    };
+    let found = variation(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
+    let record = |v: Varies| VariesRecord {
+        sentence: v.sentence(),
+        p_value: v.p_value,
+        name: v.function,
+    };
+    Ok(found.into_iter().map(record).collect())
+}
+
+/// Intervals of the profiled numbers and of all constants and scalars from refits.
+///
+/// # Errors
+/// Why there are none.
+pub fn refits(
+    at: Optimum,
+    plan: &StudyPlan,
+    threads: usize,
+) -> Result<Vec<BootstrapRecord>, String> {
+    let noise = match plan.residual_noise {
+        true => Noise::Residual,
+        false => Noise::Parametric,
+    };
+    let profiled = plan.profiles.iter().filter_map(|t| linear(at.problem, t));
+    let how = (noise, plan.replicates, plan.seed);
+    let found = intervals(
+        at.problem,
+        at.theta,
+        profiled,
+        how,
+        plan.confidence,
+        threads,
+    );
+    let found = found.map_err(|why| match why {
+        NoRefits::Undetermined => {
+            "the readings do not determine all parameters, or these are more than 64: refits from the \
+             optimum would not move where nothing is seen"
+                .into()
+        }
+        NoRefits::NoResponse(error) => error.to_string(),
+    })?;
+    let record = |(of, interval): NumberInterval| BootstrapRecord {
+        interval,
+        name: of.name,
+        unit: of.unit,
+    };
+    Ok(found.into_iter().map(record).collect())
+}
+
+/// The tubes of all functions that are fitted and of k/m and c/m, and the motions that the model asks for and those in the
+/// experiments that might be made, with their envelopes over the extreme devices.
+pub fn tubes(
+    model: &Model,
+    at: Optimum,
+    threads: usize,
+) -> (Vec<TubeRecord>, Vec<PredictionRecord>) {
+    let plan = &model.study;
+    let level = Level::at(
+        at.problem,
+        at.theta,
+        at.evaluation,
+        plan.level,
+        plan.confidence,
+    );
+    let mut records = Vec::new();
+    let mut extremes = Vec::new();
+    for found in envelopes(at.problem, at.theta, &level, &plan.tubes, threads) {
+        let ends = found.bands.iter().flat_map(|band| [&band.low, &band.high]);
+        let device = |e: &Extreme| (e.name(), e.misfit, ended(e.ended_at(&level)).to_owned());
+        records.push(TubeRecord {
+            name: found.name,
+            unit: found.unit.to_owned(),
+            times: plan.tubes.clone(),
+            low: found.bands.iter().map(|band| band.low.value).collect(),
+            high: found.bands.iter().map(|band| band.high.value).collect(),
+            level: level.misfit,
+            devices: ends.map(device).collect(),
+        });
+        extremes.extend(found.bands.into_iter().flat_map(|b| [b.low, b.high]));
+    }
+    (records, predictions(model, at, &extremes))
+}
+
+/// How the search for an extreme device ended.
+fn ended(ended: Ended) -> &'static str {
+    match ended {
+        Ended::Settled => super::text::ENDED,
+        Ended::Reach => "at the reach that was stated: no end was met",
+        Ended::Stuck => "no trial could be brought back to the level",
+        Ended::Programs => "the programs ran out",
+    }
+}
+
+fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<PredictionRecord> {
+    let covariance = at.problem.covariance(at.evaluation);
+    let free = model.predictions.iter().map(|state| {
+        let (y, v) = (state.displacement, state.velocity);
+        prediction::Run::free(format!("from y = {y} m, v = {v} m/s"), *state)
+    });
+    let candidates = model.study.candidates.iter().map(|c| prediction::Run {
+        excitation: c.experiment.excitation.clone(),
+        ..prediction::Run::free(format!("`{}`", c.name), c.experiment.initial)
+    });
+    let each = free.chain(candidates).filter_map(|run| {
+        let covariance = covariance.as_ref();
+        let found = prediction::predict(at.problem, at.theta, &run, covariance, extremes).ok()?;
+        Some(PredictionRecord {
+            name: found.name,
+            times: found.times,
+            displacement: found.motion.displacement,
+            band: found.band,
+            worst: found.worst,
+            furthest: found.furthest,
+        })
+    });
+    each.collect()
+}
