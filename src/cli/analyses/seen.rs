@@ -37,7 +37,7 @@ pub fn spectrum(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Sp
     };
     SpectrumPiece {
         sentence: spectrum.sentence(),
-        rank: spectrum.rank,
+        rank: spectrum.rank(),
         of: spectrum.of(),
         unseen: (unseen.into_iter())
             .map(|named| NamedRecord {
@@ -52,7 +52,7 @@ pub fn spectrum(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Sp
         worst: (spectrum.worst(problem, DIRECTIONS).into_iter())
             .map(record)
             .collect(),
-        singular_values: spectrum.singular_values,
+        singular_values: spectrum.singular_values().to_vec(),
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::components::{Component, components};
 use super::directions::Directions;
-use super::linear::{column_space, null_space};
+use super::factorisation::{column_space, null_space};
 use super::sensitivity::Spectrum;
 use crate::functions::Design;
 use crate::problem::Problem;
