@@ -6,7 +6,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::{Sigma, Weight};
 use crate::config::spec::{SmoothSpec, WeightRule};
 use crate::error::InputError;
-use kmcfit_core::internals::functions::{Basis, Design, Penalty, Variation};
+use kmcfit_core::internals::functions::{Basis, Penalty, Variation};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{self, Measurements};
 
@@ -52,7 +52,7 @@ pub(super) fn build(
                 continue;
             };
             let penalty = penalty(file, problem, (j, &basis), &key, spec, weight)?;
-            if penalty.target.is_empty() {
+            if penalty.rows.is_empty() {
                 warnings.push(format!(
                     "{key} says nothing: this derivative of a {} function is zero",
                     basis.name()
@@ -87,7 +87,7 @@ pub(super) fn add_variations(file: &ModelFile, problem: &mut Problem) -> Result<
             let added = problem.penalize_variation(Variation {
                 function: j,
                 weight,
-                rows: Design::Sparse(basis.changes(&grid)),
+                rows: basis.changes(&grid),
             });
             added.map_err(|why| file.error_at(&slot.key, why.to_string()))?;
         }
@@ -115,7 +115,7 @@ fn penalty(
                 .found(format!("`{}`", basis.name()))
                 .expected("a basis whose functions the nodes can tell apart")
         })?;
-        penalty.target = penalty.residuals(&nearest);
+        penalty.rows.set_right(penalty.residuals(&nearest));
     }
     Ok(penalty)
 }

@@ -3,7 +3,7 @@
 use super::BuildError;
 use crate::constraints::{Limit, Statement};
 use crate::functions::basis::{from_physical_powers, uniform_knots};
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Design, Penalty, Variation};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Penalty, Variation};
 use crate::system::Grid;
 
 /// Where a function comes from.
@@ -215,12 +215,12 @@ impl Part {
         let smooth = self.smooth.iter().map(|&(order, weight)| {
             Penalty::new(index, order, weight, basis.roughness(grid, order))
         });
-        let smooth = smooth.filter(|p| !p.target.is_empty() && p.weight > 0.0);
+        let smooth = smooth.filter(|p| !p.rows.is_empty() && p.weight > 0.0);
         let variation = self.variation.filter(|weight| *weight > 0.0);
         let variation = variation.map(|weight| Variation {
             function: index,
             weight,
-            rows: Design::Sparse(basis.changes(grid)),
+            rows: basis.changes(grid),
         });
         Ok((smooth.collect(), variation))
     }

@@ -181,13 +181,8 @@ impl Parameterization {
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
         match (self.flat[index], delta.as_slice()) {
             (Some([_, entry]), [delta]) => (entry * delta).abs(),
-            (_, delta) => design.largest(delta, self.nodes),
+            (_, delta) => design.largest(delta),
         }
-    }
-
-    /// Whether function `index` of the list is constant, or has no parameters.
-    pub fn is_constant_or_known(&self, index: usize) -> bool {
-        self.constant[index] || matches!(self.list[index].design, Design::Empty)
     }
 
     /// The start of the search.

@@ -199,13 +199,13 @@ impl Problem {
 /// rows.
 fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> DMatrix<f64> {
     let range = problem.functions.ranges()[penalty.function].clone();
-    let (rows, n) = (penalty.target.len(), directions.len());
+    let (rows, n) = (penalty.rows.len(), directions.len());
     let mut out = DMatrix::zeros(rows, n);
     for k in 0..n {
         let theta = directions.column(k);
         let part = &theta[range.clone()];
         if part.iter().any(|x| *x != 0.0) {
-            let image = penalty.rows.multiply(part, rows);
+            let image = penalty.rows.multiply(part);
             out.set_column(k, &DVector::from_vec(image));
         }
     }

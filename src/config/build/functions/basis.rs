@@ -180,11 +180,13 @@ fn listed(
 /// Refuses a basis with a function that no node sees, or with dependent functions.
 fn told_apart(file: &ModelFile, grid: &Grid, key: &str, basis: &Basis) -> Result<(), InputError> {
     let design = basis.design(grid);
-    let Design::Sparse(matrix) = &design else {
+    let Design::Sparse(rows) = &design else {
         return Ok(());
     };
-    let mut seen = vec![false; matrix.ncols()];
-    matrix.col_indices().iter().for_each(|&j| seen[j] = true);
+    let mut seen = vec![false; rows.width()];
+    for i in 0..rows.len() {
+        rows.row(i).for_each(|(j, _)| seen[j] = true);
+    }
     if let Some(unseen) = seen.iter().position(|seen| !seen) {
         // Function j is not zero between the knots j - reach and j + 1.
         let knots = basis.knot_times(grid);
