@@ -62,8 +62,6 @@ pub(crate) trait Arithmetic: Copy {
     fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
-    /// The larger of two, or `b` where one of them is no number.
-    fn larger(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     /// Whether there is an instruction for a product and a sum that are rounded once.
     const IS_FUSED: bool;
     /// `1 / d`, and what its rounding has lost; zeros, and no work, without that instruction.
@@ -125,15 +123,6 @@ impl<A: Arithmetic> Eight<A> {
             column.registers = registers;
         }
         columns
-    }
-
-    /// The larger of two, or the second where one of them is no number.
-    #[inline(always)]
-    pub fn larger(self, other: Self) -> Self {
-        Self {
-            registers: self.arithmetic.larger(self.registers, other.registers),
-            ..self
-        }
     }
 
     /// `1 / d`, and what its rounding has lost to within `2^-105` of it; zeros where there are no fused products

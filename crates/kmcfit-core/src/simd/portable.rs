@@ -47,8 +47,6 @@ impl Arithmetic for Portable {
         mul | a,
         b | a * b,
         div | a,
-        b | a / b,
-        larger | a,
-        b | if a > b { a } else { b }
+        b | a / b
     );
 }

@@ -20,7 +20,6 @@ impl Kernel for Everything {
             rows.push((a * b).row());
             rows.push((a / b).row());
             rows.push((a * b + a * a - b / a).row());
-            rows.push(a.larger(b).row());
             rows.push((-a).row());
         }
         rows.as_flattened().iter().map(|x| x.to_bits()).collect()

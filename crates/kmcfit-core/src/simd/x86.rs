@@ -89,7 +89,7 @@ impl Arithmetic for Avx512 {
     }
 
     operators!(at_once __m512d; add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd,
-        div _mm512_div_pd, larger _mm512_max_pd);
+        div _mm512_div_pd);
 
     #[inline(always)]
     fn reciprocal(self, d: __m512d) -> [__m512d; 2] {
@@ -185,7 +185,7 @@ impl Arithmetic for Avx2 {
     }
 
     operators!(in_halves [__m256d; 2]; add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd,
-        div _mm256_div_pd, larger _mm256_max_pd);
+        div _mm256_div_pd);
 
     #[inline(always)]
     fn reciprocal(self, d: [__m256d; 2]) -> [[__m256d; 2]; 2] {
