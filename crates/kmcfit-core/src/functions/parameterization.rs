@@ -185,6 +185,11 @@ impl Parameterization {
         }
     }
 
+    /// Whether function `index` of the list is constant, or has no parameters.
+    pub fn is_constant_or_known(&self, index: usize) -> bool {
+        self.constant[index] || matches!(self.list[index].design, Design::Empty)
+    }
+
     /// The start of the search.
     pub fn start(&self) -> Vec<f64> {
         let functions = self.list.iter().flat_map(|f| f.start.iter().copied());

@@ -3,7 +3,7 @@
 use super::Evaluation;
 use crate::functions::{CoefficientFunction, Design};
 use crate::problem::Problem;
-use crate::simulate::{Trajectory, continuous_adjoint};
+use crate::simulate::{CoefficientGradient, Engine, Trajectory, continuous_adjoint};
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, State};
 
@@ -122,17 +122,16 @@ impl Problem {
             vec![None; self.functions.assemblies().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
-            if experiment.channels.is_empty() {
+            if experiment.channels.is_empty()
+                || self.add_gradient_of_constants(evaluation, e, &mut gradient, &mut scalars)
+            {
                 continue;
             }
             let view = self.view(evaluation, e);
             let empty = || self.functions.empty_device();
             let total = nodal[experiment.device].get_or_insert_with(empty);
-            let mut source = Trajectory::zeros(experiment.nodes);
-            for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
-                let slopes = channel.slopes(predicted);
-                channel.add_transpose(view, &slopes, &mut source, total, &mut scalars);
-            }
+            let direct = &mut CoefficientGradient::AtNodes(total);
+            let source = self.source(evaluation, e, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
             add(total, &share.device);
             add_initial(experiment.sought, share.initial, &mut scalars);
@@ -144,6 +143,70 @@ impl Problem {
         }
         gradient[self.functions.scalar_range()].copy_from_slice(&scalars);
         gradient
+    }
+
+    /// The derivative of the misfit of experiment `e` with respect to its motion; those at fixed states are added to
+    /// `direct` and `scalars`.
+    fn source(
+        &self,
+        evaluation: &Evaluation,
+        e: usize,
+        direct: &mut CoefficientGradient,
+        scalars: &mut [f64],
+    ) -> Trajectory {
+        let (experiment, view) = (&self.experiments[e], self.view(evaluation, e));
+        let mut source = Trajectory::zeros(experiment.nodes);
+        for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
+            let slopes = channel.slopes(predicted);
+            channel.add_transpose(view, &slopes, &mut source, direct, scalars);
+        }
+        source
+    }
+
+    /// Adds the part of experiment `e` if all functions of its device are constants: nothing is then written to the
+    /// nodes. Whether that was possible; if not, nothing is added.
+    fn add_gradient_of_constants(
+        &self,
+        evaluation: &Evaluation,
+        e: usize,
+        gradient: &mut [f64],
+        scalars: &mut [f64],
+    ) -> bool {
+        let (experiment, functions) = (&self.experiments[e], &self.functions);
+        let assembly = functions.assembly(experiment.device);
+        let view = self.view(evaluation, e);
+        if view.engine() != Engine::Prefactored
+            || !assembly.iter().all(|f| functions.is_constant_or_known(*f))
+        {
+            return false;
+        }
+        let mut direct = vec![0.0; assembly.len()];
+        let mut own = vec![0.0; scalars.len()];
+        let source = self.source(
+            evaluation,
+            e,
+            &mut CoefficientGradient::Summed(&mut direct),
+            &mut own,
+        );
+        let found = view.engine().discrete_adjoint_sums(
+            view.oscillator,
+            view.device,
+            view.excitation,
+            view.motion,
+            &source,
+        );
+        let Some((sums, initial)) = found else {
+            return false;
+        };
+        for (f, (sum, direct)) in assembly.iter().zip(sums.iter().zip(&direct)) {
+            let first = functions.ranges()[*f].start;
+            for (j, entry) in functions.get(*f).design.row(0) {
+                gradient[first + j] += entry * (direct + sum);
+            }
+        }
+        add_initial(experiment.sought, initial, &mut own);
+        scalars.iter_mut().zip(&own).for_each(|(s, own)| *s += own);
+        true
     }
 
     /// Euclidean gradient in the parameters, and the parameters of the L2 gradient.

@@ -3,10 +3,10 @@
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
 use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
-use crate::simulate::Trajectory;
 use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
 use crate::simulate::fast::padded_loads;
-use crate::system::{Excitation, NodalCoefficients};
+use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
     /// Whether reading `i` is the acceleration at node `i`.
@@ -95,16 +95,16 @@ impl Kernel for Predict<'_> {
 }
 
 /// [`Channel::add_transpose`] of such readings, after the filter.
-pub(super) struct AddTranspose<'a> {
+pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
     pub slopes: &'a [f64],
     pub source: &'a mut Trajectory,
-    pub direct: &'a mut NodalCoefficients,
+    pub direct: &'a mut CoefficientGradient<'b>,
     pub scalars: &'a mut [f64],
 }
 
-impl Kernel for AddTranspose<'_> {
+impl Kernel for AddTranspose<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -122,6 +122,7 @@ impl Kernel for AddTranspose<'_> {
         let seeks = sensor.indices().iter().any(Option::is_some);
         let factor = Eight::splat(arithmetic, gain);
         let mut seen = Accelerations::NOTHING;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
         for (from, slopes) in (0..).step_by(LANES).zip(slopes.chunks(LANES)) {
             channel.accelerations(arithmetic, view, from, &mut seen);
             let mut row = [0.0; LANES];
@@ -136,8 +137,18 @@ impl Kernel for AddTranspose<'_> {
                 &mut source.displacement[nodes.clone()],
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
-            for (values, by) in direct.functions_mut().zip(&seen.functions) {
-                add_products(arithmetic, push, by, &mut values[nodes.clone()]);
+            match direct {
+                CoefficientGradient::AtNodes(device) => {
+                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, &mut values[nodes.clone()]);
+                    }
+                }
+                // Lanes without a reading have no slope.
+                CoefficientGradient::Summed(_) => {
+                    for (sums, by) in sums.iter_mut().zip(&seen.functions) {
+                        add_products(arithmetic, push, by, sums);
+                    }
+                }
             }
             if seeks {
                 for (l, slope) in slopes.iter().enumerate() {
@@ -145,6 +156,11 @@ impl Kernel for AddTranspose<'_> {
                     let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
                     sensor.add_gradient(factors, *slope, scalars);
                 }
+            }
+        }
+        if let CoefficientGradient::Summed(all) = direct {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
             }
         }
     }

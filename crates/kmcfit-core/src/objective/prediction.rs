@@ -5,9 +5,9 @@ use super::{RecordTangent, SimulatedRecord};
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simd;
-use crate::simulate::Trajectory;
 use crate::simulate::reference::{Observation, observe};
-use crate::system::{NodalCoefficients, TimePoint};
+use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::system::TimePoint;
 
 impl Channel {
     /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
@@ -97,7 +97,7 @@ impl Channel {
         view: SimulatedRecord,
         slopes: &[f64],
         source: &mut Trajectory,
-        direct: &mut NodalCoefficients,
+        direct: &mut CoefficientGradient,
         scalars: &mut [f64],
     ) {
         let filtered;
@@ -174,15 +174,15 @@ fn spread(
     step: usize,
     slope: f64,
     source: &mut Trajectory,
-    direct: &mut NodalCoefficients,
+    direct: &mut CoefficientGradient,
 ) {
     for side in 0..2 {
         source.displacement[step + side] += slope * sensed.states[2 * side];
         source.velocity[step + side] += slope * sensed.states[2 * side + 1];
     }
-    for (f, values) in direct.functions_mut().enumerate() {
+    for f in 0..direct.functions() {
         for side in 0..2 {
-            values[step + side] += slope * sensed.functions[side][f];
+            direct.add(f, step + side, slope * sensed.functions[side][f]);
         }
     }
 }

@@ -22,7 +22,6 @@ macro_rules! operators {
 
 impl Arithmetic for Portable {
     type Registers = Row;
-    const IS_FUSED: bool = false;
 
     #[inline(always)]
     fn splat(self, x: f64) -> Row {

@@ -1,11 +1,11 @@
 //! The choice among the reference functions and their specialisations.
 
-use super::Trajectory;
 use super::error::{SimulationError, require_finite, require_positive_mass};
 use super::fast::blocks::LinearDevice;
 use super::fast::{continuous_adjoint, prefactored, simd_adjoint};
 use super::reference::equation::EquationOfMotion;
 use super::reference::{self, AdjointEquation};
+use super::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, Method, NodalCoefficients, State, System, SystemTangent, Term};
 
 /// Purpose of a simulation.
@@ -122,6 +122,25 @@ impl Engine {
         gradient.unwrap_or_else(|| {
             reference::discrete_adjoint(oscillator, device, excitation, trajectory, source)
         })
+    }
+
+    /// Sums over the nodes of [`Engine::discrete_adjoint`], which are the gradient with respect to constant functions,
+    /// and its initial state. `None` if the engine does not sum, or the sums leave the finite numbers.
+    pub(crate) fn discrete_adjoint_sums(
+        self,
+        oscillator: &System,
+        device: &NodalCoefficients,
+        excitation: Option<&Excitation>,
+        trajectory: &Trajectory,
+        source: &Trajectory,
+    ) -> Option<(Vec<f64>, State)> {
+        (self == Self::Prefactored).then_some(())?;
+        let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
+        let mut sums = vec![0.0; 1 + oscillator.terms.len()];
+        let gradient = CoefficientGradient::Summed(&mut sums);
+        let initial = simd_adjoint::back(equation, oscillator.method, trajectory, source, gradient);
+        let is_finite = initial.is_finite() && sums.iter().all(|x| x.is_finite());
+        is_finite.then_some((sums, initial))
     }
 }
 

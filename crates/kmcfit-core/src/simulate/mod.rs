@@ -6,12 +6,14 @@
 mod engine;
 mod error;
 pub(crate) mod fast;
+mod gradient;
 pub mod reference;
 mod trajectory;
 
 pub use engine::{Engine, Purpose, continuous_adjoint};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use error::{Cause, SimulationError};
+pub use gradient::CoefficientGradient;
 pub use reference::{Observation, StepJacobian};
 pub use trajectory::Trajectory;
 

@@ -3,9 +3,9 @@
 
 use super::step_linearisation::{self, StepLinearisation, Wanted};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
-use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
-use crate::system::{Method, NodalCoefficients, State, SystemTangent};
+use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::system::{FUNCTIONS, Method, NodalCoefficients, State, SystemTangent};
 
 /// As [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()), to 40 machine precisions of the largest
 /// value for each step; not finite where a product of this order
@@ -16,11 +16,27 @@ pub(crate) fn gradient(
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
+    let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
+    let gradient = CoefficientGradient::AtNodes(&mut device);
+    let initial = back(equation, method, trajectory, source, gradient);
+    SystemTangent { device, initial }
+}
+
+/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
+/// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
+pub(crate) fn back(
+    equation: EquationOfMotion,
+    method: Method,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+    gradient: CoefficientGradient,
+) -> State {
     simd::run(Back {
         equation,
         method,
         trajectory,
         source,
+        gradient,
     })
 }
 
@@ -29,19 +45,24 @@ struct Back<'a> {
     method: Method,
     trajectory: &'a Trajectory,
     source: &'a Trajectory,
+    gradient: CoefficientGradient<'a>,
 }
 
 impl Kernel for Back<'_> {
-    type Output = SystemTangent;
+    type Output = State;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> SystemTangent {
+    fn run<A: Arithmetic>(self, arithmetic: A) -> State {
         let (equation, source) = (&self.equation, self.source);
-        let terms = equation.terms.len();
-        let mut device = NodalCoefficients::zeros(equation.device.mass.len(), terms);
+        let mut gradient = self.gradient;
+        let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
         let mut wanted = Wanted::default();
-        wanted.ends[..=terms].fill(true);
+        let asked = match &gradient {
+            CoefficientGradient::AtNodes(_) => &mut wanted.ends,
+            CoefficientGradient::Summed(_) => &mut wanted.sum,
+        };
+        asked[..=equation.terms.len()].fill(true);
         let mut maps = StepLinearisation::NOTHING;
         let mut x = [source.displacement[last], source.velocity[last]];
         let mut to = last;
@@ -72,20 +93,30 @@ impl Kernel for Back<'_> {
                 Eight::load(arithmetic, &ends[0]),
                 Eight::load(arithmetic, &ends[1]),
             ];
-            for f in 0..=terms {
-                let left = share(arithmetic, &maps.left[f], ends);
-                let right = share(arithmetic, &maps.right[f], ends);
-                let values = &mut device.function_mut(f)[from..];
-                set(arithmetic, left, right, to - from, values);
+            for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
+                match &mut gradient {
+                    CoefficientGradient::AtNodes(device) => {
+                        let left = share(arithmetic, &maps.left[f], ends);
+                        let right = share(arithmetic, &maps.right[f], ends);
+                        let values = &mut device.function_mut(f)[from..];
+                        set(arithmetic, left, right, to - from, values);
+                    }
+                    CoefficientGradient::Summed(_) => {
+                        let share = share(arithmetic, &maps.sum[f], ends);
+                        *sum = (Eight::load(arithmetic, sum) + share).row();
+                    }
+                }
             }
             to = from;
         }
-        SystemTangent {
-            device,
-            initial: State {
-                displacement: x[0],
-                velocity: x[1],
-            },
+        if let CoefficientGradient::Summed(all) = gradient {
+            for (sum, lanes) in all.iter_mut().zip(sums) {
+                *sum += lanes.iter().sum::<f64>();
+            }
+        }
+        State {
+            displacement: x[0],
+            velocity: x[1],
         }
     }
 }

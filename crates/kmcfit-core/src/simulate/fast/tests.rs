@@ -304,13 +304,21 @@ proptest! {
     }
 
     #[test]
-    fn prefactored_adjoints(case in any_case()) {
+    fn prefactored_adjoints_and_their_sums(case in any_case()) {
         let (oscillator, device, excitation) = (&case.oscillator, &case.device, case.excitation());
         let (motion, source) = (case.response(), case.source());
         let exact = reference::discrete_adjoint(oscillator, device, excitation, &motion, &source);
         let engine = Engine::Prefactored;
         let fast = engine.discrete_adjoint(oscillator, device, excitation, &motion, &source);
         case.agree_gradients(&fast, &exact)?;
+        let sums = engine.discrete_adjoint_sums(oscillator, device, excitation, &motion, &source);
+        let (sums, initial) = sums.expect("finite sums");
+        prop_assert_eq!(initial, fast.initial);
+        for (sum, values) in sums.iter().zip(exact.device.functions()) {
+            let size: f64 = values.iter().map(|x| x.abs()).sum();
+            let error = (sum - values.iter().sum::<f64>()).abs();
+            prop_assert!(error <= PER_STEP * case.nodes() as f64 * f64::EPSILON * size);
+        }
     }
 
     #[test]
