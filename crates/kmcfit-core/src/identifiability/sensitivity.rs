@@ -7,8 +7,8 @@ use crate::problem::Problem;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Singular values above this share of the largest count along smooth directions of many parameters, where the error of the stepper, some 1e-5 of a
-/// motion, makes the scale over time faintly seen.
+/// Singular values above this share of the largest count along smooth directions of many parameters, where the error of
+/// the stepper, some 1e-5 of a motion, makes the scale over time faintly seen.
 pub const COARSE_RANK: f64 = 1e-5;
 /// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
 /// readings of 3000 parameters. Beyond it the directions are made coarser.
