@@ -111,7 +111,7 @@ fn robust(problem: &Problem) -> String {
 
 fn penalty(penalty: &Penalty, symbol: &str) -> String {
     let integrand = match penalty.order {
-        0 if penalty.target.iter().all(|t| *t == 0.0) => format!("{symbol}^2"),
+        0 if penalty.rows.right().iter().all(|t| *t == 0.0) => format!("{symbol}^2"),
         0 => format!("({symbol} - reference)^2"),
         1 => format!("(d{symbol}/dt)^2"),
         q => format!("(d^{q}{symbol}/dt^{q})^2"),

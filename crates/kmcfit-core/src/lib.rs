@@ -68,6 +68,7 @@ mod objective;
 mod problem;
 mod qp;
 mod record;
+mod rows;
 mod signal;
 mod simd;
 mod simulate;

@@ -1,8 +1,9 @@
 //! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
-use crate::functions::{CoefficientKind, Design, Parameterization, Penalty, Variation};
+use crate::functions::{CoefficientKind, Parameterization, Penalty, Variation};
 use crate::record::{Channel, Experiment, Weighting};
+use crate::rows::Rows;
 use crate::system::System;
 use std::ops::{Deref, Range};
 use thiserror::Error;
@@ -110,9 +111,9 @@ impl ProblemParts {
         self.check_rows(groups, &self.constraints.cones)
     }
 
-    fn check_penalty(&self, function: usize, rows: &Design) -> Result<(), ProblemError> {
+    fn check_penalty(&self, function: usize, rows: &Rows) -> Result<(), ProblemError> {
         let parameters = self.functions.ranges().get(function).map(Range::len);
-        match parameters.is_some_and(|n| rows.has_columns(n)) {
+        match parameters.is_some_and(|n| rows.width() == n) {
             true => Ok(()),
             false => Err(ProblemError::Penalty { function }),
         }

@@ -86,12 +86,7 @@ fn dense(
     let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
     let part = &theta[functions.ranges()[j].clone()];
     let rows = basis.rows(&grid(), times, q);
-    let row = |i: usize| {
-        let row = rows.row(i);
-        let terms = row.col_indices().iter().zip(row.values());
-        terms.map(|(&k, b)| b * part[k]).sum()
-    };
-    (0..times.len()).map(row).collect()
+    rows.multiply(part)
 }
 
 /// Times ten times finer than the nodes.

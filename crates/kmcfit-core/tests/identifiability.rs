@@ -152,11 +152,11 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         let seen = spectrum(&problem);
         println!(
             "{words}: {} of {}; {}",
-            seen.rank,
+            seen.rank(),
             seen.of(),
             counted.sentences().join("; ")
         );
-        assert_eq!((seen.rank, seen.of()), (expected, 600), "{words}");
+        assert_eq!((seen.rank(), seen.of()), (expected, 600), "{words}");
         assert_eq!(
             (counted.seen_at_most, counted.of),
             (expected, 600),
@@ -181,7 +181,7 @@ fn a_force_that_pauses_sees_less_while_it_does() {
     );
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
     assert_eq!(count(&problem).seen_at_most, 3 * 79 - 19);
-    assert_eq!(spectrum(&problem).rank, 3 * 79 - 19);
+    assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
         let counted = count(&problem);
         println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
-        assert_eq!(spectrum(&problem).rank, expected);
+        assert_eq!(spectrum(&problem).rank(), expected);
         assert_eq!(counted.symmetry, symmetry);
     }
 }
@@ -231,7 +231,7 @@ proptest! {
             (state(y, v), drive.then_some(force))
         }).collect();
         let problem = nodal(&oscillator, &device, &records);
-        let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank);
+        let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
             prop_assert_eq!(seen, counted);
@@ -815,7 +815,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         .unwrap();
     // Half of the knots are beyond the last reading.
     assert_eq!(count(&problem).seen_at_most, 7);
-    assert_eq!(spectrum(&problem).rank, 7);
+    assert_eq!(spectrum(&problem).rank(), 7);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
@@ -967,7 +967,7 @@ fn the_scale_by_bases_and_drives() {
         // Values that jump at knots are linear over the step there: the rank is that of the constant
         // factor alone, with singular values that fall with the step.
         if symmetry != Symmetry::Function {
-            assert!(spectrum(&problem).rank <= expected, "{name}");
+            assert!(spectrum(&problem).rank() <= expected, "{name}");
         }
         let gauge = Gauge::at(&problem, &problem.start());
         assert_eq!(gauge.constant().count(), 1, "{name}");

@@ -2,15 +2,15 @@
 
 mod common;
 
+use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Design, Penalty, Variation,
+    Basis, CoefficientFunction, CoefficientKind, Penalty, Variation,
 };
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping, fit};
 use kmcfit_core::internals::system::{Method, NodalCoefficients};
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 const SIGMA: f64 = 0.02;
 const JUMP: f64 = 12.0;
@@ -49,13 +49,12 @@ fn problem() -> (Problem, Vec<f64>) {
     )
 }
 
-fn differences() -> CsrMatrix<f64> {
-    let mut rows = CooMatrix::new(KNOTS - 2, KNOTS - 1);
+fn differences() -> Rows {
+    let mut rows = Rows::new();
     for i in 0..KNOTS - 2 {
-        rows.push(i, i, -1.0);
-        rows.push(i, i + 1, 1.0);
+        rows.push([(i, -1.0), (i + 1, 1.0)], 0.0);
     }
-    CsrMatrix::from(&rows)
+    rows
 }
 
 fn stiffness(problem: &Problem) -> Vec<f64> {
@@ -92,7 +91,7 @@ fn jumps(k: &[f64]) -> Vec<usize> {
 #[test]
 fn total_variation_finds_the_jump_and_both_levels() {
     let (mut problem, cells) = problem();
-    let rows = Design::Sparse(differences());
+    let rows = differences();
     problem = problem
         .with(|parts| {
             parts.variations = vec![Variation {

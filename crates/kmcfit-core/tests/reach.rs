@@ -87,9 +87,8 @@ fn constraints(problem: &Problem, basis: &Basis) -> Vec<RowGroup> {
     for i in 1..times.len() {
         // The mass of a time less that of the time before.
         let entries = [(i, 1.0), (i - 1, -1.0)].map(|(i, sign)| {
-            let row = values.row(i);
-            let terms = row.col_indices().iter().zip(row.values());
-            terms.map(|(j, a)| (*j, sign * a)).collect::<Vec<_>>()
+            let terms = values.row(i).map(|(j, a)| (j, sign * a));
+            terms.collect::<Vec<_>>()
         });
         let mut row = vec![0.0; basis.parameters(&grid)];
         entries.concat().iter().for_each(|(j, a)| row[*j] += a);

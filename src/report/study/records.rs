@@ -59,7 +59,7 @@ pub fn spectrum(at: Optimum) -> SpectrumPiece {
     };
     SpectrumPiece {
         sentence: spectrum.sentence(),
-        rank: spectrum.rank,
+        rank: spectrum.rank(),
         of: spectrum.of(),
         unseen: unseen
             .map(|named| NamedRecord {
@@ -70,7 +70,7 @@ pub fn spectrum(at: Optimum) -> SpectrumPiece {
         times: at.problem.oscillator.grid.times(),
         best: records(spectrum.best(at.problem, DIRECTIONS)),
         worst: records(spectrum.worst(at.problem, DIRECTIONS)),
-        singular_values: spectrum.singular_values,
+        singular_values: spectrum.singular_values().to_vec(),
     }
 }
 

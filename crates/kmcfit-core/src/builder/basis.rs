@@ -137,11 +137,13 @@ fn listed(key: &str, given: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError>
 /// Refuses a basis function that is zero at all nodes, and dependent basis functions.
 fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildError> {
     let design = basis.design(grid);
-    let Design::Sparse(matrix) = &design else {
+    let Design::Sparse(rows) = &design else {
         return Ok(());
     };
-    let mut at_nodes = vec![false; matrix.ncols()];
-    (matrix.col_indices().iter()).for_each(|&j| at_nodes[j] = true);
+    let mut at_nodes = vec![false; basis.parameters(grid)];
+    for i in 0..rows.len() {
+        rows.row(i).for_each(|(j, _)| at_nodes[j] = true);
+    }
     if let Some(absent) = at_nodes.iter().position(|there| !there) {
         // Function j is not zero between the knots j - reach and j + 1.
         let knots = basis.knot_times(grid);

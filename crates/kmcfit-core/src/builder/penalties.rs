@@ -3,7 +3,7 @@
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::Limit;
-use crate::functions::{Basis, Design, Penalty, Variation};
+use crate::functions::{Basis, Penalty, Variation};
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::solvers::{Measurements, WeightRule};
@@ -61,9 +61,10 @@ impl Builder {
                     basis.roughness(&problem.oscillator.grid, order),
                 );
                 if let Some(reference) = reference {
-                    penalty.target = target(problem, &basis, &key, reference, &penalty)?;
+                    let residuals = residuals_at(problem, &basis, &key, reference, &penalty)?;
+                    penalty.rows.set_right(residuals);
                 }
-                if penalty.target.is_empty() {
+                if penalty.rows.is_empty() {
                     let basis = basis.name();
                     notices.push(BuildNotice::NoRoughness { key, basis });
                     continue;
@@ -155,7 +156,7 @@ fn penalize_variation(
     if weight == 0.0 {
         return Ok(());
     }
-    let rows = Design::Sparse(basis.changes(&problem.oscillator.grid));
+    let rows = basis.changes(&problem.oscillator.grid);
     let added = problem.penalize_variation(Variation {
         function,
         weight,
@@ -165,7 +166,7 @@ fn penalize_variation(
 }
 
 /// Residuals of a penalty at its reference.
-fn target(
+fn residuals_at(
     problem: &Problem,
     basis: &Basis,
     key: &str,

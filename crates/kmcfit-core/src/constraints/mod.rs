@@ -3,12 +3,11 @@
 //! What is demanded of the functions is a [`Statement`]; [`Statement::build`] turns it into rows.
 
 mod build;
-mod rows;
 mod set;
 mod soft;
 mod violation;
 
+pub use crate::rows::Rows;
 pub use build::{Impossible, Limit, Shape, Statement};
-pub use rows::Rows;
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
 pub use violation::TOLERANCE;

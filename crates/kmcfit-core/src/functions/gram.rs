@@ -1,6 +1,7 @@
 //! The L2 inner product in parameters: `G = B^T W B` with trapezoid weights `W`.
 
 use super::Design;
+use crate::rows::Rows;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
@@ -19,7 +20,7 @@ pub enum Gram {
     /// Any other basis, with its Cholesky factor.
     Factored {
         /// `G`.
-        matrix: CsrMatrix<f64>,
+        matrix: Rows,
         /// Its factor.
         factor: Box<CscCholesky<f64>>,
     },
@@ -32,7 +33,12 @@ impl Gram {
         match design {
             Design::Empty => Some(Gram::Diagonal(Vec::new())),
             Design::Identity => Some(Gram::Diagonal(weights.to_vec())),
-            Design::Sparse(matrix) => {
+            Design::Sparse(rows) => {
+                let (starts, columns, values) = rows.compressed();
+                let parts = (starts.to_vec(), columns.to_vec(), values.to_vec());
+                let (count, width) = (rows.len(), rows.width());
+                let matrix =
+                    CsrMatrix::try_from_csr_data(count, width, parts.0, parts.1, parts.2).ok()?;
                 let mut weighted = matrix.clone();
                 for (i, weight) in weights.iter().enumerate() {
                     let mut row = weighted.row_mut(i);
@@ -42,7 +48,7 @@ impl Gram {
                 let factor = CscCholesky::factor(&CscMatrix::from(&gram)).ok()?;
                 independent(&gram, factor.l()).then_some(())?;
                 Some(Gram::Factored {
-                    matrix: gram,
+                    matrix: rows_of(&gram),
                     factor: Box::new(factor),
                 })
             }
@@ -54,8 +60,8 @@ impl Gram {
         match self {
             Gram::Diagonal(weights) => weights.clone(),
             Gram::Factored { matrix, .. } => {
-                let entry = |i| matrix.get_entry(i, i).map_or(0.0, |e| e.into_value());
-                (0..matrix.nrows()).map(entry).collect()
+                let entry = |i| matrix.row(i).find(|(j, _)| *j == i).map_or(0.0, |(_, a)| a);
+                (0..matrix.len()).map(entry).collect()
             }
         }
     }
@@ -70,7 +76,7 @@ impl Gram {
             }
             Gram::Factored { matrix, .. } => {
                 out.fill(0.0);
-                Design::Sparse(matrix.clone()).multiply_add(theta, out);
+                matrix.multiply_add(theta, out);
             }
         }
     }
@@ -111,6 +117,15 @@ impl Gram {
     }
 }
 
+fn rows_of(matrix: &CsrMatrix<f64>) -> Rows {
+    let mut rows = Rows::of_width(matrix.ncols());
+    for row in matrix.row_iter() {
+        let entries = row.col_indices().iter().zip(row.values());
+        rows.push(entries.map(|(j, a)| (*j, *a)), 0.0);
+    }
+    rows
+}
+
 /// Whether no pivot `L_jj^2` is negligible beside the diagonal entry `G_jj` it came from.
 fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
     let diagonal = |matrix: Option<SparseEntry<'_, f64>>| matrix.map_or(0.0, |e| e.into_value());
@@ -123,19 +138,16 @@ fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra_sparse::CooMatrix;
-
     /// The square of a size is the sum over the nodes, in whatever basis.
     #[test]
     fn squares_are_those_of_the_values() {
         let weights = [0.5, 1.0, 1.0, 1.0, 0.5];
         let theta = [1.5, -2.0];
-        let mut entries = CooMatrix::new(5, 2);
+        let mut rows = Rows::new();
         for i in 0..5 {
-            entries.push(i, 0, 1.0);
-            entries.push(i, 1, 0.25 * i as f64);
+            rows.push([(0, 1.0), (1, 0.25 * i as f64)], 0.0);
         }
-        let design = Design::Sparse(CsrMatrix::from(&entries));
+        let design = Design::Sparse(rows);
         let gram = Gram::new(&design, &weights).expect("independent columns");
         let value = |i: usize| theta[0] + theta[1] * 0.25 * i as f64;
         let expected: f64 = (0..5).map(|i| weights[i] * value(i).powi(2)).sum();

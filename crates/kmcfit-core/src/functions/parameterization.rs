@@ -181,7 +181,7 @@ impl Parameterization {
         let delta: Vec<f64> = after.iter().zip(from).map(|(a, b)| a - b).collect();
         match (self.flat[index], delta.as_slice()) {
             (Some([_, entry]), [delta]) => (entry * delta).abs(),
-            (_, delta) => design.largest(delta, self.nodes),
+            (_, delta) => design.largest(delta),
         }
     }
 

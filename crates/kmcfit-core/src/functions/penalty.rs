@@ -1,7 +1,6 @@
 //! Penalties on the roughness of a function.
 
-use super::Design;
-use nalgebra_sparse::CsrMatrix;
+use crate::rows::Rows;
 
 /// `weight * |L theta_j - target|^2` for one function `j`.
 ///
@@ -16,27 +15,24 @@ pub struct Penalty {
     pub order: usize,
     /// Weight, in the unit of J per unit of the integral.
     pub weight: f64,
-    /// `L`, rows x parameters of the function.
-    pub rows: Design,
-    /// Target of the rows.
-    pub target: Vec<f64>,
+    /// `L`, rows x parameters of the function, and the target.
+    pub rows: Rows,
 }
 
 impl Penalty {
     /// Roughness `rows` of order `order` with target zero.
-    pub fn new(function: usize, order: usize, weight: f64, rows: CsrMatrix<f64>) -> Self {
+    pub fn new(function: usize, order: usize, weight: f64, rows: Rows) -> Self {
         Self {
             function,
             order,
             weight,
-            target: vec![0.0; rows.nrows()],
-            rows: Design::Sparse(rows),
+            rows,
         }
     }
 
     /// `L theta - target`.
     pub fn residuals(&self, theta: &[f64]) -> Vec<f64> {
-        let mut residuals: Vec<f64> = self.target.iter().map(|t| -t).collect();
+        let mut residuals: Vec<f64> = self.rows.right().iter().map(|t| -t).collect();
         self.rows.multiply_add(theta, &mut residuals);
         residuals
     }

@@ -1,6 +1,6 @@
 //! Penalties on the total variation of a function.
 
-use super::Design;
+use crate::rows::Rows;
 
 /// `weight * sum_i |(D theta_j)_i|` for one function `j`, where the rows of `D` are the changes from
 /// one knot, cell or node to the next: the total variation of the function. Unlike squared
@@ -12,29 +12,18 @@ pub struct Variation {
     /// Weight, in the unit of J per unit of the function.
     pub weight: f64,
     /// `D`, rows x parameters of the function.
-    pub rows: Design,
+    pub rows: Rows,
 }
 
 impl Variation {
     /// The changes `D theta`.
-    pub fn changes(&self, theta: &[f64], count: usize) -> Vec<f64> {
-        self.rows.multiply(theta, count)
-    }
-
-    /// Number of changes.
-    pub fn count(&self) -> usize {
-        match &self.rows {
-            Design::Sparse(matrix) => matrix.nrows(),
-            Design::Empty | Design::Identity => 0,
-        }
+    pub fn changes(&self, theta: &[f64]) -> Vec<f64> {
+        self.rows.multiply(theta)
     }
 
     /// `sum_i |(D theta)_i|`, without the weight.
     pub fn total(&self, theta: &[f64]) -> f64 {
-        self.changes(theta, self.count())
-            .iter()
-            .map(|c| c.abs())
-            .sum()
+        self.changes(theta).iter().map(|c| c.abs()).sum()
     }
 
     /// Adds a subgradient, `weight D^T sign(D theta)`.
@@ -46,7 +35,7 @@ impl Variation {
                 self.weight * c.signum()
             }
         };
-        let signs: Vec<f64> = self.changes(theta, self.count()).iter().map(sign).collect();
+        let signs: Vec<f64> = self.changes(theta).iter().map(sign).collect();
         self.rows.transpose_multiply_add(&signs, gradient);
     }
 }

@@ -3,17 +3,12 @@
 
 use super::active::ActiveRow;
 use super::directions::Directions;
-use super::linear::{null_space, right_svd};
+use super::factorisation::Factorisation;
 use super::sensitivity::Sensitivity;
 use crate::functions::Penalty;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use nalgebra::{DMatrix, DVector};
-
-/// A direction whose singular value is below this share of the largest is not identifiable.
-const UNSEEN: f64 = 1e-11;
-/// Constraint rows closer to dependent than this are so.
-const DEPENDENT: f64 = 1e-10;
 
 /// What is known of the parameters, in the scaled directions.
 pub(super) struct Information {
@@ -104,14 +99,17 @@ impl Information {
                 row
             })
             .collect();
-        let free = match rows.is_empty() {
-            true => DMatrix::identity(n, n),
-            false => null_space(
-                &DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]),
-                DEPENDENT,
-            ),
+        let all = self.rows();
+        let (inverse_root, unseen) = match rows.is_empty() {
+            true => split(&Factorisation::complete(&all)),
+            false => {
+                let held = DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
+                let held = Factorisation::complete(&held);
+                let free = held.undetermined();
+                let (root, unseen) = split(&Factorisation::complete(&(all * free)));
+                (free * root, free * unseen)
+            }
         };
-        let (inverse_root, unseen) = inverse_root(&self.rows(), free);
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
@@ -161,24 +159,10 @@ impl Information {
     }
 }
 
-/// A root of `(A' A)^-1` for the matrix `A` of `rows` along the orthonormal columns of `free`, and a basis of the
-/// combinations of these columns that `A` does not determine.
-fn inverse_root(rows: &DMatrix<f64>, free: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-    // Rows of zeros make the decomposition name the undetermined combinations too.
-    let mut reduced = rows * &free;
-    if reduced.nrows() < free.ncols() {
-        reduced = reduced.resize_vertically(free.ncols(), 0.0);
-    }
-    let (values, vectors) = right_svd(&reduced);
-    let most = values.first().copied().unwrap_or(0.0);
-    let rank = values.iter().filter(|s| **s > UNSEEN * most).count();
-    let vectors = free * vectors;
-    let mut root = vectors.columns(0, rank).into_owned();
-    for (mut column, s) in root.column_iter_mut().zip(&values) {
-        column /= *s;
-    }
-    let unseen = vectors.columns(rank, vectors.ncols() - rank).into_owned();
-    (root, unseen)
+/// A root of the inverse, and the combinations that are not determined.
+fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
+    let unseen = factorisation.undetermined().into_owned();
+    (factorisation.inverse_root(), unseen)
 }
 
 impl Problem {
@@ -194,14 +178,15 @@ impl Problem {
         }
         let directions = Directions::new(self, evaluation, n, n);
         let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let (root, unseen) = inverse_root(&sensitivity.jacobian, DMatrix::identity(n, n));
+        let factorisation = Factorisation::of(&sensitivity.jacobian);
         let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
         let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
             true => 1.0,
             false => squares / (readings - n) as f64,
         };
         // A fit that leaves nothing says nothing of the noise.
-        (unseen.ncols() == 0 && scale > 0.0).then(|| {
+        (factorisation.rank == n && scale > 0.0).then(|| {
+            let root = factorisation.inverse_root();
             let column = |z: &[f64]| DVector::from_vec(sensitivity.directions.to_parameters(z));
             let columns: Vec<_> = root.column_iter().map(|z| column(z.as_slice())).collect();
             let root = DMatrix::from_columns(&columns);
@@ -214,13 +199,13 @@ impl Problem {
 /// rows.
 fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> DMatrix<f64> {
     let range = problem.functions.ranges()[penalty.function].clone();
-    let (rows, n) = (penalty.target.len(), directions.len());
+    let (rows, n) = (penalty.rows.len(), directions.len());
     let mut out = DMatrix::zeros(rows, n);
     for k in 0..n {
         let theta = directions.column(k);
         let part = &theta[range.clone()];
         if part.iter().any(|x| *x != 0.0) {
-            let image = penalty.rows.multiply(part, rows);
+            let image = penalty.rows.multiply(part);
             out.set_column(k, &DVector::from_vec(image));
         }
     }

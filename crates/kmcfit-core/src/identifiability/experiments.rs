@@ -12,9 +12,9 @@
 //! as ratios of standard errors after and before: 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
 
 use super::covariance::{Information, stacked};
+use super::factorisation::Factorisation;
 use super::gauge::Gauge;
-use super::linear::right_svd;
-use super::sensitivity::{Sensitivity, rank_of};
+use super::sensitivity::Sensitivity;
 use crate::diagnostics::rms;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -120,21 +120,21 @@ pub fn rank_experiments(
         true => information.rows(),
         false => now.clone(),
     };
-    let (values, vectors) = right_svd(&rows);
-    let seen = rank_of(&values);
+    let known = Factorisation::of(&rows);
+    let seen = known.rank;
     let rank_now = match penalties {
-        true => rank_of(&right_svd(now).0),
+        true => Factorisation::of(now).rank,
         false => seen,
     };
     let gauge = Gauge::at(problem, theta);
     let gain = |candidate: &Candidate| -> Result<Gain, String> {
         let experiment = simulated(problem, candidate)?;
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
-        let rank = rank_of(&right_svd(&stacked(now, &added)).0);
-        let before = &values[..seen];
-        let kept = vectors.columns(0, seen);
+        let rank = Factorisation::of(&stacked(now, &added)).rank;
+        let before = &known.singular_values[..seen];
         let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
-        let (after, _) = right_svd(&stacked(&old, &(&added * kept)));
+        let both = stacked(&old, &(&added * known.determined()));
+        let after = Factorisation::of(&both).singular_values;
         let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
         let shrinks = |ratio: f64| if seen == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());

@@ -7,7 +7,7 @@
 
 use super::components::{Component, components};
 use super::directions::Directions;
-use super::linear::{column_space, null_space};
+use super::factorisation::{column_space, null_space};
 use super::sensitivity::Spectrum;
 use crate::functions::Design;
 use crate::problem::Problem;
@@ -305,13 +305,7 @@ fn dense(design: &Design, nodes: usize) -> DMatrix<f64> {
     match design {
         Design::Empty => DMatrix::zeros(nodes, 0),
         Design::Identity => DMatrix::identity(nodes, nodes),
-        Design::Sparse(matrix) => {
-            let mut out = DMatrix::zeros(nodes, matrix.ncols());
-            for (i, j, b) in matrix.triplet_iter() {
-                out[(i, j)] += b;
-            }
-            out
-        }
+        Design::Sparse(rows) => rows.dense(),
     }
 }
 

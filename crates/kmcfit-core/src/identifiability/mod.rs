@@ -19,9 +19,10 @@ mod counting;
 mod covariance;
 mod directions;
 mod experiments;
+mod factorisation;
 mod gauge;
-mod linear;
 mod sensitivity;
+mod spans;
 mod verdict;
 pub use verdict::is_rounding;
 
@@ -39,6 +40,7 @@ pub use counting::{Symmetry, count};
 pub use experiments::{
     Candidate, CandidateChannel, Gain, Ranked, rank_experiments, residual_spread,
 };
+pub(crate) use factorisation::Factorisation;
 pub use gauge::Gauge;
 pub use sensitivity::{Seen, Sensitivity, Spectrum};
 pub use verdict::{Judgement, Verdict, VerdictKind, verdicts};

@@ -1,16 +1,14 @@
 //! The weighted Jacobian of all predictions and its singular values.
 
 use super::directions::Directions;
-use super::linear::right_svd;
+use super::factorisation::Factorisation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Singular values above this share of the largest count: the rank of problem.md, section 5.
-pub const RANK: f64 = 1e-12;
-/// The same along smooth directions of many parameters, where the error of the stepper, some 1e-5 of a
-/// motion, makes the scale over time faintly seen.
+/// Singular values above this share of the largest count along smooth directions of many parameters, where the error of
+/// the stepper, some 1e-5 of a motion, makes the scale over time faintly seen.
 pub const COARSE_RANK: f64 = 1e-5;
 /// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
 /// readings of 3000 parameters. Beyond it the directions are made coarser.
@@ -87,31 +85,17 @@ impl Sensitivity {
 
     /// Singular values and directions.
     pub fn spectrum(&self) -> Spectrum {
-        let (singular_values, vectors) = right_svd(&self.jacobian);
-        // Along smooth directions the scale over time shows through the error of the stepper.
-        let rank = match self.directions.is_coarse() {
-            false => rank_of(&singular_values),
-            true => above(&singular_values, COARSE_RANK),
-        };
+        let mut factorisation = Factorisation::of(&self.jacobian);
+        if self.directions.is_coarse() {
+            // Along smooth directions the scale over time shows through the error of the stepper.
+            factorisation = factorisation.above(COARSE_RANK);
+        }
         Spectrum {
-            rank,
-            singular_values,
-            vectors,
+            factorisation,
             directions: self.directions.clone(),
             names: self.names.clone(),
         }
     }
-}
-
-/// Number of singular values above [`RANK`] times the largest.
-pub(super) fn rank_of(values: &[f64]) -> usize {
-    above(values, RANK)
-}
-
-/// Number of values above a share of the largest.
-fn above(values: &[f64], share: f64) -> usize {
-    let most = values.first().copied().unwrap_or(0.0);
-    values.iter().filter(|s| **s > share * most).count()
 }
 
 /// One tangent solve for each direction.
@@ -133,12 +117,7 @@ fn by_tangents(
 /// What the readings see: `J = U S V^T`.
 #[derive(Debug, Clone)]
 pub struct Spectrum {
-    /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
-    /// readings together per change by 100 % of the natural sizes ([`Directions`]).
-    pub singular_values: Vec<f64>,
-    /// Number of those above [`RANK`] times the largest.
-    pub rank: usize,
-    vectors: DMatrix<f64>,
+    factorisation: Factorisation,
     directions: Directions,
     names: Vec<String>,
 }
@@ -155,6 +134,17 @@ pub struct Seen {
 }
 
 impl Spectrum {
+    /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
+    /// readings together per change by 100 % of the natural sizes ([`Directions`]).
+    pub fn singular_values(&self) -> &[f64] {
+        &self.factorisation.singular_values
+    }
+
+    /// Number of those that count.
+    pub fn rank(&self) -> usize {
+        self.factorisation.rank
+    }
+
     /// Number of directions that were looked at: that of the parameters, unless it is coarse.
     pub fn of(&self) -> usize {
         self.directions.len()
@@ -162,7 +152,7 @@ impl Spectrum {
 
     /// Number of directions that are not seen.
     pub fn unseen(&self) -> usize {
-        self.of() - self.rank
+        self.of() - self.rank()
     }
 
     /// The directions that it is about.
@@ -170,14 +160,9 @@ impl Spectrum {
         &self.directions
     }
 
-    /// Right singular vectors of the directions that are seen, as columns.
-    pub fn seen(&self) -> nalgebra::DMatrixView<'_, f64> {
-        self.vectors.columns(0, self.rank)
-    }
-
     /// The part of `z` that is not seen.
     pub fn unseen_part(&self, z: &DMatrix<f64>) -> DMatrix<f64> {
-        let seen = self.seen();
+        let seen = self.factorisation.determined();
         let mut rest = z.clone();
         // Twice: what the first pass leaves to rounding.
         for _ in 0..2 {
@@ -189,15 +174,17 @@ impl Spectrum {
 
     /// The directions of these ranks, best first, as changes of every function over time.
     pub fn at(&self, problem: &Problem, ranks: Range<usize>) -> Vec<Seen> {
-        let each = ranks.filter(|k| *k < self.vectors.ncols()).map(|k| {
-            let z = self.vectors.column(k);
-            let change = self.directions.to_parameters(z.as_slice());
-            Seen {
-                singular_value: self.singular_values[k],
-                functions: functions_along(problem, &change, &self.names),
-                change,
-            }
-        });
+        let each = ranks
+            .filter(|k| *k < self.factorisation.vectors().ncols())
+            .map(|k| {
+                let z = self.factorisation.vectors().column(k);
+                let change = self.directions.to_parameters(z.as_slice());
+                Seen {
+                    singular_value: self.singular_values()[k],
+                    functions: functions_along(problem, &change, &self.names),
+                    change,
+                }
+            });
         each.collect()
     }
 
@@ -208,12 +195,12 @@ impl Spectrum {
 
     /// The `count` directions that they see worst, the worst last, of those they do see.
     pub fn worst(&self, problem: &Problem, count: usize) -> Vec<Seen> {
-        self.at(problem, self.rank.saturating_sub(count)..self.rank)
+        self.at(problem, self.rank().saturating_sub(count)..self.rank())
     }
 
     /// In words.
     pub fn sentence(&self) -> String {
-        let (rank, of) = (self.rank, self.of());
+        let (rank, of) = (self.rank(), self.of());
         match self.directions.is_coarse() {
             false => format!("the readings see {rank} of {of} directions"),
             true => format!(

@@ -2,7 +2,7 @@
 
 use super::band::Band;
 use super::bands::Bands;
-use super::linear::{span_words, spans};
+use super::spans::{span_words, spans};
 use crate::diagnostics::{NORMAL_975, median_size};
 use crate::objective::Evaluation;
 use crate::problem::Problem;

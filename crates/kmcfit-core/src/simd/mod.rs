@@ -3,9 +3,7 @@
 //! A kernel ([`Kernel`]) is written once, in terms of [`Eight`], and compiled for AVX-512, for
 //! AVX2 and for plain numbers; which of them runs is decided when the program runs. All do the same IEEE
 //! operations on the same eight lanes in the same order and none contracts a product and a sum, so
-//! **all give the same bits**: the processor decides how fast an answer comes, never what it is. Two things are there for
-//! speed alone and may differ, [`Eight::quotients`] and [`Eight::reciprocal`]: who uses them sees to it that what comes
-//! out does not.
+//! **all give the same bits**: the processor decides how fast an answer comes, never what it is.
 //!
 //! [`pulp`] proves the presence of instructions by its types, so there is no `unsafe` here.
 
@@ -62,20 +60,6 @@ pub(crate) trait Arithmetic: Copy {
     fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
-    /// The larger of two, or `b` where one of them is no number.
-    fn larger(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
-    /// Whether there is an instruction for a product and a sum that are rounded once.
-    const IS_FUSED: bool;
-    /// `1 / d`, and what its rounding has lost; zeros, and no work, without that instruction.
-    #[inline(always)]
-    fn reciprocal(self, _: Self::Registers) -> [Self::Registers; 2] {
-        [self.splat(0.0); 2]
-    }
-    /// `a / d` and `b / d`: see [`Eight::quotients`].
-    #[inline(always)]
-    fn quotients(self, [a, b]: [Self::Registers; 2], d: Self::Registers) -> [Self::Registers; 2] {
-        [self.div(a, d), self.div(b, d)]
-    }
     /// Rows to columns.
     #[inline(always)]
     fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES] {
@@ -125,43 +109,6 @@ impl<A: Arithmetic> Eight<A> {
             column.registers = registers;
         }
         columns
-    }
-
-    /// The larger of two, or the second where one of them is no number.
-    #[inline(always)]
-    pub fn larger(self, other: Self) -> Self {
-        Self {
-            registers: self.arithmetic.larger(self.registers, other.registers),
-            ..self
-        }
-    }
-
-    /// `1 / d`, and what its rounding has lost to within `2^-105` of it; zeros where there are no fused products
-    /// and sums ([`Arithmetic::IS_FUSED`]).
-    #[inline(always)]
-    pub fn reciprocal(self) -> [Self; 2] {
-        let [reciprocal, lost] = self.arithmetic.reciprocal(self.registers);
-        [
-            Self {
-                registers: reciprocal,
-                ..self
-            },
-            Self {
-                registers: lost,
-                ..self
-            },
-        ]
-    }
-
-    /// `a / d` and `b / d`, with one division and multiplications where that is faster: quotients that are off by less than
-    /// `2^-50` of a unit in the last place are rounded, so that they have the bits of two divisions but where the exact one
-    /// is as near as that to the middle between two numbers. The divisors are between `2^-300` and `2^300` and the
-    /// numerators zero or between `2^-600` and `2^600` in size; a zero may have the other sign. Of smaller numerators more
-    /// bits may differ, of larger ones what is not finite.
-    #[inline(always)]
-    pub fn quotients(a: Self, b: Self, d: Self) -> [Self; 2] {
-        let [a, b] = (d.arithmetic).quotients([a.registers, b.registers], d.registers);
-        [Self { registers: a, ..d }, Self { registers: b, ..d }]
     }
 }
 

@@ -22,7 +22,6 @@ macro_rules! operators {
 
 impl Arithmetic for Portable {
     type Registers = Row;
-    const IS_FUSED: bool = false;
 
     #[inline(always)]
     fn splat(self, x: f64) -> Row {
@@ -47,8 +46,6 @@ impl Arithmetic for Portable {
         mul | a,
         b | a * b,
         div | a,
-        b | a / b,
-        larger | a,
-        b | if a > b { a } else { b }
+        b | a / b
     );
 }

@@ -1,40 +1,48 @@
 //! Sums and largest values in eight lanes.
 
-use super::{Arithmetic, Eight, Kernel, LANES};
+use super::{Arithmetic, Kernel, LANES};
 
-/// Four rows at a time, as one sum would wait for itself.
-const AT_ONCE: usize = 4;
+/// Values that are folded side by side: four rows, as one would wait for itself.
+const AT_ONCE: usize = 4 * LANES;
 
-/// `sum_i a_i b_i`, each lane by itself and then the lanes.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    super::run(Dot(a, b))
-}
+/// Folds pairs of values by a function that the compiler puts into lanes: pair `i` into fold `i % AT_ONCE`.
+struct Fold<'a, F>(&'a [f64], &'a [f64], F);
 
-struct Dot<'a>(&'a [f64], &'a [f64]);
-
-impl Kernel for Dot<'_> {
-    type Output = f64;
+impl<F: Fn(f64, f64, f64) -> f64> Kernel for Fold<'_, F> {
+    type Output = [f64; AT_ONCE];
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> f64 {
-        let (a, a_rest) = self.0.as_chunks::<{ AT_ONCE * LANES }>();
-        let (b, b_rest) = self.1.as_chunks::<{ AT_ONCE * LANES }>();
-        let mut sums = [Eight::splat(arithmetic, 0.0); AT_ONCE];
+    fn run<A: Arithmetic>(self, _: A) -> [f64; AT_ONCE] {
+        let Self(a, b, next) = self;
+        let (a, b) = (a.as_chunks::<AT_ONCE>().0, b.as_chunks::<AT_ONCE>().0);
+        let mut folds = [0.0; AT_ONCE];
         for (a, b) in a.iter().zip(b) {
-            let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
-            for q in 0..AT_ONCE {
-                sums[q] += Eight::load(arithmetic, &a[q]) * Eight::load(arithmetic, &b[q]);
+            for ((fold, a), b) in folds.iter_mut().zip(a).zip(b) {
+                *fold = next(*fold, *a, *b);
             }
         }
-        let mut sum = 0.0;
-        for lane in ((sums[0] + sums[1]) + (sums[2] + sums[3])).row() {
-            sum += lane;
-        }
-        for (a, b) in a_rest.iter().zip(b_rest) {
-            sum += a * b;
-        }
-        sum
+        folds
     }
+}
+
+/// The pairs that are too few for another round of [`Fold`].
+fn left_over(a: &[f64], b: &[f64]) -> impl Iterator<Item = (f64, f64)> {
+    let (a, b) = (a.as_chunks::<AT_ONCE>().1, b.as_chunks::<AT_ONCE>().1);
+    a.iter().copied().zip(b.iter().copied())
+}
+
+/// The sum of the terms of all pairs, each lane by itself and then the lanes.
+fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    let sums = super::run(Fold(a, b, |sum, a, b| sum + term(a, b)));
+    let rows = sums.as_chunks::<LANES>().0;
+    let lane = |l: usize| (rows[0][l] + rows[1][l]) + (rows[2][l] + rows[3][l]);
+    let whole = (0..LANES).map(lane).fold(0.0, |sum, lane| sum + lane);
+    left_over(a, b).fold(whole, |sum, (a, b)| sum + term(a, b))
+}
+
+/// `sum_i a_i b_i`.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    sum(a, b, |a, b| a * b)
 }
 
 /// The root mean square; zero of no values.
@@ -42,122 +50,52 @@ pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// `sum_i (factor (a_i - b_i))^2`, each lane by itself and then the lanes.
+/// `sum_i (factor (a_i - b_i))^2`.
 pub(crate) fn squared_distance(a: &[f64], b: &[f64], factor: f64) -> f64 {
-    super::run(SquaredDistance(a, b, factor))
+    sum(a, b, |a, b| {
+        let part = factor * (a - b);
+        part * part
+    })
 }
 
-struct SquaredDistance<'a>(&'a [f64], &'a [f64], f64);
+/// The larger of two, or the second where one of them is no number.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
 
-impl Kernel for SquaredDistance<'_> {
-    type Output = f64;
+/// The larger of the size of `x` and `most`; `most` where `x` is no number.
+fn larger_size(x: f64, most: f64) -> f64 {
+    larger(x, larger(0.0 - x, most))
+}
 
-    #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> f64 {
-        let Self(a, b, factor) = self;
-        let (a, a_rest) = a.as_chunks::<{ AT_ONCE * LANES }>();
-        let (b, b_rest) = b.as_chunks::<{ AT_ONCE * LANES }>();
-        let each = Eight::splat(arithmetic, factor);
-        let mut sums = [Eight::splat(arithmetic, 0.0); AT_ONCE];
-        for (a, b) in a.iter().zip(b) {
-            let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
-            for q in 0..AT_ONCE {
-                let difference = Eight::load(arithmetic, &a[q]) - Eight::load(arithmetic, &b[q]);
-                let part = each * difference;
-                sums[q] += part * part;
-            }
-        }
-        let mut sum = 0.0;
-        for lane in ((sums[0] + sums[1]) + (sums[2] + sums[3])).row() {
-            sum += lane;
-        }
-        for (a, b) in a_rest.iter().zip(b_rest) {
-            let part = factor * (a - b);
-            sum += part * part;
-        }
-        sum
-    }
+fn largest_of(a: &[f64], b: &[f64], value: impl Fn(f64, f64) -> f64) -> f64 {
+    let folds = super::run(Fold(a, b, |most, a, b| larger_size(value(a, b), most)));
+    let most = folds.into_iter().fold(0.0, |most, x| larger(x, most));
+    left_over(a, b).fold(most, |most, (a, b)| larger(value(a, b).abs(), most))
 }
 
 /// The largest size of the numbers; those that are none are passed over.
 pub(crate) fn largest(values: &[f64]) -> f64 {
-    super::run(LargestDifference::<false>(values, values))
+    largest_of(values, values, |a, _| a)
 }
 
 /// The largest size of `a_i - b_i`; what is no number is passed over.
 pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    super::run(LargestDifference::<true>(a, b))
-}
-
-/// Of differences, or of the first numbers alone.
-struct LargestDifference<'a, const IS_TAKEN: bool>(&'a [f64], &'a [f64]);
-
-impl<const IS_TAKEN: bool> Kernel for LargestDifference<'_, IS_TAKEN> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> f64 {
-        let zero = Eight::splat(arithmetic, 0.0);
-        let (a, a_rest) = self.0.as_chunks::<{ AT_ONCE * LANES }>();
-        let (b, b_rest) = self.1.as_chunks::<{ AT_ONCE * LANES }>();
-        let mut most = [zero; AT_ONCE];
-        for (a, b) in a.iter().zip(b) {
-            let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
-            for q in 0..AT_ONCE {
-                let mut x = Eight::load(arithmetic, &a[q]);
-                if IS_TAKEN {
-                    x = x - Eight::load(arithmetic, &b[q]);
-                }
-                most[q] = x.larger((zero - x).larger(most[q]));
-            }
-        }
-        let most = most[0].larger(most[1]).larger(most[2].larger(most[3]));
-        let larger = |most: f64, x: f64| if x > most { x } else { most };
-        let rest = a_rest.iter().zip(b_rest);
-        let rest = rest.map(|(a, b)| if IS_TAKEN { (a - b).abs() } else { a.abs() });
-        rest.chain(most.row()).fold(0.0, larger)
-    }
+    largest_of(a, b, |a, b| a - b)
 }
 
 /// Whether all numbers are positive, and are numbers.
 pub(crate) fn are_positive(values: &[f64]) -> bool {
-    let (parts, rest) = values.as_chunks::<{ AT_ONCE * LANES }>();
-    let mut others = [0.0; AT_ONCE * LANES];
-    super::run(super::Elementwise(|| {
-        for part in parts {
-            for (others, value) in others.iter_mut().zip(part) {
-                *others += if *value > 0.0 { 0.0 } else { 1.0 };
-            }
-        }
-    }));
-    others == [0.0; AT_ONCE * LANES] && rest.iter().all(|value| *value > 0.0)
+    let next = |others, x, _| others + if x > 0.0 { 0.0 } else { 1.0 };
+    let others = super::run(Fold(values, values, next));
+    others == [0.0; AT_ONCE] && left_over(values, values).all(|(x, _)| x > 0.0)
 }
 
 /// Whether all numbers are finite.
 pub(crate) fn are_finite(values: &[f64]) -> bool {
-    super::run(Finite(values))
-}
-
-struct Finite<'a>(&'a [f64]);
-
-impl Kernel for Finite<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> bool {
-        let zero = Eight::splat(arithmetic, 0.0);
-        let (values, rest) = self.0.as_chunks::<{ AT_ONCE * LANES }>();
-        // Zero times what is not finite is not a number, and stays so.
-        let mut sums = [zero; AT_ONCE];
-        for values in values {
-            let values = values.as_chunks::<LANES>().0;
-            for q in 0..AT_ONCE {
-                sums[q] += zero * Eight::load(arithmetic, &values[q]);
-            }
-        }
-        let sums = ((sums[0] + sums[1]) + (sums[2] + sums[3])).row();
-        sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|x| x.is_finite())
-    }
+    // Zero times what is not finite is not a number, and stays so.
+    let zeros = super::run(Fold(values, values, |sum, x, _| sum + 0.0 * x));
+    zeros == [0.0; AT_ONCE] && left_over(values, values).all(|(x, _)| x.is_finite())
 }
 
 #[cfg(test)]
@@ -174,16 +112,11 @@ mod tests {
             }
             let one_by_one = |values: &[f64]| values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             let difference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-            let sizes = crate::simd::on_each(|| LargestDifference::<false>(&a, &a));
-            assert!(
-                sizes.iter().all(|size| *size == one_by_one(&a)),
-                "{sizes:?}"
-            );
-            let sizes = crate::simd::on_each(|| LargestDifference::<true>(&a, &b));
-            assert!(
-                sizes.iter().all(|size| *size == one_by_one(&difference)),
-                "{sizes:?}"
-            );
+            let next = |most, a, b| larger_size(a - b, most);
+            let folds = crate::simd::on_each(|| Fold(&a, &b, next));
+            assert!(folds.windows(2).all(|pair| pair[0] == pair[1]), "{folds:?}");
+            assert_eq!(largest(&a), one_by_one(&a));
+            assert_eq!(largest_difference(&a, &b), one_by_one(&difference));
         }
     }
 

@@ -71,7 +71,6 @@ macro_rules! operators {
 
 impl Arithmetic for Avx512 {
     type Registers = __m512d;
-    const IS_FUSED: bool = true;
 
     #[inline(always)]
     fn splat(self, x: f64) -> __m512d {
@@ -89,24 +88,7 @@ impl Arithmetic for Avx512 {
     }
 
     operators!(at_once __m512d; add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd,
-        div _mm512_div_pd, larger _mm512_max_pd);
-
-    #[inline(always)]
-    fn reciprocal(self, d: __m512d) -> [__m512d; 2] {
-        let f = self.0.avx512f;
-        let one = f._mm512_set1_pd(1.0);
-        let reciprocal = f._mm512_div_pd(one, d);
-        let lost = f._mm512_mul_pd(f._mm512_fnmadd_pd(d, reciprocal, one), reciprocal);
-        [reciprocal, lost]
-    }
-
-    #[inline(always)]
-    fn quotients(self, [a, b]: [__m512d; 2], d: __m512d) -> [__m512d; 2] {
-        let f = self.0.avx512f;
-        let [reciprocal, lost] = self.reciprocal(d);
-        let quotient = |a| f._mm512_fmadd_pd(a, reciprocal, f._mm512_mul_pd(a, lost));
-        [quotient(a), quotient(b)]
-    }
+        div _mm512_div_pd);
 
     /// Pairs within 128 bits, then the 128-bit parts in two rounds.
     #[inline(always)]
@@ -167,7 +149,6 @@ impl Avx2 {
 
 impl Arithmetic for Avx2 {
     type Registers = [__m256d; 2];
-    const IS_FUSED: bool = true;
 
     #[inline(always)]
     fn splat(self, x: f64) -> [__m256d; 2] {
@@ -185,20 +166,7 @@ impl Arithmetic for Avx2 {
     }
 
     operators!(in_halves [__m256d; 2]; add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd,
-        div _mm256_div_pd, larger _mm256_max_pd);
-
-    #[inline(always)]
-    fn reciprocal(self, d: [__m256d; 2]) -> [[__m256d; 2]; 2] {
-        let (f, fused) = (self.0.avx, self.0.fma);
-        let one = f._mm256_set1_pd(1.0);
-        let reciprocal = [f._mm256_div_pd(one, d[0]), f._mm256_div_pd(one, d[1])];
-        let rest = |q: usize| fused._mm256_fnmadd_pd(d[q], reciprocal[q], one);
-        let lost = [
-            f._mm256_mul_pd(rest(0), reciprocal[0]),
-            f._mm256_mul_pd(rest(1), reciprocal[1]),
-        ];
-        [reciprocal, lost]
-    }
+        div _mm256_div_pd);
 
     /// Four squares of four: each is transposed, and the two off the diagonal change places.
     #[inline(always)]

@@ -3,8 +3,8 @@
 use super::All;
 use super::form::Form;
 use crate::functions::Basis;
+use crate::rows::Rows;
 use crate::system::Grid;
-use nalgebra_sparse::CsrMatrix;
 
 /// Times nearer than this, relative to the record, are one: the same that the bases take for one.
 const SAME_TIME: f64 = 1e-12;
@@ -179,7 +179,7 @@ impl All<'_> {
     }
 
     /// Rows of a matrix in the parameters of function `j`, one form each at `times` (s).
-    pub fn matrix_forms(&self, j: usize, rows: &CsrMatrix<f64>, times: &[f64]) -> Vec<Form> {
+    pub fn matrix_forms(&self, j: usize, rows: &Rows, times: &[f64]) -> Vec<Form> {
         let first = self.functions.ranges()[j].start;
         let form = |(i, t): (usize, &f64)| Form {
             entries: entries(rows, i, first),
@@ -203,10 +203,8 @@ impl Form {
     }
 }
 
-fn entries(matrix: &CsrMatrix<f64>, i: usize, first: usize) -> Vec<(usize, f64)> {
-    let row = matrix.row(i);
-    let columns = row.col_indices().iter().map(|j| first + j);
-    columns.zip(row.values().iter().copied()).collect()
+fn entries(rows: &Rows, i: usize, first: usize) -> Vec<(usize, f64)> {
+    rows.row(i).map(|(j, a)| (first + j, a)).collect()
 }
 
 /// A derivative of the piecewise linear function with these values at the nodes.

@@ -62,7 +62,7 @@ fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
                 Basis::PiecewiseConstant { .. } => 0.5 * (knots[i + 1] + knots[i + 2]),
                 _ => knots[i + 1],
             };
-            let times: Vec<f64> = (0..rows.nrows()).map(middle).collect();
+            let times: Vec<f64> = (0..rows.len()).map(middle).collect();
             all.matrix_forms(j, &rows, &times)
         }
         _ => {

@@ -18,9 +18,9 @@ pub use knots::uniform_knots;
 pub use polynomial::{from_physical_powers, physical_powers};
 
 use super::{Design, Gram};
+use crate::rows::Rows;
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use space::{BasisFunctions, matrix};
 
 /// How often [`Basis::project`] corrects its solution of the normal equations; the second pass
@@ -126,7 +126,7 @@ impl Basis {
     /// Where the derivative jumps it is the one after the time; at the end of the record the one
     /// before. A node that misses a knot by rounding only counts as being on it. Times outside the
     /// record are moved to its ends.
-    pub fn rows(&self, grid: &Grid, times: &[f64], derivative: usize) -> CsrMatrix<f64> {
+    pub fn rows(&self, grid: &Grid, times: &[f64], derivative: usize) -> Rows {
         let space = self.on(grid);
         let row = |t: &f64| (*t, 1.0);
         matrix(space.as_ref(), times.iter().map(row), derivative)
@@ -141,7 +141,7 @@ impl Basis {
     /// inner knots (for `piecewise-constant`: of differences between cell centres), `h` the mean of
     /// the two neighbouring spacings; with equal spacing `h ((p_{j-1} - 2 p_j + p_{j+1}) / h^2)^2`.
     /// It leaves out the half cell at either end. A derivative that is zero has no rows.
-    pub fn roughness(&self, grid: &Grid, order: usize) -> CsrMatrix<f64> {
+    pub fn roughness(&self, grid: &Grid, order: usize) -> Rows {
         self.on(grid).roughness(order)
     }
 
@@ -175,7 +175,7 @@ impl Basis {
 
     /// Changes of the function from one knot, cell or node to the next, rows x parameters: the sum
     /// of their sizes is its total variation.
-    pub fn changes(&self, grid: &Grid) -> CsrMatrix<f64> {
+    pub fn changes(&self, grid: &Grid) -> Rows {
         let knots = self.knot_times(grid);
         let times: Vec<f64> = match self {
             Basis::PiecewiseConstant { .. } => {
@@ -186,17 +186,14 @@ impl Basis {
             Basis::Polynomial { .. } | Basis::BSpline { .. } => grid.times(),
         };
         let values = self.rows(grid, &times, 0);
-        let mut changes = CooMatrix::new(times.len().saturating_sub(1), self.parameters(grid));
+        let mut changes = Rows::of_width(self.parameters(grid));
         for i in 1..times.len() {
-            for (row, sign) in [(i, 1.0), (i - 1, -1.0)] {
-                if let Some(row) = values.get_row(row) {
-                    for (&j, value) in row.col_indices().iter().zip(row.values()) {
-                        changes.push(i - 1, j, sign * value);
-                    }
-                }
-            }
+            let before = values.row(i - 1).map(|(j, value)| (j, -value));
+            let mut entries: Vec<_> = values.row(i).chain(before).collect();
+            entries.sort_by_key(|(j, _)| *j);
+            changes.push(entries, 0.0);
         }
-        CsrMatrix::from(&changes)
+        changes
     }
 
     /// The parameters of the function closest to the values `nodal` at the nodes:

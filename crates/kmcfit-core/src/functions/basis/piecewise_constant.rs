@@ -3,7 +3,7 @@
 use super::differences;
 use super::knots::Knots;
 use super::space::{BasisFunctions, square_integral};
-use nalgebra_sparse::CsrMatrix;
+use crate::rows::Rows;
 
 /// The indicator functions of the cells.
 pub(super) struct PiecewiseConstant {
@@ -44,7 +44,7 @@ impl BasisFunctions for PiecewiseConstant {
         }
     }
 
-    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+    fn roughness(&self, order: usize) -> Rows {
         match order {
             1 => differences::first(&self.centre_distances()),
             2 => differences::second(&self.centre_distances()),

@@ -3,8 +3,8 @@
 use super::differences;
 use super::knots::Knots;
 use super::space::{BasisFunctions, square_integral};
+use crate::rows::Rows;
 use crate::system::Grid;
-use nalgebra_sparse::CsrMatrix;
 
 /// Hat functions: 1 at their own knot, 0 at all others.
 pub(super) struct PiecewiseLinear {
@@ -58,7 +58,7 @@ impl BasisFunctions for PiecewiseLinear {
         }
     }
 
-    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+    fn roughness(&self, order: usize) -> Rows {
         match order {
             2 => differences::second(self.knots.widths()),
             _ => square_integral(self, order),

@@ -1,7 +1,7 @@
 //! The interface of a basis on a record.
 
 use super::legendre;
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
+use crate::rows::Rows;
 
 /// The functions `b_j` of a basis on a record: polynomials between break points.
 pub(super) trait BasisFunctions {
@@ -20,7 +20,7 @@ pub(super) trait BasisFunctions {
 
     /// The roughness, see [`Basis::roughness`](super::Basis::roughness); as it stands for functions
     /// whose derivative is square-integrable.
-    fn roughness(&self, order: usize) -> CsrMatrix<f64> {
+    fn roughness(&self, order: usize) -> Rows {
         square_integral(self, order)
     }
 }
@@ -28,29 +28,25 @@ pub(super) trait BasisFunctions {
 /// The matrix with one row per time and factor: `factor * d^derivative b_j / dt^derivative`.
 pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     space: &S,
-    rows: impl ExactSizeIterator<Item = (f64, f64)>,
+    rows: impl Iterator<Item = (f64, f64)>,
     derivative: usize,
-) -> CsrMatrix<f64> {
-    let mut matrix = CooMatrix::new(rows.len(), space.parameters());
+) -> Rows {
+    let mut matrix = Rows::of_width(space.parameters());
     let mut entries = Vec::new();
-    for (i, (t, factor)) in rows.enumerate() {
+    for (t, factor) in rows {
         entries.clear();
         space.row(t, derivative, &mut entries);
-        for &(j, value) in entries.iter().filter(|(_, value)| *value != 0.0) {
-            matrix.push(i, j, factor * value);
-        }
+        let nonzero = entries.iter().filter(|(_, value)| *value != 0.0);
+        matrix.push(nonzero.map(|(j, value)| (*j, factor * value)), 0.0);
     }
-    CsrMatrix::from(&matrix)
+    matrix
 }
 
 /// `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule:
 /// `degree - order + 1` rows per cell.
-pub(super) fn square_integral<S: BasisFunctions + ?Sized>(
-    space: &S,
-    order: usize,
-) -> CsrMatrix<f64> {
+pub(super) fn square_integral<S: BasisFunctions + ?Sized>(space: &S, order: usize) -> Rows {
     let Some(rest) = space.degree().checked_sub(order) else {
-        return CsrMatrix::zeros(0, space.parameters());
+        return Rows::of_width(space.parameters());
     };
     let rule = legendre::gauss_rule(rest + 1);
     let breaks = space.breaks();

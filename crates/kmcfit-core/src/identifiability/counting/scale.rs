@@ -1,7 +1,7 @@
 //! The common scale of the functions that share one: where it is free, and what holds it.
 
 use super::super::components::{Component, given_words};
-use super::super::linear::{span_words, spans};
+use super::super::spans::{span_words, spans};
 use super::Symmetry;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;

@@ -119,14 +119,10 @@ impl Part<'_> {
                     set(node, first + node, 1.0);
                 }
             }
-            Design::Sparse(matrix) => {
-                let (offsets, columns, entries) = matrix.csr_data();
-                let last = (first + TILE_NODES).min(matrix.nrows());
-                for (node, ends) in offsets[first..=last].windows(2).enumerate() {
-                    let range = ends[0]..ends[1];
-                    for (j, b) in columns[range.clone()].iter().zip(&entries[range]) {
-                        set(node, *j, *b);
-                    }
+            Design::Sparse(rows) => {
+                let last = (first + TILE_NODES).min(rows.len());
+                for (node, i) in (first..last).enumerate() {
+                    rows.row(i).for_each(|(j, b)| set(node, j, b));
                 }
             }
         }

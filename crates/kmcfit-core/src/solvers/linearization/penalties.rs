@@ -39,7 +39,7 @@ pub(in crate::solvers) fn add_variations(
 ) {
     for variation in &problem.variations {
         let range = problem.functions.ranges()[variation.function].clone();
-        let changes = variation.changes(&parameters[range.clone()], variation.count());
+        let changes = variation.changes(&parameters[range.clone()]);
         for (i, change) in changes.iter().enumerate() {
             let row = variation.rows.row(i).map(|(j, a)| (range.start + j, a));
             sub.absolute.push(row, -change);

@@ -1,15 +1,13 @@
 //! Refits of both models to simulated readings, by their linearisation.
 
 use super::reduced::Reduced;
+use crate::identifiability::Factorisation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::solvers::{add_penalties, add_priors, weighted_jacobian};
 use crate::study::simulate::{normal, sigmas, stream};
 use nalgebra::{DMatrix, DVector};
-
-/// Singular values below this share of the largest are directions that nothing sees.
-const UNSEEN: f64 = 1e-10;
 
 /// Both models, linearised at the constant optimum.
 pub struct Linearised {
@@ -78,11 +76,7 @@ fn span(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
             column /= size;
         }
     }
-    let svd = matrix.svd(true, false);
-    let most = svd.singular_values.max();
-    let seen: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|i| svd.singular_values[*i] > UNSEEN * most)
-        .collect();
-    let u = svd.u.expect("asked for");
-    u.select_columns(&seen)
+    // The right singular vectors of the transpose are the left ones.
+    let factorisation = Factorisation::of(&matrix.transpose());
+    factorisation.determined().into_owned()
 }

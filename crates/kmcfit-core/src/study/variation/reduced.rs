@@ -1,9 +1,8 @@
 //! The problem with one function constant.
 
 use crate::constraints::{Constraints, RowGroup, Rows};
-use crate::functions::{CoefficientFunction, Design, Parameterization, Penalty};
+use crate::functions::{CoefficientFunction, Parameterization, Penalty};
 use crate::problem::Problem;
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
 /// The problem with one function constant, and how its parameters become those of the whole one.
 pub struct Reduced {
@@ -121,14 +120,13 @@ impl Reduced {
         if penalty.order > 0 {
             return None;
         }
-        let rows = penalty.target.len();
-        let column = penalty.rows.multiply(&self.one, rows);
-        let mut matrix = CooMatrix::new(rows, 1);
-        for (i, a) in column.into_iter().enumerate() {
-            matrix.push(i, 0, a);
+        let mut rows = Rows::of_width(1);
+        let column = penalty.rows.multiply(&self.one);
+        for (a, target) in column.into_iter().zip(penalty.rows.right()) {
+            rows.push([(0, a)], *target);
         }
         Some(Penalty {
-            rows: Design::Sparse(CsrMatrix::from(&matrix)),
+            rows,
             ..penalty.clone()
         })
     }

@@ -3,8 +3,7 @@
 //! What is wanted of them is which is lowest, and its motion, with the bits that it would have by itself
 //! ([`forward`](crate::simulate::reference::forward())). So no motion is kept: of each eight states along the record are, from
 //! which the lowest one's is made again, eight parts at once ([`reconstruct()`]). The costs are sums in another order than that of
-//! the integral, of motions in which one quotient in `2^50` may have another last bit; those who may have the lowest cost are
-//! told from all others by a margin far above both.
+//! the integral; those who may have the lowest cost are told from all others by a margin far above its rounding.
 
 mod reconstruct;
 mod rows;
@@ -37,8 +36,7 @@ pub(crate) struct SearchRay<'a> {
 pub(crate) const ROWS: usize = 4;
 
 /// How far a cost that is summed in lanes, relative to itself, may be from the one that is summed in order. Of `n` terms
-/// that are not negative two sums are within `n EPSILON`, which is less up to 10^5 nodes (and is taken beyond). The rest is
-/// for the last bit of a quotient, which may grow on the way: one in `2^50` has another one.
+/// that are not negative two sums are within `n EPSILON`, which is less up to 10^5 nodes (and is taken beyond).
 const MARGIN: f64 = 1e-10;
 
 /// In which rows and lanes the trials at some lengths are.
@@ -53,7 +51,7 @@ pub(crate) struct LaneLayout {
 }
 
 impl LaneLayout {
-    /// That of the devices at `lengths`, which fall. The ray [`is_moderate`](Ray::is_moderate) as far as the longest of them.
+    /// That of the devices at `lengths`, which fall.
     pub fn new(ray: SearchRay, lengths: &[f64]) -> Self {
         let without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[without_mass..];
@@ -174,22 +172,11 @@ impl SearchRay<'_> {
     /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
     /// after rounding.
     fn first_with_mass(self, lengths: &[f64]) -> usize {
-        let has_mass = |a: &f64| self.masses(*a, |m| m > 0.0);
+        // All are looked at: a loop without a way out is the faster one.
+        let has_mass = |a: &f64| {
+            let pairs = self.functions[0].iter().zip(self.direction[0]);
+            pairs.fold(true, |so_far, (p, g)| so_far & (p - a * g > 0.0))
+        };
         lengths.iter().position(has_mass).unwrap_or(lengths.len())
-    }
-
-    /// Whether the masses of all devices as far as `longest` are so moderate, where they are positive, that
-    /// [`Eight::quotients`] divides by them as it says. A positive difference is no smaller than the
-    /// last place of what it is taken from.
-    pub fn is_moderate(self, longest: f64) -> bool {
-        const LIGHT: f64 = 1e-70;
-        const HEAVY: f64 = 1e70;
-        self.masses(0.0, |m| LIGHT < m && m < HEAVY) && self.masses(longest, |m| m < HEAVY)
-    }
-
-    /// Whether all masses at `a` are as they should be. All are looked at: a loop without a way out is the faster one.
-    fn masses(self, a: f64, are: impl Fn(f64) -> bool) -> bool {
-        let pairs = self.functions[0].iter().zip(self.direction[0]);
-        pairs.fold(true, |so_far, (p, g)| so_far & are(p - a * g))
     }
 }

@@ -91,7 +91,7 @@ impl Kernel for Replay<'_> {
                 for (value, ahead) in right.0.iter_mut().zip(&ahead) {
                     *value = Eight::load(arithmetic, &ahead[j]);
                 }
-                state = steps.step::<true>([left, right], state);
+                state = steps.step([left, right], state);
                 left = right;
             }
             if part - first < LANES {

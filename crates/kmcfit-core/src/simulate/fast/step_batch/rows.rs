@@ -41,16 +41,11 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
-    /// `-y'' = k y/m + c v/m`, by divisions or by as few of them as there can be ([`Eight::quotients`]). Of both signs
-    /// all that follows has the same bits, but for the sign of a velocity of zero.
+    /// `-y'' = k y/m + c v/m`. Of both signs all that follows has the same bits, but for the sign of a velocity of zero.
     #[inline(always)]
-    fn deceleration<const DIVIDED: bool>(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
+    fn deceleration(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
         let [m, c, k] = self.0;
-        if DIVIDED {
-            return k * y / m + c * v / m;
-        }
-        let [elastic, viscous] = Eight::quotients(k * y, c * v, m);
-        elastic + viscous
+        k * y / m + c * v / m
     }
 }
 
@@ -71,19 +66,14 @@ impl<A: Arithmetic> Steps<A> {
         }
     }
 
-    /// One step of the midpoint rule, whose acceleration at its left node is `DIVIDED` or not; that in its middle always is:
-    /// with one of each, divider and multipliers are busy side by side.
+    /// One step of the midpoint rule.
     #[inline(always)]
-    pub fn step<const DIVIDED: bool>(
-        self,
-        [left, right]: [Values<A>; 2],
-        [y, v]: [Eight<A>; 2],
-    ) -> [Eight<A>; 2] {
+    pub fn step(self, [left, right]: [Values<A>; 2], [y, v]: [Eight<A>; 2]) -> [Eight<A>; 2] {
         let Self { dt, half_dt } = self;
-        let d = left.deceleration::<DIVIDED>(y, v);
+        let d = left.deceleration(y, v);
         let (y_half, v_half) = (y + half_dt * v, v - half_dt * d);
         let middle = left.twice_middle(right);
-        let d_half = middle.deceleration::<true>(y_half, v_half);
+        let d_half = middle.deceleration(y_half, v_half);
         [y + dt * v_half, v - dt * d_half]
     }
 }
@@ -121,7 +111,7 @@ impl<A: Arithmetic> Devices<A> {
         self.sum += residual * residual;
         let length = Eight::load(self.arithmetic, &self.length);
         let right = Values::at(ray, self.arithmetic, length, i + 1);
-        self.state = steps.step::<false>([self.left, right], self.state);
+        self.state = steps.step([self.left, right], self.state);
         self.left = right;
     }
 

@@ -92,12 +92,8 @@ fn move_to(
 
 /// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
 /// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
-/// any other, and where the masses are not moderate.
-pub(super) fn ray<'a>(
-    problem: &'a Problem,
-    point: &'a Iterate,
-    lengths: &[f64],
-) -> Option<SearchRay<'a>> {
+/// any other.
+pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
     let oscillator = &problem.oscillator;
     let nodes = experiment.nodes;
@@ -112,14 +108,13 @@ pub(super) fn ray<'a>(
         let (damping, stiffness) = others.split_at(nodes);
         [mass, damping, stiffness]
     };
-    let ray = fits.then(|| SearchRay {
+    fits.then(|| SearchRay {
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,
         readings: channel.observed(),
         step: oscillator.grid.step(),
-    });
-    ray.filter(|ray| ray.is_moderate(lengths[0]))
+    })
 }
 
 #[cfg(test)]

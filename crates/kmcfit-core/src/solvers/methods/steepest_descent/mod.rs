@@ -35,7 +35,7 @@ struct Best {
 impl StepRule for SteepestDescent {
     fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let lengths = lengths(point);
-        let best = match batched_trials::ray(work.problem(), point, &lengths) {
+        let best = match batched_trials::ray(work.problem(), point) {
             Some(ray) => (self.batched).lowest(work, point, ray, &lengths, &mut self.spare),
             None => self.one_by_one(work, point, &lengths),
         };

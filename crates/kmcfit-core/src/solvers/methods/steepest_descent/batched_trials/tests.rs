@@ -56,7 +56,7 @@ fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     for _ in 0..steps {
         let point = points.last().expect("a point");
         let lengths = lengths(point);
-        let ray = ray(problem, point, &lengths).expect("the paper's problem");
+        let ray = ray(problem, point).expect("the paper's problem");
         let best = batched.lowest(&mut work, point, ray, &lengths, &mut spare);
         let best = best.expect("a lower cost");
         points.push(work.complete(best.parameters, best.evaluation));

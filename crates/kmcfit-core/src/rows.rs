@@ -1,8 +1,12 @@
-//! Sparse rows with a right-hand side, built one after the other.
+//! Sparse rows with a right-hand side, built one after the other: design matrices, penalties, constraints, subproblems.
+
+use crate::simd::sum::largest;
+use nalgebra::DMatrix;
 
 /// Rows `a_i^T z` with right-hand sides `b_i`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rows {
+    width: usize,
     starts: Vec<usize>,
     columns: Vec<usize>,
     values: Vec<f64>,
@@ -12,7 +16,13 @@ pub struct Rows {
 impl Rows {
     /// No rows.
     pub fn new() -> Self {
+        Self::of_width(0)
+    }
+
+    /// No rows yet, of at least so many columns.
+    pub fn of_width(width: usize) -> Self {
         Self {
+            width,
             starts: vec![0],
             ..Self::default()
         }
@@ -27,6 +37,7 @@ impl Rows {
         // Rows usually come with rising columns; only others have to be searched.
         let mut highest = None;
         for (column, value) in entries {
+            self.width = self.width.max(column + 1);
             let known = if highest.is_none_or(|h| column > h) {
                 highest = Some(column);
                 None
@@ -58,9 +69,9 @@ impl Rows {
         self.right.len()
     }
 
-    /// One more than the largest column of an entry.
+    /// Number of columns: as many as were stated, or one more than the largest column of an entry.
     pub fn width(&self) -> usize {
-        self.columns.iter().max().map_or(0, |j| j + 1)
+        self.width
     }
 
     /// Whether there are no rows.
@@ -85,11 +96,97 @@ impl Rows {
         self.right.fill(0.0);
     }
 
+    /// Sets all right-hand sides.
+    ///
+    /// # Panics
+    /// If there is not one for each row.
+    pub fn set_right(&mut self, right: Vec<f64>) {
+        assert_eq!(right.len(), self.len(), "one right-hand side per row");
+        self.right = right;
+    }
+
     /// `a_i^T z` for all rows.
     pub fn multiply(&self, z: &[f64]) -> Vec<f64> {
-        (0..self.len())
-            .map(|i| self.row(i).map(|(j, a)| a * z[j]).sum())
-            .collect()
+        let mut values = vec![0.0; self.len()];
+        self.multiply_add(z, &mut values);
+        values
+    }
+
+    /// Adds `a_i^T z` to the values, of which there may be fewer than rows.
+    pub fn multiply_add(&self, z: &[f64], values: &mut [f64]) {
+        if self.is_column() {
+            let pairs = values.iter_mut().zip(&self.values);
+            pairs.for_each(|(value, a)| *value += a * z[0]);
+            return;
+        }
+        self.each_product(z, values.len(), |i, product| values[i] += product);
+    }
+
+    /// Adds `sum_i y_i a_i` to `out`.
+    pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
+        if self.is_column() {
+            let pairs = self.values.iter().zip(y);
+            out[0] = pairs.fold(out[0], |sum, (a, y)| sum + a * y);
+            return;
+        }
+        for (i, y) in (0..self.len()).zip(y) {
+            self.row(i).for_each(|(j, a)| out[j] += a * y);
+        }
+    }
+
+    /// Largest size of `a_i^T z`.
+    pub fn largest(&self, z: &[f64]) -> f64 {
+        if self.is_column() {
+            // Rounding keeps the order of sizes.
+            return (largest(&self.values) * z[0]).abs();
+        }
+        // Some side by side: one maximum would wait for itself.
+        let mut most = [0.0f64; 4];
+        self.each_product(z, self.len(), |i, product| {
+            most[i % 4] = most[i % 4].max(product.abs());
+        });
+        largest(&most)
+    }
+
+    /// Whether there is one column, with the same entry in every row.
+    pub fn is_constant(&self) -> bool {
+        self.is_column() && self.values.windows(2).all(|pair| pair[0] == pair[1])
+    }
+
+    /// Whether there is one column, without gaps: its values are all there is to it.
+    fn is_column(&self) -> bool {
+        self.width == 1 && !self.is_empty() && self.entries() == self.len()
+    }
+
+    /// Gives `act` the number of each of the first `count` rows and its product with `z`.
+    #[inline(always)]
+    fn each_product(&self, z: &[f64], count: usize, mut act: impl FnMut(usize, f64)) {
+        for (i, ends) in self.starts.windows(2).take(count).enumerate() {
+            let range = ends[0]..ends[1];
+            let product = match (&self.columns[range.clone()], &self.values[range]) {
+                // As on knots: no loop.
+                (&[j, k], &[a, b]) => a * z[j] + b * z[k],
+                (columns, values) => {
+                    let pairs = columns.iter().zip(values);
+                    pairs.map(|(&j, a)| a * z[j]).sum()
+                }
+            };
+            act(i, product);
+        }
+    }
+
+    /// Starts of the rows and one past the last, columns and values.
+    pub(crate) fn compressed(&self) -> (&[usize], &[usize], &[f64]) {
+        (&self.starts, &self.columns, &self.values)
+    }
+
+    /// The rows as a matrix.
+    pub fn dense(&self) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.len(), self.width);
+        for i in 0..self.len() {
+            self.row(i).for_each(|(j, a)| out[(i, j)] += a);
+        }
+        out
     }
 
     /// Multiplies every column by its factor.
