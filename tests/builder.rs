@@ -272,11 +272,11 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one().tikhonov(3, 1.0)),
-            "functions.mass.smooth[0].order: this derivative cannot be penalised\n  found: 3",
+            "functions.mass.penalty[0].order: this derivative cannot be penalised\n  found: 3",
         ),
         (
             mass(one().total_variation(-1.0)),
-            "functions.mass.variation.weight: a weight cannot be negative\n  found: -1",
+            "functions.mass.penalty[0].weight: a weight cannot be negative\n  found: -1",
         ),
         (
             mass(one()).coulomb_friction(CoefficientSpec::constant(1.0), 0.0),

@@ -586,7 +586,7 @@ fn model_files() {
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
     assert_snapshot!(said(&model(period, "{method: gauss-newton}")), @"
-    m.yaml:8:66: functions.stiffness.smooth.weight: the rule `period` is a rule of the method `equation-error` alone
+    m.yaml:8:83: functions.stiffness.penalty.weight: the rule `period` is a rule of the method `equation-error` alone
       found: `gauss-newton`
       expected: `l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`
     ");
@@ -595,12 +595,12 @@ fn model_files() {
         said(&model(smooth, &format!("{{method: equation-error{more}}}")))
     };
     assert_snapshot!(equation_error("{kind: tikhonov, order: 0, weight: period}", ""), @"
-    m.yaml:8:55: functions.stiffness.smooth.order: the rule `period` is about a derivative
+    m.yaml:8:72: functions.stiffness.penalty.order: the rule `period` is about a derivative
       found: 0
       expected: order 1 or 2, or a number for the weight
     ");
     assert_snapshot!(equation_error("{kind: tikhonov, order: 1, weight: gcv}", ""), @"
-    m.yaml:8:66: functions.stiffness.smooth.weight: the method `equation-error` knows no search for the weight
+    m.yaml:8:83: functions.stiffness.penalty.weight: the method `equation-error` knows no search for the weight
       found: `gcv`
       expected: `period`, which follows from the motion, or a number
     ");

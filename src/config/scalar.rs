@@ -37,12 +37,6 @@ impl Value for Format {
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Number(pub f64);
 
-impl From<Number> for f64 {
-    fn from(number: Number) -> f64 {
-        number.0
-    }
-}
-
 impl Value for Number {
     const KIND: Kind = Kind::Number;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
@@ -61,12 +55,6 @@ impl Value for Number {
 /// A number of things: an integer, 0 or more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Count(pub usize);
-
-impl From<Count> for usize {
-    fn from(count: Count) -> usize {
-        count.0
-    }
-}
 
 impl Value for Count {
     const KIND: Kind = Kind::Count;

@@ -28,7 +28,7 @@ const PER_NODE: u64 = 600;
 /// ```no_run
 /// use kmcfit::Run;
 /// let run = Run::open("runs/paper")?;
-/// println!("{}: J = {:e}", run.document.outcome.status, run.document.cost.r#final);
+/// println!("{}: J = {:e}", run.document.outcome.status.name(), run.document.cost.r#final);
 /// let mass = &run.device.mass;                            // kg, one value per node
 /// for (t, m) in run.oscillator.grid.times().iter().zip(mass) {
 ///     println!("{t} s: {m} kg");

@@ -1,4 +1,4 @@
-//! The story of the README in one command: what the paper's fit does not find, what positivity alone
+//! The sequence of the README in one command: what the paper's fit does not find, what positivity alone
 //! does not find either, and what is known that brings the true device back.
 
 use crate::workbench::Workbench;

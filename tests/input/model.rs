@@ -76,7 +76,7 @@ fn every_key_is_read() {
     let grid = spec.grid.unwrap();
     assert_eq!(grid.nodes, Some(Nodes::Count(Count(2000))));
     assert_eq!(grid.method, Some(StepMethod::Midpoint));
-    assert_eq!(grid.duration.map(f64::from), Some(25.0));
+    assert_eq!(grid.duration.map(|n| n.0), Some(25.0));
 
     let functions = spec.functions;
     assert_eq!(functions.mass.basis, Some(Basis::Nodal));
@@ -96,7 +96,7 @@ fn every_key_is_read() {
     let fit = spec.fit.unwrap();
     assert_eq!(fit.method, Some(FitMethod::Lbfgs));
     assert_eq!(fit.gradient, Some(Gradient::Continuous));
-    assert_eq!(fit.memory.map(usize::from), Some(10));
+    assert_eq!(fit.memory.map(|n| n.0), Some(10));
     let stop = fit.stop.unwrap();
     assert_eq!(stop.iterations, Some(Count(1000)));
     assert_eq!(stop.cost_ratio, Some(Number(1e-4)));

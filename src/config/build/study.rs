@@ -122,39 +122,7 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         SAME,
         |x| x > 0.0,
     )?;
-    if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
-        return Err(file
-            .error_at("study.misfit_limit", "the largest J must be positive")
-            .found(level.0)
-            .expected("a number greater than 0, in the unit of J"));
-    }
-    let limits = [
-        ("starts", spec.starts, 1, MOST_STARTS),
-        (
-            "bootstrap",
-            spec.bootstrap,
-            FEWEST_REPLICATES,
-            MOST_REPLICATES,
-        ),
-    ];
-    for (name, given, fewest, most) in limits {
-        if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
-            return Err(file
-                .error_at(&format!("study.{name}"), "this number cannot be used")
-                .found(count.0)
-                .expected(format!("{fewest} to {most}, or no `{name}`")));
-        }
-    }
-    if spec
-        .extremes
-        .as_ref()
-        .is_some_and(|tubes| tubes.values().is_empty())
-    {
-        return Err(file
-            .error_at("study.extremes", "there is no time")
-            .found("an empty list")
-            .expected("times in s, or no `extremes` for five over the record"));
-    }
+    check(file, spec)?;
     let profiles = spec.profiles.iter().flatten().enumerate();
     let profiles = profiles
         .map(|(i, spec)| target(file, problem, &format!("study.profiles[{i}]"), spec))
@@ -190,6 +158,44 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         candidates,
         limit: None,
     })
+}
+
+/// Refuses a limit, counts and times that cannot be used.
+fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
+    if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
+        return Err(file
+            .error_at("study.misfit_limit", "the largest J must be positive")
+            .found(level.0)
+            .expected("a number greater than 0, in the unit of J"));
+    }
+    let limits = [
+        ("starts", spec.starts, 1, MOST_STARTS),
+        (
+            "bootstrap",
+            spec.bootstrap,
+            FEWEST_REPLICATES,
+            MOST_REPLICATES,
+        ),
+    ];
+    for (name, given, fewest, most) in limits {
+        if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
+            return Err(file
+                .error_at(&format!("study.{name}"), "this number cannot be used")
+                .found(count.0)
+                .expected(format!("{fewest} to {most}, or no `{name}`")));
+        }
+    }
+    if spec
+        .extremes
+        .as_ref()
+        .is_some_and(|tubes| tubes.values().is_empty())
+    {
+        return Err(file
+            .error_at("study.extremes", "there is no time")
+            .found("an empty list")
+            .expected("times in s, or no `extremes` for five over the record"));
+    }
+    Ok(())
 }
 
 fn equivalent(

@@ -1,7 +1,8 @@
 //! Constraints of a builder: rows of its statements, and a start inside them.
 
+use super::assembly::Slot;
 use super::coefficient::uncrossed;
-use super::{BuildError, BuildNotice, Builder, Contradiction, Slot};
+use super::{BuildError, BuildNotice, Builder, Contradiction};
 use crate::constraints::{Constraints, Impossible, Limit, Shape, Statement, TOLERANCE};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
