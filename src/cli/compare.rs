@@ -227,7 +227,7 @@ fn show(comparison: &Comparison, sequence: Option<&Sequence>, interrupted: bool,
     print(&format!("{}\n\n", sequence.title));
     match interrupted {
         true => {
-            print("interrupted: the sequence is not complete, so nothing is concluded from it\n")
+            print("interrupted: the sequence is not complete, so nothing is concluded from it\n");
         }
         false => comparison
             .conclusions()

@@ -88,29 +88,58 @@ impl Problem {
 /// The sums over the nodes of `y''^2` and of `phi^2` of each term.
 fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     let (y, v) = (&motion.displacement, &motion.velocity);
-    let inertia = sum_of_squares(y.len(), |i| curvature_at(y, step, i));
+    let nodes = y.len();
+    if nodes <= LONG_RECORD_STEPS {
+        return squares_in_order(motion, terms, step);
+    }
+    let inertia = sum_of_squares(nodes, |i| curvature_at(y, step, i));
     let of = |term: &Term| match term {
-        Term::Damping => sum_of_squares(v.len(), |i| v[i]),
-        Term::Stiffness => sum_of_squares(y.len(), |i| y[i]),
-        _ => sum_of_squares(y.len(), |i| term.phi(y[i], v[i])),
+        Term::Damping => sum_of_squares(nodes, |i| v[i]),
+        Term::Stiffness => sum_of_squares(nodes, |i| y[i]),
+        _ => sum_of_squares(nodes, |i| term.phi(y[i], v[i])),
     };
-    std::iter::once(inertia)
-        .chain(terms.iter().map(of))
-        .collect()
+    let terms = terms.iter().map(of);
+    std::iter::once(inertia).chain(terms).collect()
 }
 
-/// Sum of the squares of `count` values, of many in eight sums side by side. Descents along the gradient alone depend on
-/// every bit: few are added in order.
+/// [`squares`] of a short record: descents along the gradient alone depend on every bit, so all are added in order, those of
+/// four columns side by side, as each sum waits for itself.
+fn squares_in_order(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    const PART: usize = 256;
+    let (y, v) = (&motion.displacement, &motion.velocity);
+    let mut sums = vec![0.0; terms.len() + 1];
+    let mut part = [[0.0; PART]; 4];
+    for (first, sums) in (0..).step_by(4).zip(sums.chunks_mut(4)) {
+        let mut four = [0.0; 4];
+        for from in (0..y.len()).step_by(PART) {
+            let nodes = from..y.len().min(from + PART);
+            for (column, values) in (first..=terms.len()).zip(&mut part) {
+                let values = &mut values[..nodes.len()];
+                let each = values.iter_mut().zip(nodes.clone());
+                match column.checked_sub(1).map(|j| &terms[j]) {
+                    None => each.for_each(|(x, i)| *x = curvature_at(y, step, i)),
+                    Some(Term::Damping) => values.copy_from_slice(&v[nodes.clone()]),
+                    Some(Term::Stiffness) => values.copy_from_slice(&y[nodes.clone()]),
+                    Some(term) => each.for_each(|(x, i)| *x = term.phi(y[i], v[i])),
+                }
+            }
+            for i in 0..nodes.len() {
+                for (sum, values) in four.iter_mut().zip(&part) {
+                    *sum += values[i] * values[i];
+                }
+            }
+        }
+        sums.copy_from_slice(&four[..sums.len()]);
+    }
+    sums
+}
+
+/// Sum of the squares of `count` values, in eight sums side by side.
 fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
-    let lane = if count > LONG_RECORD_STEPS {
-        LANES - 1
-    } else {
-        0
-    };
     let mut sums = [0.0; LANES];
     for i in 0..count {
         let x = value(i);
-        sums[i & lane] += x * x;
+        sums[i % LANES] += x * x;
     }
     sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
