@@ -134,7 +134,7 @@ mod tests {
     fn what_is_quoted_is_code() {
         assert_eq!(
             prose("add a `penalty`; a<b"),
-            "add <code>penalty</code>; a&lt;b"
+            "add a <code>penalty</code>; a&lt;b"
         );
         assert_eq!(prose("a ` by itself"), "a ` by itself");
     }
