@@ -12,7 +12,7 @@ pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = run.oscillator.forward(&run.device, let_go, None)?;
+    let motion = run.system.forward(&run.device, let_go, None)?;
     let most = motion
         .displacement
         .iter()

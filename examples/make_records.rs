@@ -51,7 +51,7 @@ impl Run<'_> {
             mass: vec![self.mass; nodes],
             coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
         };
-        let oscillator = System {
+        let system = System {
             grid,
             method: Method::Rk4,
             terms: self.terms.iter().map(|(term, _)| *term).collect(),
@@ -67,7 +67,7 @@ impl Run<'_> {
             force: self.force.map(steps),
             base: self.base.map(steps),
         };
-        let motion: Trajectory = oscillator
+        let motion: Trajectory = system
             .forward(&device, self.initial, Some(&excitation))
             .expect("a motion");
         let readings = 0..self.count;
@@ -79,16 +79,7 @@ impl Run<'_> {
             let place = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
-            reference::observe(
-                &oscillator,
-                kind,
-                &device,
-                excitation,
-                &motion,
-                place,
-                around,
-            )
-            .value
+            reference::observe(&system, kind, &device, excitation, &motion, place, around).value
         });
         let acceleration = acceleration.collect();
         (

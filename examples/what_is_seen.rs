@@ -10,7 +10,7 @@ use std::error::Error;
 pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     // Any motion will do: what can be counted depends on the records, not on what they read.
     let grid = Grid::new(0.0, 20.0, 401).ok_or("a grid")?;
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -27,8 +27,8 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let decay = oscillator.forward(&device, plucked, None)?;
-    let shaken = oscillator.forward(&device, State::default(), Some(&excitation))?;
+    let decay = system.forward(&device, plucked, None)?;
+    let shaken = system.forward(&device, State::default(), Some(&excitation))?;
 
     let free = Record::new("free decay")
         .from_state(1.0, 0.0)

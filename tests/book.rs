@@ -83,9 +83,9 @@ functions:
     let model = build(&file, Purpose::Fit).expect("a problem");
     assert_eq!(model.title, "bare");
     assert_eq!(model.problem.experiments[0].name, "experiment 1");
-    assert_eq!(model.problem.oscillator.grid.nodes(), 2000);
-    assert_eq!(model.problem.oscillator.grid.duration(), 25.0);
-    assert_eq!(model.problem.oscillator.method, Method::Rk4);
+    assert_eq!(model.problem.system.grid.nodes(), 2000);
+    assert_eq!(model.problem.system.grid.duration(), 25.0);
+    assert_eq!(model.problem.system.method, Method::Rk4);
     assert_eq!(model.settings.solver, Solver::GaussNewton);
     assert_eq!(model.settings.gradient, GradientKind::Discrete);
     let stopping = Stopping {

@@ -38,7 +38,7 @@ const METHODS: [&str; 6] = [
 /// A forced record of all channels.
 fn readings() -> String {
     let grid = Grid::new(0.0, 9.0, NODES).unwrap();
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -53,9 +53,7 @@ fn readings() -> String {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = oscillator
-        .forward(&device, start, Some(&excitation))
-        .unwrap();
+    let motion = system.forward(&device, start, Some(&excitation)).unwrap();
     let mut csv = String::from("t_s,f_N,displacement,velocity,acceleration\n");
     for (i, f) in force.iter().enumerate() {
         let (y, v) = (motion.displacement[i], motion.velocity[i]);

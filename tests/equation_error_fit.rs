@@ -46,7 +46,7 @@ const NODES: usize = 6001;
 const WAVES: usize = 200;
 
 /// A minute at 100 readings per s.
-fn oscillator() -> System {
+fn system() -> System {
     System {
         grid: Grid::new(0.0, 60.0, NODES).unwrap(),
         method: Method::Rk4,
@@ -75,16 +75,16 @@ fn random_function(grid: &Grid, seed: u64) -> StageSamples {
 
 /// What a sensor of `kind` reads at every node of a device at rest in the beginning.
 fn readings(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: &Excitation,
     kind: ChannelKind,
 ) -> Channel {
-    let grid = &oscillator.grid;
+    let grid = &system.grid;
     let excitation = Some(excitation);
-    let motion = oscillator.forward(device, REST, excitation).unwrap();
+    let motion = system.forward(device, REST, excitation).unwrap();
     let view = SimulatedRecord {
-        oscillator,
+        system,
         device,
         excitation,
         motion: &motion,
@@ -103,14 +103,10 @@ fn channel(kind: ChannelKind, grid: &Grid, values: Vec<f64>) -> Channel {
 
 /// One experiment, mass first among the functions, with the rule `period` of order 1 for those that
 /// are nodal.
-fn problem_of(
-    oscillator: System,
-    list: Vec<CoefficientFunction>,
-    experiment: Experiment,
-) -> Problem {
-    let grid = oscillator.grid;
+fn problem_of(system: System, list: Vec<CoefficientFunction>, experiment: Experiment) -> Problem {
+    let grid = system.grid;
     let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
-    let mut problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
+    let mut problem = Problem::new(system, functions, vec![experiment]).unwrap();
     let measurements = Measurements::of(&problem).unwrap();
     let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();
     for (j, basis) in bases.iter().enumerate() {
@@ -144,9 +140,9 @@ fn free_at_nodes(nodes: usize) -> Vec<CoefficientFunction> {
 /// A device of 2 Hz whose stiffness goes up and down by a quarter four times, shaken by a force that
 /// nobody tells the fit, its acceleration, and its stiffness.
 fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
-    let oscillator = oscillator();
+    let system = system();
     let base = (TAU * 2.0_f64).powi(2);
-    let k: Vec<f64> = (oscillator.grid.times().iter())
+    let k: Vec<f64> = (system.grid.times().iter())
         .map(|t| base * (1.0 + 0.25 * (TAU * t / 15.0).sin()))
         .collect();
     let device = NodalCoefficients {
@@ -154,12 +150,12 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
         coefficients: vec![vec![0.005 * 2.0 * base.sqrt(); NODES], k.clone()],
     };
     let excitation = Excitation {
-        force: Some(random_function(&oscillator.grid, seed)),
+        force: Some(random_function(&system.grid, seed)),
         base: None,
     };
-    let channel = readings(&oscillator, &device, &excitation, ChannelKind::Acceleration);
+    let channel = readings(&system, &device, &excitation, ChannelKind::Acceleration);
     let experiment = Experiment::free("shaken", REST, NODES).with_channel(channel);
-    (problem_of(oscillator, list, experiment), k)
+    (problem_of(system, list, experiment), k)
 }
 
 /// The unknown force stands in the equation as an error of its own: with a damping ratio of 0.5 % it
@@ -209,16 +205,16 @@ fn close(found: &[f64], expected: &[f64], within: f64) {
 
 /// m = 2, c = 1.5, k = 300 under a known force or base.
 fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Problem {
-    let oscillator = oscillator();
+    let system = system();
     let device = NodalCoefficients {
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
-    let channel = readings(&oscillator, &device, &excitation, kind);
+    let channel = readings(&system, &device, &excitation, kind);
     let experiment = Experiment::free("driven", REST, NODES)
         .with_excitation(excitation)
         .with_channel(channel);
-    problem_of(oscillator, constants(mass), experiment)
+    problem_of(system, constants(mass), experiment)
 }
 
 /// The relations between the readings are of order 4: at 8 Hz and 100 readings per s they are true to
@@ -228,7 +224,7 @@ fn constants_under_a_known_force() {
     for kind in [ChannelKind::Acceleration, ChannelKind::Displacement] {
         for seed in 1..=3 {
             let excitation = Excitation {
-                force: Some(random_function(&oscillator().grid, seed)),
+                force: Some(random_function(&system().grid, seed)),
                 base: None,
             };
             let found = run(&driven(kind, excitation, None));
@@ -249,7 +245,7 @@ fn constants_on_a_known_base() {
     for mass in [Some(2.0), None] {
         let excitation = Excitation {
             force: None,
-            base: Some(random_function(&oscillator().grid, 4)),
+            base: Some(random_function(&system().grid, 4)),
         };
         let found = run(&driven(ChannelKind::Acceleration, excitation, mass));
         let expected: &[f64] = match mass {
@@ -360,7 +356,7 @@ fn the_parts_of_a_fit_belong_together() {
     assert_eq!(predicted.len(), channel.len());
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
     assert_eq!((residuals[0], residuals[NODES - 1]), (0.0, 0.0));
-    let step = problem.oscillator.grid.step();
+    let step = problem.system.grid.step();
     let squares: f64 = residuals.iter().map(|r| step * r * r).sum();
     assert!((squares / evaluation.misfit - 1.0).abs() < 1e-9);
 
@@ -381,7 +377,7 @@ fn the_parts_of_a_fit_belong_together() {
 /// Bounds that are met cost a quadratic program; soft ones are part of the same problem.
 #[test]
 fn constraints_and_soft_constraints() {
-    let grid = oscillator().grid;
+    let grid = system().grid;
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 41),
     };
@@ -481,14 +477,11 @@ fn bounds_on_functions_of_unlike_size() {
 #[test]
 fn readings_without_a_motion() {
     let grid = Grid::new(0.0, 1.0, 21).unwrap();
-    let oscillator = System {
-        grid,
-        ..oscillator()
-    };
+    let system = System { grid, ..system() };
     let still = channel(ChannelKind::Acceleration, &grid, vec![1.0; 21]);
     let experiment = Experiment::free("still", REST, 21).with_channel(still);
     let functions = Parameterization::new(free_at_nodes(21), 21, grid.step()).unwrap();
-    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
+    let problem = Problem::new(system, functions, vec![experiment]).unwrap();
     let found = run(&problem);
     assert_eq!(found.outcome.status, Status::Failed);
     assert_snapshot!(found.outcome.reason.to_string(), @"still: the acceleration is too short or does not oscillate");
@@ -503,26 +496,26 @@ fn readings_without_a_motion() {
     );
     offset = offset
         .with(|parts| {
-            parts.oscillator.terms[0] = Term::CubicStiffness;
+            parts.system.terms[0] = Term::CubicStiffness;
         })
         .unwrap();
     let remarks = Measurements::of(&offset).unwrap().remarks(&offset);
     assert_snapshot!(remarks[0], @"shaken: the acceleration is integrated above 1.015 Hz alone, so forces that are not proportional to the motion are seen with an error, and a constant offset is not seen");
     let excitation = Excitation {
-        force: Some(random_function(&self::oscillator().grid, 1)),
+        force: Some(random_function(&self::system().grid, 1)),
         base: None,
     };
-    let oscillator = self::oscillator();
+    let system = self::system();
     let device = NodalCoefficients {
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
-    let channel = readings(&oscillator, &device, &excitation, ChannelKind::Velocity);
+    let channel = readings(&system, &device, &excitation, ChannelKind::Velocity);
     let experiment = Experiment::free("driven", REST, NODES)
         .with_excitation(excitation)
         .with_channel(channel);
-    let functions = Parameterization::new(constants(None), NODES, oscillator.grid.step()).unwrap();
-    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
+    let functions = Parameterization::new(constants(None), NODES, system.grid.step()).unwrap();
+    let problem = Problem::new(system, functions, vec![experiment]).unwrap();
     assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations");
 }
 
@@ -640,11 +633,11 @@ fn the_cost_is_the_integral_of_the_squared_error() {
     let duration = 20.0;
     for stride in [1, 4] {
         let nodes = 100 * stride + 1;
-        let oscillator = System {
+        let system = System {
             grid: Grid::new(0.0, duration, nodes).unwrap(),
-            ..oscillator()
+            ..system()
         };
-        let grid = oscillator.grid;
+        let grid = system.grid;
         let spacing = duration / 100.0;
         let observed: Vec<f64> = (0..=100).map(|i| (spacing * f64::from(i)).cos()).collect();
         let weighting = Weighting::Integral { spacing };
@@ -659,7 +652,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
             CoefficientFunction::constant(CoefficientKind::Stiffness, 1.5, nodes),
         ];
         let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
-        let found = run(&problem_of(oscillator, list, experiment));
+        let found = run(&problem_of(system, list, experiment));
         // Each time stands for one spacing about it.
         let (from, to) = (1.5 * spacing, duration - 1.5 * spacing);
         let integral = |t: f64| 0.25 * (0.5 * t + 0.25 * (2.0 * t).sin());
@@ -693,12 +686,12 @@ fn left_out(problem: &Problem) -> [usize; 2] {
 #[test]
 fn two_periods_are_left_out_beside_a_known_force() {
     let excitation = Excitation {
-        force: Some(random_function(&oscillator().grid, 1)),
+        force: Some(random_function(&system().grid, 1)),
         base: None,
     };
     let mut problem = driven(ChannelKind::Acceleration, excitation, None);
     let period = TAU / (300.0_f64 / 2.0).sqrt();
-    let expected = 2.0 * period / problem.oscillator.grid.step();
+    let expected = 2.0 * period / problem.system.grid.step();
     for count in left_out(&problem) {
         // The largest line of the spectrum is within the width of the resonance, 6 %.
         let share = count as f64 / expected;
@@ -716,11 +709,11 @@ fn two_periods_are_left_out_beside_a_known_force() {
 #[test]
 fn half_of_a_short_record_is_left() {
     let excitation = Excitation {
-        force: Some(random_function(&oscillator().grid, 1)),
+        force: Some(random_function(&system().grid, 1)),
         base: None,
     };
     let mut problem = driven(ChannelKind::Acceleration, excitation, None);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let period = TAU / (300.0_f64 / 2.0).sqrt();
     let readings = (3.0 * period / grid.step()) as usize;
     let channel = &problem.experiments[0].channels[0];

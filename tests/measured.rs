@@ -127,7 +127,7 @@ fn the_roll_decay_with_damping_over_time() {
         };
         let rms = rms_degrees(&model, &run);
         assert!(rms <= 0.026, "{knots} knots: {rms}");
-        let grid = &model.problem.oscillator.grid;
+        let grid = &model.problem.system.grid;
         let damping = &run.best.evaluation.device.coefficients[0];
         let at = |t: f64| damping[(t / grid.step()).round() as usize];
         assert!((at(10.0) - 4.8).abs() <= 0.3, "{knots} knots: {}", at(10.0));

@@ -140,7 +140,7 @@ fn the_gradient_at_the_start_has_the_known_norm_and_integrals() {
     let here = problem.evaluate(&problem.functions.start()).unwrap();
     let gradient = problem.gradient(&problem.functions.start(), &here, GradientKind::Continuous);
     assert!((gradient.norm_squared / 1127.38210431 - 1.0).abs() < 1e-11);
-    let dt = problem.oscillator.grid.step();
+    let dt = problem.system.grid.step();
     let expected = [23.47941458, -9.07073615, -37.88810824];
     for (range, expected) in problem.functions.ranges().iter().zip(expected) {
         let integral = trapezoid(&gradient.l2[range.clone()], dt);
@@ -176,8 +176,7 @@ fn the_paper_s_optimum_does_not_predict() {
         (-1.0, 0.0, 0.91209, 10.89),
         (-3.3, 1.0, 39.730, 126.9),
     ];
-    let oscillator: System =
-        common::oscillator(2000, kmcfit_core::internals::system::Method::Midpoint);
+    let system: System = common::system(2000, kmcfit_core::internals::system::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()
         .map(|&(displacement, velocity, ..)| State {
@@ -187,7 +186,7 @@ fn the_paper_s_optimum_does_not_predict() {
         .collect();
     let truth = common::paper_device(2000);
     let device = &paper_run().best.evaluation.device;
-    let motions = predict(&oscillator, device, Some(&truth), &states).unwrap();
+    let motions = predict(&system, device, Some(&truth), &states).unwrap();
     for (motion, (.., cost, energy)) in motions.iter().zip(expected) {
         let found = (motion.summary.cost.unwrap(), motion.summary.energy.unwrap());
         // Five digits of the cost and four of the energy are known.

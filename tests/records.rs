@@ -29,7 +29,7 @@ fn motion(
         mass: vec![MASS; nodes],
         coefficients: vec![vec![DAMPING; nodes], vec![STIFFNESS; nodes]],
     };
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -51,9 +51,7 @@ fn motion(
         displacement: 0.02,
         velocity: 0.0,
     };
-    let motion = oscillator
-        .forward(&device, initial, Some(&excitation))
-        .unwrap();
+    let motion = system.forward(&device, initial, Some(&excitation)).unwrap();
     motion.displacement.into_iter().step_by(FINE).collect()
 }
 
@@ -353,8 +351,8 @@ fn readings_that_are_missing_at_the_ends() {
     }
     let experiment = "    initial: {displacement: 0.02, velocity: 0.0}";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    assert_eq!(model.problem.oscillator.grid.start(), 0.0);
-    assert_eq!(model.problem.oscillator.grid.duration(), 4.0);
+    assert_eq!(model.problem.system.grid.start(), 0.0);
+    assert_eq!(model.problem.system.grid.duration(), 4.0);
     assert!(error(&run) < 1e-5, "{}", error(&run));
 }
 
@@ -369,7 +367,7 @@ fn decimation_does_not_coarsen_the_grid() {
     let experiment = "    decimate: 20
     initial: estimate";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    assert!(model.problem.oscillator.grid.nodes() > 200);
+    assert!(model.problem.system.grid.nodes() > 200);
     // The filter's edges leave some 1e-3 of the motion at the ends of the record.
     assert!(error(&run) < 5e-3, "{}", error(&run));
 }

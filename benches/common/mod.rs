@@ -27,16 +27,16 @@ const SPREAD: f64 = 3.0;
 /// The paper's problem on `nodes` nodes: one free value per node for mass, damping and stiffness, the
 /// midpoint rule, the start (2, 1, 1), and readings that the same stepper made.
 pub fn paper(nodes: usize) -> Problem {
-    let oscillator = System {
+    let system = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let grid = oscillator.grid;
+    let grid = system.grid;
     let weighting = Weighting::Integral {
         spacing: grid.step(),
     };
-    let readings = paper_readings(&oscillator);
+    let readings = paper_readings(&system);
     let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
     let list = vec![
         CoefficientFunction::nodal(CoefficientKind::Mass, vec![2.0; nodes]),
@@ -45,18 +45,18 @@ pub fn paper(nodes: usize) -> Problem {
     ];
     let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
     let record = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
-    Problem::new(oscillator, functions, vec![record]).unwrap()
+    Problem::new(system, functions, vec![record]).unwrap()
 }
 
-fn paper_readings(oscillator: &System) -> Vec<f64> {
-    let nodes = oscillator.grid.nodes();
+fn paper_readings(system: &System) -> Vec<f64> {
+    let nodes = system.grid.nodes();
     let truth = NodalCoefficients {
         mass: (1..=nodes)
             .map(|i| 1.0 - 0.5 * i as f64 / nodes as f64)
             .collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let motion = oscillator.forward(&truth, INITIAL, None);
+    let motion = system.forward(&truth, INITIAL, None);
     motion.expect("a motion").displacement
 }
 
@@ -77,14 +77,9 @@ pub fn model(name: &str, changes: &[(&str, &str)]) -> Model {
 
 /// `models/paper-smooth.yaml` on `nodes` nodes.
 pub fn smooth(nodes: usize) -> Model {
-    let oscillator = paper(nodes).oscillator.clone();
+    let system = paper(nodes).system.clone();
     let mut table = String::from("t_s,y_m\n");
-    for (t, y) in oscillator
-        .grid
-        .times()
-        .iter()
-        .zip(paper_readings(&oscillator))
-    {
+    for (t, y) in system.grid.times().iter().zip(paper_readings(&system)) {
         writeln!(table, "{t},{y}").expect("a string has room");
     }
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("paper-{nodes}.csv"));
@@ -136,7 +131,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         .map(|t| 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin() + 2.0 * (9.7 * t + 2.0).sin())
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
@@ -149,7 +144,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         mass: vec![1.0; samples],
         coefficients: [1.2, 20.0, 15.0].map(|p| vec![p; samples]).to_vec(),
     };
-    let motion = oscillator.forward(&truth, rest, Some(&excitation));
+    let motion = system.forward(&truth, rest, Some(&excitation));
     let motion = motion.expect("a motion");
     let acceleration: Vec<f64> = (0..samples)
         .map(|i| {
@@ -185,7 +180,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         interrupt: None,
     };
     (
-        Problem::new(oscillator, functions, vec![record]).unwrap(),
+        Problem::new(system, functions, vec![record]).unwrap(),
         settings,
     )
 }

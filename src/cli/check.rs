@@ -95,7 +95,7 @@ fn node_counts(arguments: &Arguments) -> Vec<Option<usize>> {
 }
 
 fn describe(model: &Model) -> String {
-    let grid = &model.problem.oscillator.grid;
+    let grid = &model.problem.system.grid;
     let mut text = String::new();
     for (experiment, notes) in model.problem.experiments.iter().zip(&model.notes) {
         for (channel, note) in experiment.channels.iter().zip(notes) {
@@ -115,7 +115,7 @@ fn describe(model: &Model) -> String {
         model.title,
         grid.nodes(),
         grid.duration(),
-        model.problem.oscillator.method.name(),
+        model.problem.system.method.name(),
         model.problem.functions.parameters(),
         model.settings.solver.name(),
     )

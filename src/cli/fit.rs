@@ -276,9 +276,9 @@ pub(super) fn search(
 /// The predictions that the model asks for; one without a motion says so and harms no other.
 fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
     let device = &found.best.evaluation.device;
-    let oscillator = &model.problem.oscillator;
+    let system = &model.problem.system;
     let one = |state: &State| {
-        let motions = predict(oscillator, device, model.truth.as_ref(), &[*state]);
+        let motions = predict(system, device, model.truth.as_ref(), &[*state]);
         match motions {
             Ok(motions) => motions.into_iter().map(|m| m.summary).collect(),
             Err(breakdown) => vec![Prediction {

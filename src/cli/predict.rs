@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             OutputFolder::prepare(out, claim)
         })
         .transpose()?;
-    let motions = predict(&run.oscillator, &run.device, run.truth.as_ref(), &states)
+    let motions = predict(&run.system, &run.device, run.truth.as_ref(), &states)
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         } else {
             "m"
         };
-        write(&folder, &run.oscillator.grid.times(), &motions, unit)
+        write(&folder, &run.system.grid.times(), &motions, unit)
             .map_err(|error| unwritable(folder.path(), &error))?;
     }
     let summaries: Vec<_> = motions.into_iter().map(|m| m.summary).collect();

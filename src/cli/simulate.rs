@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .functions
         .device_into(&start, experiment.device, &mut device);
     let motion = problem
-        .oscillator
+        .system
         .forward(&device, experiment.initial, experiment.excitation.as_ref())
         .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
     let mut readings = motion.displacement;
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         noise.add_to(&mut readings);
     }
     let table = CsvTable::new()
-        .column("t_s", problem.oscillator.grid.times())
+        .column("t_s", problem.system.grid.times())
         .column("y_m", readings)
         .to_csv();
     let record = Record {
@@ -90,9 +90,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         model: arguments.model.display().to_string(),
         overrides: file.override_texts(),
         experiment: &experiment.name,
-        nodes: problem.oscillator.grid.nodes(),
-        duration: problem.oscillator.grid.duration(),
-        stepper: problem.oscillator.method.name(),
+        nodes: problem.system.grid.nodes(),
+        duration: problem.system.grid.duration(),
+        stepper: problem.system.method.name(),
         noise,
     };
     match &arguments.out {

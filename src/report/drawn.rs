@@ -104,7 +104,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
-        let grid_times = self.model.problem.oscillator.grid.times();
+        let grid_times = self.model.problem.system.grid.times();
         let nodes = self.model.problem.experiments[experiment].nodes;
         let grid_times = &grid_times[..nodes];
         let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
@@ -131,7 +131,7 @@ impl FittedModel<'_> {
         let list = self.named_functions();
         let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
         let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
-        let times = problem.oscillator.grid.times();
+        let times = problem.system.grid.times();
         let bands = self
             .bands()
             .map_or(Vec::new(), |b| b.curves(&b.functions, &times));
@@ -149,7 +149,7 @@ impl FittedModel<'_> {
     pub(super) fn ratios_figure(&self) -> Figure {
         let found = Ratios::of(&self.fit.best.evaluation.device);
         let truth = self.model.truth.as_ref().map(Ratios::of);
-        let times = self.model.problem.oscillator.grid.times();
+        let times = self.model.problem.system.grid.times();
         let bands = self
             .bands()
             .map_or(Vec::new(), |b| b.curves(&b.ratios, &times));

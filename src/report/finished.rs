@@ -30,7 +30,7 @@ const PER_NODE: u64 = 600;
 /// let run = Run::open("runs/paper")?;
 /// println!("{}: J = {:e}", run.document.outcome.status.name(), run.document.cost.r#final);
 /// let mass = &run.device.mass;                            // kg, one value per node
-/// for (t, m) in run.oscillator.grid.times().iter().zip(mass) {
+/// for (t, m) in run.system.grid.times().iter().zip(mass) {
 ///     println!("{t} s: {m} kg");
 /// }
 /// if let Some([low, high]) = run.band("mass") {           // 95 %, where they were computed
@@ -47,7 +47,7 @@ pub struct Run {
     /// The same with every key that is there, those of later versions included.
     pub value: Value,
     /// Grid, stepper and terms of the run.
-    pub oscillator: System,
+    pub system: System,
     /// The device that was found.
     pub device: NodalCoefficients,
     /// The true device, where the model named it.
@@ -75,8 +75,8 @@ impl Run {
         results::complete(folder)?;
         let value = value(folder)?;
         let document = document(folder, &value)?;
-        let (oscillator, quantities) = oscillator(folder, &document)?;
-        let nodes = oscillator.grid.nodes();
+        let (system, quantities) = system(folder, &document)?;
+        let nodes = system.grid.nodes();
         memory::check_file(&folder.join("result.json"), nodes as u64 * PER_NODE)?;
         let functions = Columns::read_rows(&folder.join("functions.csv"), nodes, "node")?;
         let trajectory = Columns::read_rows(&folder.join("trajectory.csv"), nodes, "node")?;
@@ -90,7 +90,7 @@ impl Run {
             history: history(folder, document.counts.iterations)?,
             document,
             value,
-            oscillator,
+            system,
             functions,
             trajectory,
         })
@@ -105,7 +105,7 @@ impl Run {
     }
 }
 
-fn oscillator(
+fn system(
     folder: &Path,
     document: &ResultDocument,
 ) -> Result<(System, Vec<CoefficientKind>), InputError> {
@@ -132,12 +132,12 @@ fn oscillator(
     if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
         return Err(no_terms());
     }
-    let oscillator = System {
+    let system = System {
         grid,
         method,
         terms,
     };
-    Ok((oscillator, quantities))
+    Ok((system, quantities))
 }
 
 fn value(folder: &Path) -> Result<Value, InputError> {

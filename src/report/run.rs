@@ -142,7 +142,7 @@ impl FittedModel<'_> {
 
     fn model_summary(&self) -> ModelSummary {
         let problem = &self.model.problem;
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         ModelSummary {
             file: self.model.file.display().to_string(),
             overrides: self.model.source.overrides.clone(),
@@ -150,14 +150,14 @@ impl FittedModel<'_> {
             start: grid.start(),
             duration: grid.duration(),
             step: grid.step(),
-            stepper: problem.oscillator.method.name().into(),
+            stepper: problem.system.method.name().into(),
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.parameters(),
             terms: (problem.functions.assembly(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
-            friction_width: problem.oscillator.terms.iter().find_map(|t| match t {
+            friction_width: problem.system.terms.iter().find_map(|t| match t {
                 Term::CoulombFriction { width } => Some(*width),
                 _ => None,
             }),

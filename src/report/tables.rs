@@ -30,7 +30,7 @@ impl FittedModel<'_> {
 
     pub(super) fn functions_table(&self) -> CsvTable {
         let device = &self.fit.best.evaluation.device;
-        let times = self.model.problem.oscillator.grid.times();
+        let times = self.model.problem.system.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
         for (function, values) in self.named_functions() {
             let column = self.column(function.quantity);
@@ -48,7 +48,7 @@ impl FittedModel<'_> {
             .column("natural_frequency_Hz", ratios.frequency)
             .column("damping_ratio", ratios.damping_ratio);
         if let Some(bands) = self.bands() {
-            let times = self.model.problem.oscillator.grid.times();
+            let times = self.model.problem.system.grid.times();
             for list in [&bands.functions, &bands.ratios] {
                 for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {
                     let name = band.name.replace([' ', '/', ','], "_");
@@ -70,7 +70,7 @@ impl FittedModel<'_> {
 
     pub(super) fn trajectories(&self) -> CsvTable {
         let problem = &self.model.problem;
-        let mut table = CsvTable::new().column("t_s", problem.oscillator.grid.times());
+        let mut table = CsvTable::new().column("t_s", problem.system.grid.times());
         let several = problem.experiments.len() > 1;
         let [y, v, observed_y] = match self.is_rotation() {
             true => ["y_rad", "v_rad_per_s", "observed_y_rad"],
@@ -88,7 +88,7 @@ impl FittedModel<'_> {
             // A record may end before the grid does.
             let full = |values: &[f64]| {
                 let mut values = values.to_vec();
-                values.resize(problem.oscillator.grid.nodes(), f64::NAN);
+                values.resize(problem.system.grid.nodes(), f64::NAN);
                 values
             };
             table = table
@@ -97,7 +97,7 @@ impl FittedModel<'_> {
             if let [channel] = experiment.channels.as_slice()
                 && let Some(stride) = channel.stride()
             {
-                let mut observed = vec![f64::NAN; problem.oscillator.grid.nodes()];
+                let mut observed = vec![f64::NAN; problem.system.grid.nodes()];
                 for (i, value) in channel.observed().iter().enumerate() {
                     observed[i * stride] = *value;
                 }

@@ -24,7 +24,7 @@ fn a_run_is_what_its_files_say() {
         run.trajectory.column("y_m"),
         Some(read("trajectory.csv", "y_m"))
     );
-    assert_eq!(run.oscillator.grid.times(), read("trajectory.csv", "t_s"));
+    assert_eq!(run.system.grid.times(), read("trajectory.csv", "t_s"));
     assert!(
         run.band("mass").is_none(),
         "of 6000 values no bands are computed"

@@ -380,7 +380,7 @@ pub fn run(bytes: &[u8]) -> Verdict {
                 displacement: 1.0,
                 velocity: 0.0,
             };
-            let _ = predict(&run.oscillator, &run.device, run.truth.as_ref(), &[state]);
+            let _ = predict(&run.system, &run.device, run.truth.as_ref(), &[state]);
             run.band("mass");
             Verdict::Accepted
         }

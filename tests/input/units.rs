@@ -20,7 +20,7 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
     let model = build(&file, Purpose::Fit).map_err(said)?;
-    let grid = &model.problem.oscillator.grid;
+    let grid = &model.problem.system.grid;
     let about_units = |w: &&String| w.contains("the column `") || w.contains("the unit of");
     let warnings: Vec<&str> = (model.warnings.iter().filter(about_units))
         .map(String::as_str)

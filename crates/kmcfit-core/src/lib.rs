@@ -1,4 +1,4 @@
-//! Numerics of kmcfit: time-varying mass, damping and stiffness of an oscillator from its measured motion.
+//! Numerics of kmcfit: time-varying mass, damping and stiffness of a vibrating system from measured records.
 //!
 //! Modules, in the order in which data flow:
 //!

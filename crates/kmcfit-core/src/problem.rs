@@ -15,7 +15,7 @@ pub const FEW_PARAMETERS: usize = 64;
 #[derive(Debug, Clone)]
 pub struct ProblemParts {
     /// Grid, stepper and terms.
-    pub oscillator: System,
+    pub system: System,
     /// Mass and one function per term.
     pub functions: Parameterization,
     /// The records.
@@ -86,11 +86,11 @@ impl Deref for Problem {
 impl ProblemParts {
     /// Whether all parts fit each other.
     fn check(&self) -> Result<(), ProblemError> {
-        let (functions, grid) = (self.functions.nodes(), self.oscillator.grid.nodes());
+        let (functions, grid) = (self.functions.nodes(), self.system.grid.nodes());
         if functions != grid {
             return Err(ProblemError::Nodes { functions, grid });
         }
-        let terms = self.oscillator.terms.len();
+        let terms = self.system.terms.len();
         for found in self.functions.assemblies().iter().map(Vec::len) {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
@@ -141,7 +141,7 @@ impl ProblemParts {
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         match () {
-            () if !(2..=self.oscillator.grid.nodes()).contains(&record.nodes) => {
+            () if !(2..=self.system.grid.nodes()).contains(&record.nodes) => {
                 Some("fewer than two nodes, or more than the grid has")
             }
             () if record.device >= self.functions.assemblies().len() => {
@@ -165,12 +165,12 @@ impl Problem {
     /// # Errors
     /// A [`ProblemError`] if the parts do not fit each other.
     pub fn new(
-        oscillator: System,
+        system: System,
         functions: Parameterization,
         experiments: Vec<Experiment>,
     ) -> Result<Self, ProblemError> {
         let parts = ProblemParts {
-            oscillator,
+            system,
             functions,
             experiments,
             penalties: Vec::new(),
@@ -285,7 +285,7 @@ impl Problem {
     #[must_use]
     pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
-        let grid = &self.oscillator.grid;
+        let grid = &self.system.grid;
         for experiment in &mut part.0.experiments {
             let length = (experiment.nodes - 1) as f64 * grid.step();
             let end = grid.start() + share * length;
@@ -300,7 +300,7 @@ impl Problem {
     /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading of the
     /// displacement per node, over the whole grid.
     pub fn supports_continuous(&self) -> bool {
-        let nodes = self.oscillator.grid.nodes();
+        let nodes = self.system.grid.nodes();
         let fits = |c: &Channel| {
             c.stride() == Some(1)
                 && c.len() == nodes

@@ -15,20 +15,20 @@ const NODES: usize = 101;
 
 /// m = k = 1 known, a constant c sought from the motion of c = 0.8, its damping ratio capped.
 fn capped(cap: f64) -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.8; NODES], vec![1.0; NODES]],
     };
-    let observed = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let observed = system.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    let mut problem = common::problem_of(oscillator, list, observed.displacement, None);
+    let mut problem = common::problem_of(system, list, observed.displacement, None);
     let statement = Statement::DampingRatio { max: cap };
-    let rows = statement.build(&problem.oscillator.grid, &problem.functions);
+    let rows = statement.build(&problem.system.grid, &problem.functions);
     problem.constrain(rows.unwrap()).unwrap();
     problem
 }
@@ -141,7 +141,7 @@ fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup
         CoefficientFunction::constant(CoefficientKind::Stiffness, k, NODES),
     ];
     let observed = plain.experiments[0].channels[0].observed().to_vec();
-    let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, Some(sigma));
+    let mut problem = common::problem_of(plain.system.clone(), list, observed, Some(sigma));
     problem = problem
         .with(|parts| {
             parts.constraints.groups = groups;
@@ -240,8 +240,7 @@ fn with_sum_below(cap: f64) -> Problem {
     ];
     problem = problem
         .with(|parts| {
-            parts.functions =
-                Parameterization::new(list, NODES, parts.oscillator.grid.step()).unwrap();
+            parts.functions = Parameterization::new(list, NODES, parts.system.grid.step()).unwrap();
         })
         .unwrap();
     let mut group = RowGroup::new("sum");
@@ -295,9 +294,9 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1 * unit, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![unit; NODES]),
     ];
-    problem = common::problem_of(problem.oscillator.clone(), list, observed, None);
+    problem = common::problem_of(problem.system.clone(), list, observed, None);
     let statement = Statement::DampingRatio { max: cap };
-    let built = statement.build(&problem.oscillator.grid, &problem.functions);
+    let built = statement.build(&problem.system.grid, &problem.functions);
     problem = problem
         .with(|parts| {
             parts.constraints = built.unwrap();
@@ -346,9 +345,9 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 0.9, NODES),
     ];
-    let (grid, observed) = (problem.oscillator.grid, &problem.experiments[0].channels[0]);
+    let (grid, observed) = (problem.system.grid, &problem.experiments[0].channels[0]);
     let observed = observed.observed().to_vec();
-    problem = common::problem_of(problem.oscillator.clone(), list, observed, None);
+    problem = common::problem_of(problem.system.clone(), list, observed, None);
     let best = |problem: &Problem| {
         let start = problem.functions.start();
         fit(problem, &start, &settings(), &mut |_| {}).unwrap().best

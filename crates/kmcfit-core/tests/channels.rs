@@ -227,12 +227,12 @@ impl Case {
                 });
             experiment = experiment.with_channel(channel);
         }
-        let oscillator = System {
+        let system = System {
             grid,
             method: self.method,
             terms: TERMS.iter().map(|(_, term, _)| *term).collect(),
         };
-        Problem::new(oscillator, functions, vec![experiment]).unwrap()
+        Problem::new(system, functions, vec![experiment]).unwrap()
     }
 
     /// J and its derivative with respect to parameter `seed`, by the independent evaluation.
@@ -363,7 +363,7 @@ fn jacobian_is_that_of_single_tangents(
 
 /// The same with constants and, if `with_knots`, knots in place of one value a node.
 fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let knots = Basis::PiecewiseLinear {
         knots: (0..3)
             .map(|i| 0.5 * f64::from(i) * grid.duration())

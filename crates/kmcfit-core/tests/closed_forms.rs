@@ -5,7 +5,7 @@ mod common;
 use common::closed_form::{Bessel, constant_coefficients};
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
 
-fn oscillator(nodes: usize, duration: f64, method: Method) -> System {
+fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
@@ -15,14 +15,14 @@ fn oscillator(nodes: usize, duration: f64, method: Method) -> System {
 
 /// Largest error of the displacement for m = 1 - a t, c = 0, k = 1.
 fn bessel_error(nodes: usize, method: Method) -> f64 {
-    let oscillator = oscillator(nodes, common::DURATION, method);
+    let system = system(nodes, common::DURATION, method);
     let exact = Bessel::PAPER;
-    let times = oscillator.grid.times();
+    let times = system.grid.times();
     let device = NodalCoefficients {
         mass: times.iter().map(|t| exact.mass(*t)).collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
+    let motion = system.forward(&device, common::INITIAL, None).unwrap();
     let errors = times.iter().zip(&motion.displacement);
     errors.fold(0.0f64, |most, (t, y)| {
         most.max((y - exact.displacement(*t)).abs())
@@ -78,13 +78,13 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
     for (m, c, k) in devices {
         for method in [Method::Midpoint, Method::Rk4] {
             let error = |nodes: usize| {
-                let oscillator = oscillator(nodes, 10.0, method);
+                let system = system(nodes, 10.0, method);
                 let device = NodalCoefficients {
                     mass: vec![m; nodes],
                     coefficients: vec![vec![c; nodes], vec![k; nodes]],
                 };
-                let motion = oscillator.forward(&device, initial, None).unwrap();
-                let times = oscillator.grid.times();
+                let motion = system.forward(&device, initial, None).unwrap();
+                let times = system.grid.times();
                 let exact = times
                     .iter()
                     .map(|t| constant_coefficients((m, c, k), initial, *t));

@@ -512,7 +512,7 @@ fn bounds_and_fixed_values_hold_exactly() {
 }
 
 fn problem(functions: Parameterization) -> Problem {
-    let oscillator = System {
+    let system = System {
         grid: grid(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -521,8 +521,8 @@ fn problem(functions: Parameterization) -> Problem {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let experiment = Experiment::free("none", initial, oscillator.grid.nodes());
-    Problem::new(oscillator, functions, vec![experiment]).unwrap()
+    let experiment = Experiment::free("none", initial, system.grid.nodes());
+    Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
 #[test]

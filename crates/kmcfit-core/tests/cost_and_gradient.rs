@@ -48,7 +48,7 @@ fn of_one_value_a_node() {
 fn with_a_sigma_and_with_penalties() {
     let mut problem = paper_problem(300, [2.0, 1.0, 1.0]);
     let readings = problem.experiments[0].channels[0].observed().to_vec();
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let sigma = Weighting::Sigma(0.1);
     let channel = Channel::displacement_at_nodes(readings.clone(), 1, sigma, &grid);
     problem = problem
@@ -62,7 +62,7 @@ fn with_a_sigma_and_with_penalties() {
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(&grid.times(), &readings);
-    let method = problem.oscillator.method;
+    let method = problem.system.method;
     let smooth = Builder::new(parts)
         .record(record)
         .method(method)
@@ -75,7 +75,7 @@ fn with_a_sigma_and_with_penalties() {
 #[test]
 fn of_everything_else() {
     let mut problem = paper_problem(301, [2.0, 1.0, 1.0]);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let readings: Vec<f64> = problem.experiments[0].channels[0].observed().to_vec();
     let half: Vec<f64> = readings.iter().copied().step_by(2).collect();
     let spacing = 2.0 * grid.step();

@@ -16,14 +16,14 @@ use proptest::prelude::*;
 
 /// The discrete adjoint as fits compute it.
 fn discrete_adjoint(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     motion: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let engine = Engine::choose(oscillator, excitation, motion.nodes(), Purpose::Estimation);
-    engine.discrete_adjoint(oscillator, device, excitation, motion, source)
+    let engine = Engine::choose(system, excitation, motion.nodes(), Purpose::Estimation);
+    engine.discrete_adjoint(system, device, excitation, motion, source)
 }
 
 /// A random device with a random force, initial state and cost weights.
@@ -38,7 +38,7 @@ struct Case {
 }
 
 impl Case {
-    fn oscillator(&self) -> System {
+    fn system(&self) -> System {
         let nodes = self.force.len();
         System {
             grid: Grid::new(0.0, 0.1 * (nodes - 1) as f64, nodes).unwrap(),
@@ -49,7 +49,7 @@ impl Case {
 
     /// `sum a (y - b)^2 + c (v - d)^2`, by the independent solve.
     fn cost<D: DualNum<Primitive = f64> + Copy>(&self, inputs: &Inputs<D>, y0: D, v0: D) -> D {
-        let states = motion(self.method, inputs, (y0, v0), self.oscillator().grid.step());
+        let states = motion(self.method, inputs, (y0, v0), self.system().grid.step());
         let terms = states.iter().zip(&self.weights);
         terms.fold(D::from(0.0), |sum, ((y, v), [a, b, c, d])| {
             sum + (*y - *b).powi(2) * *a + (*v - *d).powi(2) * *c
@@ -72,14 +72,12 @@ impl Case {
     }
 
     fn adjoint_gradient(&self) -> SystemTangent {
-        let oscillator = self.oscillator();
+        let system = self.system();
         let excitation = Excitation::force_at_nodes(&self.force);
         let force = Some(&excitation);
-        let motion = oscillator
-            .forward(&self.device, self.initial, force)
-            .unwrap();
+        let motion = system.forward(&self.device, self.initial, force).unwrap();
         let source = self.source(&motion);
-        discrete_adjoint(&oscillator, &self.device, force, &motion, &source)
+        discrete_adjoint(&system, &self.device, force, &motion, &source)
     }
 
     /// The derivative with respect to input `seed`: the functions' nodes in order, then y0, v0.
@@ -152,10 +150,10 @@ proptest! {
 
     #[test]
     fn the_adjoint_is_the_transpose_of_the_tangent(case in case(), other in case()) {
-        let oscillator = case.oscillator();
+        let system = case.system();
         let excitation = Excitation::force_at_nodes(&case.force);
         let force = Some(&excitation);
-        let motion = oscillator.forward(&case.device, case.initial, force).unwrap();
+        let motion = system.forward(&case.device, case.initial, force).unwrap();
         // A direction and weights of the right length, taken from an unrelated case.
         let cut = |f: &[f64]| -> Vec<f64> {
             f.iter().cycle().take(case.force.len()).copied().collect()
@@ -171,8 +169,8 @@ proptest! {
             displacement: cut(&other.force),
             velocity: cut(&other.device.coefficients[1]),
         };
-        let forward = reference::tangent(&oscillator, &case.device, force, &motion, &direction);
-        let backward = discrete_adjoint(&oscillator, &case.device, force, &motion, &weights);
+        let forward = reference::tangent(&system, &case.device, force, &motion, &direction);
+        let backward = discrete_adjoint(&system, &case.device, force, &motion, &weights);
         let all = |t: &Trajectory| [t.displacement.clone(), t.velocity.clone()].concat();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (ju, w) = (all(&forward), all(&weights));
@@ -184,8 +182,8 @@ proptest! {
 
     #[test]
     fn the_forward_solve_is_the_textbook_one(case in case()) {
-        let oscillator = case.oscillator();
-        let ours = oscillator
+        let system = case.system();
+        let ours = system
             .forward(&case.device, case.initial, Some(&Excitation::force_at_nodes(&case.force)))
             .unwrap();
         let inputs = Inputs {
@@ -195,7 +193,7 @@ proptest! {
             force: case.force.clone(),
         };
         let start = (case.initial.displacement, case.initial.velocity);
-        let other = motion(case.method, &inputs, start, oscillator.grid.step());
+        let other = motion(case.method, &inputs, start, system.grid.step());
         let largest = other.iter().fold(0.0f64, |m, s| m.max(s.0.abs()).max(s.1.abs()));
         for (i, (y, v)) in other.iter().enumerate() {
             prop_assert!((ours.displacement[i] - y).abs() <= 1e-13 * largest);
@@ -296,16 +294,16 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
 
 /// Of a device whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
 fn initial_gradients(nodes: usize) -> [State; 2] {
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
-    let times = oscillator.grid.times();
+    let system = common::system(nodes, Method::Midpoint);
+    let times = system.grid.times();
     let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
     let device = NodalCoefficients {
         mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
         coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
     };
-    let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
+    let motion = system.forward(&device, common::INITIAL, None).unwrap();
     let observed = of(|t| (0.7 * t).cos());
-    let weights = trapezoid_weights(nodes, oscillator.grid.step());
+    let weights = trapezoid_weights(nodes, system.grid.step());
     let pairs = motion.displacement.iter().zip(&observed);
     let source = Trajectory {
         displacement: (pairs.zip(weights))
@@ -314,8 +312,8 @@ fn initial_gradients(nodes: usize) -> [State; 2] {
         velocity: vec![0.0; nodes],
     };
     [
-        continuous_adjoint(&oscillator, &device, None, &motion, &observed).initial,
-        discrete_adjoint(&oscillator, &device, None, &motion, &source).initial,
+        continuous_adjoint(&system, &device, None, &motion, &observed).initial,
+        discrete_adjoint(&system, &device, None, &motion, &source).initial,
     ]
 }
 

@@ -21,7 +21,7 @@ const REST: State = State {
     velocity: 0.0,
 };
 
-fn oscillator(nodes: usize, duration: f64, method: Method) -> System {
+fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
@@ -98,10 +98,10 @@ fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
             let lag = (C * w).atan2(K - M * w * w);
             let error = |nodes: usize| {
                 let nodes = STEADY * (nodes - 1) + 1;
-                let oscillator = oscillator(nodes, 240.0, method);
-                let grid = oscillator.grid;
+                let system = system(nodes, 240.0, method);
+                let grid = system.grid;
                 let force = sampled(&grid, |t| 5.0 * (w * t).cos());
-                let motion = oscillator
+                let motion = system
                     .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                     .unwrap();
                 let settled = nodes * 5 / 6;
@@ -128,8 +128,8 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
             for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
                 let error = |nodes: usize| {
                     let nodes = STEADY * (nodes - 1) + 1;
-                    let oscillator = oscillator(nodes, 240.0, method);
-                    let grid = oscillator.grid;
+                    let system = system(nodes, 240.0, method);
+                    let grid = system.grid;
                     let of_base = match kind {
                         ChannelKind::Displacement => 1.0,
                         _ => -w * w,
@@ -139,16 +139,14 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                         base: Some(sampled(&grid, |t| -w * w * (w * t).cos())),
                     };
                     let device = constants(nodes, &[M, C, K]);
-                    let motion = oscillator
-                        .forward(&device, REST, Some(&excitation))
-                        .unwrap();
+                    let motion = system.forward(&device, REST, Some(&excitation)).unwrap();
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
                         let place = TimePoint::node(*i, nodes);
                         let around = excitation.around(place);
                         let sensed = reference::observe(
-                            &oscillator,
+                            &system,
                             kind,
                             &device,
                             Some(&excitation),
@@ -185,19 +183,15 @@ fn step_response(t: f64) -> f64 {
 fn a_force_that_jumps_at_nodes_gives_the_step_response() {
     for method in METHODS {
         let error = |nodes: usize| {
-            let oscillator = oscillator(nodes, 8.0, method);
+            let system = system(nodes, 8.0, method);
             let (first, last) = ((nodes - 1) / 8, (nodes - 1) / 2);
             let on = |i: usize| [f64::from(u8::from((first..last).contains(&i))); 3];
             let force = StageSamples::new((0..nodes - 1).map(on).collect());
-            let motion = oscillator
+            let motion = system
                 .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                 .unwrap();
             let after = |t: f64| if t > 0.0 { step_response(t) } else { 0.0 };
-            let times = oscillator
-                .grid
-                .times()
-                .into_iter()
-                .zip(&motion.displacement);
+            let times = system.grid.times().into_iter().zip(&motion.displacement);
             times.fold(0.0f64, |most, (t, y)| {
                 most.max((y - after(t - 1.0) + after(t - 4.0)).abs())
             })
@@ -229,18 +223,14 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
     };
     for method in METHODS {
         let error = |nodes: usize| {
-            let oscillator = oscillator(nodes, 8.0, method);
-            let force = sampled(&oscillator.grid, |t| {
+            let system = system(nodes, 8.0, method);
+            let force = sampled(&system.grid, |t| {
                 if t < 2.0 + 1e-9 { (w * t).sin() } else { 0.0 }
             });
-            let motion = oscillator
+            let motion = system
                 .forward(&constants(nodes, &[M, 0.0, K]), REST, Some(&pushed(force)))
                 .unwrap();
-            let times = oscillator
-                .grid
-                .times()
-                .into_iter()
-                .zip(&motion.displacement);
+            let times = system.grid.times().into_iter().zip(&motion.displacement);
             times.fold(0.0f64, |most, (t, y)| most.max((y - exact(t)).abs()))
         };
         check_order(method, "half sine", error);
@@ -251,13 +241,13 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
 fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     // A step 1/20 of the time that the speed takes to cross the narrowest width.
     let nodes = 40_001;
-    let mut oscillator = oscillator(nodes, 2.0 * PI * 3.2, Method::Rk4);
-    oscillator.terms = vec![Term::Stiffness, Term::CoulombFriction { width }];
+    let mut system = system(nodes, 2.0 * PI * 3.2, Method::Rk4);
+    system.terms = vec![Term::Stiffness, Term::CoulombFriction { width }];
     let initial = State {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = oscillator
+    let motion = system
         .forward(&constants(nodes, &[1.0, 1.0, friction]), initial, None)
         .unwrap();
     let Trajectory {
@@ -266,7 +256,7 @@ fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     } = motion;
     let turns = (1..nodes - 1).filter(|i| v[*i] * v[i + 1] <= 0.0);
     // At the turn itself: v is a line between the nodes, and y a parabola.
-    let h = oscillator.grid.step();
+    let h = system.grid.step();
     turns
         .map(|i| y[i] + 0.5 * v[i] * h * v[i] / (v[i] - v[i + 1]))
         .collect()
@@ -347,13 +337,11 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
             let error = |nodes: usize| {
                 // 16 to 32 steps in a period of the device: with more, rounding would show.
                 let nodes = (nodes - 1) / 4 + 1;
-                let oscillator = oscillator(nodes, 10.0, method);
-                let grid = oscillator.grid;
+                let system = system(nodes, 10.0, method);
+                let grid = system.grid;
                 let excitation = pushed(sampled(&grid, |t| (w * t).cos()));
                 let device = constants(nodes, &[M, C, K]);
-                let motion = oscillator
-                    .forward(&device, initial, Some(&excitation))
-                    .unwrap();
+                let motion = system.forward(&device, initial, Some(&excitation)).unwrap();
                 let mut most = 0.0f64;
                 for step in 0..nodes - 1 {
                     for fraction in [0.0, 0.1, 0.31, 0.5, 0.77, 0.99] {
@@ -364,7 +352,7 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
                             base: 0.0,
                         };
                         let seen = reference::observe(
-                            &oscillator,
+                            &system,
                             kind,
                             &device,
                             Some(&excitation),

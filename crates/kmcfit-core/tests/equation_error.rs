@@ -18,12 +18,12 @@ const START: f64 = 2.0;
 /// Free motion of m = 1, c = 0, k = 1.5, a force of zero if asked for; m and k are constants to be
 /// found from a mass of 2, c is fixed at `damping`, or sought if that is `None`.
 fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
     };
-    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
     let damping = match damping {
         Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
         None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
@@ -33,7 +33,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
         damping,
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let mut problem = common::problem_of(oscillator, list, motion.displacement, None);
+    let mut problem = common::problem_of(system, list, motion.displacement, None);
     if silent_force {
         problem = problem
             .with(|parts| {
@@ -119,18 +119,18 @@ fn a_fixed_function_or_value_sets_the_scale() {
 /// A device need not have a damping, nor a stiffness in any place of its list.
 #[test]
 fn a_spring_alone_has_an_equation_too() {
-    let mut oscillator = common::oscillator(NODES, Method::Rk4);
-    oscillator.terms = vec![Term::Stiffness];
+    let mut system = common::system(NODES, Method::Rk4);
+    system.terms = vec![Term::Stiffness];
     let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![1.5; NODES]],
     };
-    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let problem = common::problem_of(oscillator, list, motion.displacement, None);
+    let problem = common::problem_of(system, list, motion.displacement, None);
     let found = equation_error(&problem, &problem.functions.start()).unwrap();
     close(found[0], 1.5);
 }
@@ -140,7 +140,7 @@ fn a_spring_alone_has_an_equation_too() {
 #[test]
 fn irregular_velocities_are_integrated() {
     let mut problem = problem(Some(0.1), false);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let late = |i: usize| 0.4 * (1.0 + (1.7 * i as f64).sin() * (0.3 * i as f64).cos());
     let times: Vec<f64> = (0..100).map(|i| 0.25 * (i as f64 + late(i))).collect();
     let truth = NodalCoefficients {
@@ -148,7 +148,7 @@ fn irregular_velocities_are_integrated() {
         coefficients: vec![vec![0.1; NODES], vec![1.5; NODES]],
     };
     let maker = Truth {
-        oscillator: &problem.oscillator,
+        system: &problem.system,
         device: &truth,
         excitation: None,
         initial: common::INITIAL,
@@ -177,9 +177,9 @@ fn the_start_knows_no_unit_of_mass_or_length() {
     let observed = common::synthetic::with_noise(&observed, 0.05, 4);
     let start = |unit: f64, length: f64, weight: f64| -> Vec<f64> {
         let basis = Basis::PiecewiseLinear {
-            knots: uniform_knots(&plain.oscillator.grid, 6),
+            knots: uniform_knots(&plain.system.grid, 6),
         };
-        let rows = basis.roughness(&plain.oscillator.grid, 1);
+        let rows = basis.roughness(&plain.system.grid, 1);
         let stiffness = vec![unit; 6];
         let list = vec![
             CoefficientFunction::fixed(CoefficientKind::Mass, vec![unit; NODES]),
@@ -187,12 +187,12 @@ fn the_start_knows_no_unit_of_mass_or_length() {
             CoefficientFunction::free(
                 CoefficientKind::Stiffness,
                 basis,
-                &plain.oscillator.grid,
+                &plain.system.grid,
                 stiffness,
             ),
         ];
         let observed = observed.iter().map(|y| y * length).collect();
-        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        let mut problem = common::problem_of(plain.system.clone(), list, observed, None);
         let weight = weight * (length / unit).powi(2);
         problem.penalize(Penalty::new(2, 1, weight, rows)).unwrap();
         let found = equation_error(&problem, &problem.functions.start()).unwrap();
@@ -220,7 +220,7 @@ fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
     let observed = plain.experiments[0].channels[0].observed().to_vec();
     let observed = common::synthetic::with_noise(&observed, 0.05, 4);
     let start = |damping: f64, weight: f64| {
-        let grid = plain.oscillator.grid;
+        let grid = plain.system.grid;
         let basis = Basis::PiecewiseLinear {
             knots: uniform_knots(&grid, 6),
         };
@@ -231,7 +231,7 @@ fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
             CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, vec![1.0; 6]),
         ];
         let observed = observed.clone();
-        let mut problem = common::problem_of(plain.oscillator.clone(), list, observed, None);
+        let mut problem = common::problem_of(plain.system.clone(), list, observed, None);
         problem.penalize(Penalty::new(2, 1, weight, rows)).unwrap();
         equation_error(&problem, &problem.functions.start()).unwrap()
     };

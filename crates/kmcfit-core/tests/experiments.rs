@@ -37,7 +37,7 @@ const STATES: [State; 3] = [
     },
 ];
 
-fn oscillator(nodes: usize) -> System {
+fn system(nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method: Method::Rk4,
@@ -71,15 +71,15 @@ type Records<'a> = &'a [(State, bool)];
 
 /// One value per step for each function, from (2, 1, 1), with readings at all nodes.
 fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Problem {
-    let oscillator = oscillator(nodes);
-    let grid = oscillator.grid;
+    let system = system(nodes);
+    let grid = system.grid;
     let list = QUANTITIES.into_iter().zip([2.0, 1.0, 1.0]);
     let list = list.map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]));
     let functions = Parameterization::new(list.collect(), nodes, grid.step()).unwrap();
     let records = records.iter().map(|&(initial, forced)| {
         let excitation = forced.then(|| force(&grid));
         let truth = Truth {
-            oscillator: &oscillator,
+            system: &system,
             device,
             excitation: excitation.as_ref(),
             initial,
@@ -93,7 +93,7 @@ fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Proble
         experiment
     });
     let records = records.collect();
-    Problem::new(oscillator, functions, records).unwrap()
+    Problem::new(system, functions, records).unwrap()
 }
 
 /// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside readings whose
@@ -101,7 +101,7 @@ fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Proble
 const SMOOTHNESS: f64 = 1e-2;
 
 fn smooth(mut problem: Problem, scale_fixed: bool) -> Problem {
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     for function in 0..3 {
         let rows = Basis::Nodal.roughness(&grid, 2);
         problem
@@ -147,7 +147,7 @@ fn another_device(records: Records, scale_fixed: bool, truth: &NodalCoefficients
 
 #[test]
 fn two_free_records_determine_the_ratios() {
-    let truth = truth(&oscillator(NODES).grid);
+    let truth = truth(&system(NODES).grid);
     let two = [(STATES[0], false), (STATES[1], false)];
     let found = run(&smooth(problem(NODES, &truth, &two), true));
     let errors = ratio_errors(&found, &truth);
@@ -170,7 +170,7 @@ fn two_free_records_determine_the_ratios() {
 
 #[test]
 fn two_free_records_and_a_forced_one_determine_the_device() {
-    let truth = truth(&oscillator(NODES).grid);
+    let truth = truth(&system(NODES).grid);
     let three = [(STATES[0], false), (STATES[1], false), (STATES[2], true)];
     let found = run(&smooth(problem(NODES, &truth, &three), false));
     let errors = common::errors(&found.best.evaluation.device, &truth);
@@ -223,7 +223,7 @@ fn the_rank_of_the_records_is_that_of_the_table() {
         let mut problem = problem(nodes, &device, records);
         problem = problem
             .with(|parts| {
-                parts.oscillator.method = Method::Midpoint;
+                parts.system.method = Method::Midpoint;
             })
             .unwrap();
         problem = problem

@@ -31,7 +31,7 @@ const INITIAL: State = State {
     velocity: -0.5,
 };
 
-fn oscillator(terms: &[Term]) -> System {
+fn system(terms: &[Term]) -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
@@ -287,7 +287,7 @@ impl Case {
     }
 
     fn problem(&self) -> Problem {
-        let oscillator = oscillator(&self.terms);
+        let system = system(&self.terms);
         let mass = match &self.mass {
             Some(sought) => sought.function(),
             None => CoefficientFunction::fixed(CoefficientKind::Mass, known_mass()),
@@ -302,18 +302,17 @@ impl Case {
             devices.push(device);
             list.push(sought.function());
         }
-        let functions =
-            Parameterization::with_devices(list, devices, NODES, oscillator.grid.step())
-                .unwrap()
-                .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
+        let functions = Parameterization::with_devices(list, devices, NODES, system.grid.step())
+            .unwrap()
+            .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
         let records = self.records.iter().map(|record| {
             // A record ends with its last reading, at the next node.
             let ends = record.readings.iter().map(|r| r.times[r.times.len() - 1]);
             let end = ends.fold(0.0, f64::max);
-            let nodes = ((end / oscillator.grid.step() - 1e-9).ceil() as usize + 1).min(NODES);
+            let nodes = ((end / system.grid.step() - 1e-9).ceil() as usize + 1).min(NODES);
             let device = self.device(record.device);
             let truth = Truth {
-                oscillator: &oscillator,
+                system: &system,
                 device: &device,
                 excitation: record.excitation.as_ref(),
                 initial: record.initial,
@@ -336,7 +335,7 @@ impl Case {
             experiment
         });
         let records = records.collect();
-        Problem::new(oscillator, functions, records).unwrap()
+        Problem::new(system, functions, records).unwrap()
     }
 
     /// Fits from the start values and compares all parameters, each relative to the larger of itself

@@ -37,13 +37,13 @@ const PLAIN: Units = Units {
 /// A known motion, read with an offset (m) and a drift (m/s) that are sought: the readings are linear in
 /// both. The noise is as large, so that a step leaves half of the cost.
 fn problem(units: Units) -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let system = common::system(NODES, Method::Rk4);
     let device = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.1; NODES], vec![1.0; NODES]],
     };
-    let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
-    let times = oscillator.grid.times();
+    let motion = system.forward(&device, common::INITIAL, None).unwrap();
+    let times = system.grid.times();
     let drifted = motion.displacement.iter().zip(&times);
     let drifted: Vec<f64> = drifted.map(|(y, t)| y + 1.0 + 0.05 * t).collect();
     let observed = with_noise(&drifted, 1.0, 7)
@@ -56,7 +56,7 @@ fn problem(units: Units) -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, device.coefficients[1].clone()),
     ];
     let sigma = units.length * units.sigma;
-    let mut problem = common::problem_of(oscillator, list, observed, Some(sigma));
+    let mut problem = common::problem_of(system, list, observed, Some(sigma));
     let scalar = |size: f64| ScalarParameter {
         name: "a number".into(),
         unit: String::new(),
@@ -109,7 +109,7 @@ impl Squares {
             constant: 0.0,
             sizes: SIZES,
         };
-        let times = problem.oscillator.grid.times();
+        let times = problem.system.grid.times();
         let sigma = channel.weighting().sigma(0).unwrap();
         for (r, t) in channel.residuals(&silent.predictions[0][0]).zip(times) {
             let (row, r) = (Vector2::new(1.0, t) / sigma, r / sigma);

@@ -51,17 +51,17 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
 
 /// Displacement of `device` at all nodes, for each record; sigma 1e-3.
 fn with_records(
-    oscillator: &System,
+    system: &System,
     list: Vec<CoefficientFunction>,
     device: &NodalCoefficients,
     records: &[Record],
 ) -> Problem {
-    let grid = oscillator.grid;
+    let grid = system.grid;
     let nodes = grid.nodes();
     let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let records = records.iter().map(|(initial, force)| {
         let excitation = force.as_ref().map(|f| Excitation::force_at_nodes(f));
-        let motion = oscillator
+        let motion = system
             .forward(device, *initial, excitation.as_ref())
             .unwrap();
         let weighting = Weighting::Sigma(1e-3);
@@ -70,14 +70,14 @@ fn with_records(
         record.excitation = excitation;
         record
     });
-    Problem::new(oscillator.clone(), functions, records.collect()).unwrap()
+    Problem::new(system.clone(), functions, records.collect()).unwrap()
 }
 
 /// One value per node for each function, starting at the device itself.
-fn nodal(oscillator: &System, device: &NodalCoefficients, records: &[Record]) -> Problem {
+fn nodal(system: &System, device: &NodalCoefficients, records: &[Record]) -> Problem {
     let list = QUANTITIES.into_iter().zip(device.functions());
     let list = list.map(|(q, p)| CoefficientFunction::nodal(q, p.to_vec()));
-    with_records(oscillator, list.collect(), device, records)
+    with_records(system, list.collect(), device, records)
 }
 
 fn spectrum(problem: &Problem) -> Spectrum {
@@ -86,8 +86,8 @@ fn spectrum(problem: &Problem) -> Spectrum {
 }
 
 /// A linear mass beside a constant damping and a constant stiffness.
-fn linear_mass(oscillator: &System, record: Record) -> Problem {
-    let grid = oscillator.grid;
+fn linear_mass(system: &System, record: Record) -> Problem {
+    let grid = system.grid;
     let nodes = grid.nodes();
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let degree_1 = Basis::Polynomial { degree: 1 };
@@ -101,15 +101,15 @@ fn linear_mass(oscillator: &System, record: Record) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    with_records(oscillator, list, &device, &[record])
+    with_records(system, list, &device, &[record])
 }
 
 #[test]
 fn the_count_and_the_rank_are_those_of_the_table() {
     let nodes = 200;
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
-    let grid = oscillator.grid;
+    let grid = system.grid;
     let drive = |i, silent| forced(i, &grid, silent);
     let table: [(&str, Vec<Record>, usize, Symmetry); 8] = [
         ("one free", vec![free(0)], 199, Symmetry::Function),
@@ -147,7 +147,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         ),
     ];
     for (words, records, expected, symmetry) in table {
-        let problem = nodal(&oscillator, &device, &records);
+        let problem = nodal(&system, &device, &records);
         let counted = count(&problem);
         let seen = spectrum(&problem);
         println!(
@@ -169,16 +169,12 @@ fn the_count_and_the_rank_are_those_of_the_table() {
 #[test]
 fn a_force_that_pauses_sees_less_while_it_does() {
     let nodes = 80;
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
-    let (state, force) = forced(2, &oscillator.grid, 0);
+    let (state, force) = forced(2, &system.grid, 0);
     let mut force = force.unwrap();
     force[30..50].fill(0.0);
-    let problem = nodal(
-        &oscillator,
-        &device,
-        &[free(0), free(1), (state, Some(force))],
-    );
+    let problem = nodal(&system, &device, &[free(0), free(1), (state, Some(force))]);
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
     assert_eq!(count(&problem).seen_at_most, 3 * 79 - 19);
     assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
@@ -186,13 +182,13 @@ fn a_force_that_pauses_sees_less_while_it_does() {
 
 #[test]
 fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
-    let oscillator = common::oscillator(200, Method::Midpoint);
-    let force = forced(0, &oscillator.grid, 0);
+    let system = common::system(200, Method::Midpoint);
+    let force = forced(0, &system.grid, 0);
     for (record, expected, symmetry) in [
         (free(0), 3, Symmetry::ConstantFactor),
         (force, 4, Symmetry::None),
     ] {
-        let problem = linear_mass(&oscillator, record);
+        let problem = linear_mass(&system, record);
         let counted = count(&problem);
         println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
@@ -214,12 +210,12 @@ proptest! {
         rk4 in any::<bool>(),
     ) {
         let nodes = 30;
-        let oscillator = System {
+        let system = System {
             grid: Grid::new(0.0, 4.0, nodes).unwrap(),
             method: if rk4 { Method::Rk4 } else { Method::Midpoint },
             terms: vec![Term::Damping, Term::Stiffness],
         };
-        let grid = oscillator.grid;
+        let grid = system.grid;
         let function = |(base, swing, pace): (f64, f64, f64)| -> Vec<f64> {
             grid.times().iter().map(|t| base + swing * (pace * t).sin()).collect()
         };
@@ -230,7 +226,7 @@ proptest! {
             force[from..from + pause].fill(0.0);
             (state(y, v), drive.then_some(force))
         }).collect();
-        let problem = nodal(&oscillator, &device, &records);
+        let problem = nodal(&system, &device, &records);
         let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
@@ -241,8 +237,8 @@ proptest! {
 
 #[test]
 fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
-    let oscillator = common::oscillator(200, Method::Midpoint);
-    let problem = linear_mass(&oscillator, free(0));
+    let system = common::system(200, Method::Midpoint);
+    let problem = linear_mass(&system, free(0));
     let theta = problem.start();
     // Off the truth, so that there is a cost.
     let theta: Vec<f64> = theta.iter().map(|x| 1.05 * x - 0.01).collect();
@@ -281,15 +277,15 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
     for (method, order) in [(Method::Midpoint, 2.0), (Method::Rk4, 2.0)] {
         let off = |nodes: usize| {
-            let oscillator = common::oscillator(nodes, method);
-            let times = oscillator.grid.times();
+            let system = common::system(nodes, method);
+            let times = system.grid.times();
             let device = common::paper_device(nodes);
             let mut scaled = device.clone();
             for values in scaled.functions_mut() {
                 let factors = times.iter().map(|t| 1.0 + 0.4 * (0.5 * t).sin());
                 values.iter_mut().zip(factors).for_each(|(p, s)| *p *= s);
             }
-            let motion = |d: &NodalCoefficients| oscillator.forward(d, STATES[0], None).unwrap();
+            let motion = |d: &NodalCoefficients| system.forward(d, STATES[0], None).unwrap();
             largest(&motion(&device).displacement, &motion(&scaled).displacement)
         };
         let rate = (off(401) / off(801)).log2();
@@ -306,10 +302,10 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
 #[test]
 fn what_holds_the_scale_and_what_only_its_constant_factor() {
     let nodes = 60;
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
     let both = [free(0), free(1)];
-    let open = nodal(&oscillator, &device, &both);
+    let open = nodal(&system, &device, &both);
     let gauge = |problem: &Problem| Gauge::at(problem, &problem.start());
     let found = gauge(&open);
     assert_eq!(found.constant().count(), 1);
@@ -325,8 +321,8 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
     assert_eq!(named[0].name, "scale of (m, c, k)");
     assert_eq!(named[1].name, "scale over time s(t) of (m, c, k)");
 
-    let drive = forced(2, &oscillator.grid, 0);
-    let with_force = nodal(&oscillator, &device, &[free(0), free(1), drive]);
+    let drive = forced(2, &system.grid, 0);
+    let with_force = nodal(&system, &device, &[free(0), free(1), drive]);
     assert!(gauge(&with_force).is_empty());
 
     let mut fixed = open.clone();
@@ -337,7 +333,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
     ];
     fixed = fixed
         .with(|parts| {
-            parts.functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
+            parts.functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
         })
         .unwrap();
     assert!(gauge(&fixed).is_empty());
@@ -367,7 +363,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         println!("{}", counted.sentences().join("; "));
         assert_eq!(counted.symmetry, Symmetry::Function);
         let mut smooth = held.clone();
-        let rows = Basis::Nodal.roughness(&oscillator.grid, 2);
+        let rows = Basis::Nodal.roughness(&system.grid, 2);
         smooth = smooth
             .with(|parts| {
                 parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
@@ -427,7 +423,7 @@ impl Coverage {
 
 /// Fits of 200 records with noise: the coverage of every function that is sought, and of the ratios.
 fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
-    let clean = (problem.oscillator)
+    let clean = (problem.system)
         .forward(truth, problem.experiments[0].initial, None)
         .unwrap();
     // Enough draws for the 95 % point to two digits.
@@ -445,7 +441,7 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     let mut found = [(); 4].map(|()| Coverage::new());
     for seed in 0..200 {
         let mut noisy = problem.clone();
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         let values = with_noise(&clean.displacement, sigma, seed);
         noisy = noisy
             .with(|parts| {
@@ -482,8 +478,8 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
 
 #[test]
 fn bands_of_a_linear_mass_cover_the_truth() {
-    let oscillator = common::oscillator(500, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(500, Method::Rk4);
+    let grid = system.grid;
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let truth = NodalCoefficients {
         mass,
@@ -497,7 +493,7 @@ fn bands_of_a_linear_mass_cover_the_truth() {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
     ];
     coverage(
-        &with_records(&oscillator, list, &truth, &[free(0)]),
+        &with_records(&system, list, &truth, &[free(0)]),
         &truth,
         0.1,
     );
@@ -505,8 +501,8 @@ fn bands_of_a_linear_mass_cover_the_truth() {
 
 #[test]
 fn bands_of_functions_on_knots_cover_the_truth() {
-    let oscillator = common::oscillator(500, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(500, Method::Rk4);
+    let grid = system.grid;
     let basis = |count| Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, count),
     };
@@ -526,7 +522,7 @@ fn bands_of_functions_on_knots_cover_the_truth() {
         CoefficientFunction::free(CoefficientKind::Damping, damping.clone(), &grid, c),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
     ];
-    let mut problem = with_records(&oscillator, list, &truth, &[free(0)]);
+    let mut problem = with_records(&system, list, &truth, &[free(0)]);
     // So light that the bias is a small part of the standard error: sandwich bands leave it out.
     let rows = [mass.roughness(&grid, 2), damping.roughness(&grid, 1)];
     for (function, (rows, order)) in rows.into_iter().zip([2, 1]).enumerate() {
@@ -539,8 +535,8 @@ fn bands_of_functions_on_knots_cover_the_truth() {
 
 #[test]
 fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
-    let oscillator = common::oscillator(200, Method::Midpoint);
-    let problem = linear_mass(&oscillator, free(0));
+    let system = common::system(200, Method::Midpoint);
+    let problem = linear_mass(&system, free(0));
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
@@ -606,14 +602,14 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
 #[test]
 fn a_bound_that_is_active_makes_the_band_one_sided() {
     let nodes = 200;
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    let mut problem = with_records(&oscillator, list, &device, &[free(0)]);
+    let mut problem = with_records(&system, list, &device, &[free(0)]);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let open = Bands::at(&problem, &theta, &here, &BandSettings::default());
@@ -644,15 +640,15 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
 #[test]
 fn without_sigma_the_residuals_say_it() {
     let nodes = 400;
-    let oscillator = common::oscillator(nodes, Method::Rk4);
-    let with_sigma = linear_mass(&oscillator, forced(0, &oscillator.grid, 0));
+    let system = common::system(nodes, Method::Rk4);
+    let with_sigma = linear_mass(&system, forced(0, &system.grid, 0));
     let theta = with_sigma.start();
     let clean = with_sigma.evaluate(&theta).unwrap().predictions[0][0].clone();
     let sigma = 0.01;
     let values = with_noise(&clean, sigma, 5);
     let bands = |weighting: Weighting| {
         let mut problem = with_sigma.clone();
-        let grid = &oscillator.grid;
+        let grid = &system.grid;
         problem = problem
             .with(|parts| {
                 parts.experiments[0].channels = vec![Channel::displacement_at_nodes(
@@ -673,7 +669,7 @@ fn without_sigma_the_residuals_say_it() {
     };
     let known = bands(Weighting::Sigma(sigma));
     let guessed = bands(Weighting::Integral {
-        spacing: oscillator.grid.step(),
+        spacing: system.grid.step(),
     });
     assert_eq!(known.sigma, None);
     // The scatter of a standard deviation from 396 readings is 3.6 %: three of these, for both.
@@ -700,11 +696,11 @@ fn candidate(name: &str, (initial, force): Record) -> Candidate {
 #[test]
 fn the_next_experiment_is_the_one_that_sees_something_new() {
     let nodes = 60;
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let device = common::paper_device(nodes);
-    let drive = forced(2, &oscillator.grid, 0);
+    let drive = forced(2, &system.grid, 0);
     let ranked = |records: &[Record], candidates: &[Candidate]| {
-        let problem = nodal(&oscillator, &device, records);
+        let problem = nodal(&system, &device, records);
         let theta = problem.start();
         let here = problem.evaluate(&theta).unwrap();
         let found = rank_experiments(&problem, &theta, &here, candidates, false);
@@ -769,12 +765,12 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
 #[test]
 fn tangents_and_adjoints_give_the_same_jacobian() {
     let nodes = 40;
-    let oscillator = common::oscillator(nodes, Method::Rk4);
+    let system = common::system(nodes, Method::Rk4);
     let device = common::paper_device(nodes);
-    let drive = forced(1, &oscillator.grid, 0);
+    let drive = forced(1, &system.grid, 0);
     // 40 readings of 120 parameters: adjoints. Four times as many: tangents.
-    let one = nodal(&oscillator, &device, std::slice::from_ref(&drive));
-    let four = nodal(&oscillator, &device, &vec![drive; 4]);
+    let one = nodal(&system, &device, std::slice::from_ref(&drive));
+    let four = nodal(&system, &device, &vec![drive; 4]);
     let jacobian = |p: &Problem| {
         let here = p.evaluate(&p.start()).unwrap();
         Sensitivity::of(p, &here).jacobian
@@ -788,8 +784,8 @@ fn tangents_and_adjoints_give_the_same_jacobian() {
 #[test]
 fn a_record_that_ends_early_identifies_only_its_span() {
     let (nodes, half) = (500, 250);
-    let oscillator = common::oscillator(nodes, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(nodes, Method::Rk4);
+    let grid = system.grid;
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
@@ -802,7 +798,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let problem = with_records(&oscillator, list, &device, &[free(0)]);
+    let problem = with_records(&system, list, &device, &[free(0)]);
     let part = problem.experiments[0].channels[0].first(half);
     let (times, values) = (part.times().to_vec(), part.observed().to_vec());
     let weighting = part.weighting().clone();
@@ -837,8 +833,8 @@ fn a_record_that_ends_early_identifies_only_its_span() {
 #[test]
 fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let (nodes, sigma, seeds) = (300, 0.05, 200);
-    let oscillator = common::oscillator(nodes, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(nodes, Method::Rk4);
+    let grid = system.grid;
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 9),
     };
@@ -851,7 +847,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
         CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let bare = with_records(&oscillator, list, &device, &[free(0)]);
+    let bare = with_records(&system, list, &device, &[free(0)]);
     let mut problem = bare.clone();
     let rows = basis.roughness(&grid, 2);
     problem.penalize(Penalty::new(0, 2, 3e4, rows)).unwrap();
@@ -905,8 +901,8 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
 #[test]
 fn the_scale_by_bases_and_drives() {
     let nodes = 61;
-    let oscillator = common::oscillator(nodes, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(nodes, Method::Rk4);
+    let grid = system.grid;
     let device = NodalCoefficients {
         mass: grid.times().iter().map(|t| 1.0 - 0.02 * t).collect(),
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
@@ -917,7 +913,7 @@ fn the_scale_by_bases_and_drives() {
             let start = basis.project(&grid, values).unwrap();
             CoefficientFunction::free(quantity, basis, &grid, start)
         });
-        with_records(&oscillator, list.collect(), &device, records)
+        with_records(&system, list.collect(), &device, records)
     };
     let all = |basis: Basis| [basis.clone(), basis.clone(), basis];
     let knots = |count| uniform_knots(&grid, count);
@@ -974,7 +970,7 @@ fn the_scale_by_bases_and_drives() {
     }
 
     // A base that moves pushes with m b'': that scales too.
-    let mut problem = nodal(&oscillator, &device, &[free(0)]);
+    let mut problem = nodal(&system, &device, &[free(0)]);
     problem = problem
         .with(|parts| {
             parts.experiments[0].excitation = Some(Excitation {
@@ -990,10 +986,10 @@ fn the_scale_by_bases_and_drives() {
     );
 
     // Motions of a stiffness that is not linear do not add up: a third free record counts.
-    let mut cubic = oscillator.clone();
+    let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];
-    let linear = count(&nodal(&oscillator, &device, &records)).equations;
+    let linear = count(&nodal(&system, &device, &records)).equations;
     let bent = count(&nodal(&cubic, &device, &records)).equations;
     assert_eq!((linear, bent), (2 * (nodes - 1), 3 * (nodes - 1)));
 }

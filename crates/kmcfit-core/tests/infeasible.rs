@@ -19,24 +19,24 @@ const UNBOUNDED: f64 = f64::INFINITY;
 
 /// Readings of a mass that grows, `m = 0.8 + 0.01 t`; the mass is sought in `basis`.
 fn problem(basis: &Basis) -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(NODES, Method::Rk4);
+    let grid = system.grid;
     let truth = NodalCoefficients {
         mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     };
-    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
         CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    common::problem_of(oscillator, list, motion.displacement, None)
+    common::problem_of(system, list, motion.displacement, None)
 }
 
 fn knots() -> Basis {
-    let grid = common::oscillator(NODES, Method::Rk4).grid;
+    let grid = common::system(NODES, Method::Rk4).grid;
     Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 6),
     }
@@ -200,7 +200,7 @@ fn contradictory_constraints_are_infeasible_where_nobody_looked_before() {
 fn a_start_is_moved_to_where_there_is_a_mass() {
     let basis = Basis::Polynomial { degree: 4 };
     let mut problem = problem(&basis);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let times = [0.0, 12.5, 18.75];
     let mut group = RowGroup::new("three masses");
     let rows = basis.rows(&grid, &times, 0);

@@ -17,8 +17,8 @@ const JUMP: f64 = 12.0;
 const KNOTS: usize = 51;
 
 fn problem() -> (Problem, Vec<f64>) {
-    let oscillator = common::oscillator(2000, Method::Rk4);
-    let grid = oscillator.grid;
+    let system = common::system(2000, Method::Rk4);
+    let grid = system.grid;
     let nodes = grid.nodes();
     let level = |t: f64| if t < JUMP { 2.0 } else { 1.6 };
     let stiffness: Vec<f64> = grid.times().iter().map(|t| level(*t)).collect();
@@ -26,7 +26,7 @@ fn problem() -> (Problem, Vec<f64>) {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], stiffness],
     };
-    let observed = common::noisy(&oscillator, &truth, SIGMA, 1);
+    let observed = common::noisy(&system, &truth, SIGMA, 1);
     let knots = uniform_knots(&grid, KNOTS);
     let cells = knots
         .windows(2)
@@ -44,7 +44,7 @@ fn problem() -> (Problem, Vec<f64>) {
         ),
     ];
     (
-        common::problem_of(oscillator, list, observed, Some(SIGMA)),
+        common::problem_of(system, list, observed, Some(SIGMA)),
         cells,
     )
 }
@@ -130,7 +130,7 @@ fn squared_smoothness_smears_the_jump() {
     else {
         panic!("the stiffness has a basis");
     };
-    let rows = basis.roughness(&problem.oscillator.grid, 1);
+    let rows = basis.roughness(&problem.system.grid, 1);
     for weight in [1e2, 1e3, 1e4] {
         problem = problem
             .with(|parts| {

@@ -23,7 +23,7 @@ const STIFFNESS: f64 = 101.0;
 /// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
 fn problem() -> Problem {
     let nodes = STRIDE * (READINGS - 1) + 1;
-    let oscillator = System {
+    let system = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -32,9 +32,9 @@ fn problem() -> Problem {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
-    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
+    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
     let observed: Vec<f64> = motion.displacement.into_iter().step_by(STRIDE).collect();
-    let step = oscillator.grid.step();
+    let step = system.grid.step();
     // Known to be free of noise: so few readings look like noise to a rule that does not know.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
@@ -42,10 +42,10 @@ fn problem() -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 130.0, nodes),
     ];
-    let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &oscillator.grid);
+    let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &system.grid);
     let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment]).unwrap()
+    Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
 /// that is looked at, seen every fourth step.
 fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let nodes = 40_001;
-    let oscillator = System {
+    let system = System {
         grid: Grid::new(0.0, 40.0, nodes).unwrap(),
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
@@ -126,7 +126,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         true => 0.0,
         false => 4.0 * (3.1 * t).sin() + 3.0 * (5.3 * t + 1.0).sin(),
     };
-    let force: Vec<f64> = (oscillator.grid.times().into_iter().enumerate())
+    let force: Vec<f64> = (system.grid.times().into_iter().enumerate())
         .map(drive)
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
@@ -134,12 +134,10 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         displacement: 0.0,
         velocity: 0.0,
     };
-    let motion = oscillator
-        .forward(&device, rest, Some(&excitation))
-        .unwrap();
+    let motion = system.forward(&device, rest, Some(&excitation)).unwrap();
     let observed = motion.displacement.into_iter().step_by(4).collect();
     let weighting = Weighting::Sigma(1e-4);
-    let channel = Channel::displacement_at_nodes(observed, 4, weighting, &oscillator.grid);
+    let channel = Channel::displacement_at_nodes(observed, 4, weighting, &system.grid);
     let experiment = Experiment::free("two sines", rest, nodes)
         .with_excitation(excitation)
         .with_channel(channel);
@@ -151,10 +149,10 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
     ];
     let list = quantities.into_iter().zip([1.2, 1.0, 18.0, 12.0]);
     let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
-    let step = oscillator.grid.step();
+    let step = system.grid.step();
     let functions = Parameterization::new(list.collect(), nodes, step).unwrap();
     (
-        Problem::new(oscillator, functions, vec![experiment]).unwrap(),
+        Problem::new(system, functions, vec![experiment]).unwrap(),
         truth,
     )
 }
@@ -211,7 +209,7 @@ fn a_silent_beginning_says_nothing() {
 #[test]
 fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
     let nodes = 401;
-    let oscillator = System {
+    let system = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -219,17 +217,17 @@ fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
     // What no oscillator does.
     let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();
     let weighting = Weighting::Integral {
-        spacing: oscillator.grid.step(),
+        spacing: system.grid.step(),
     };
-    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 2.0, nodes),
     ];
-    let functions = Parameterization::new(list, nodes, oscillator.grid.step()).unwrap();
+    let functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
     let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
-    let problem = Problem::new(oscillator, functions, vec![experiment]).unwrap();
+    let problem = Problem::new(system, functions, vec![experiment]).unwrap();
     assert!(problem.supports_continuous() && !problem.truncated(0.5).supports_continuous());
     let settings = FitSettings {
         solver: Solver::GaussNewton,

@@ -83,7 +83,7 @@ impl Case {
     }
 }
 
-fn oscillator(nodes: usize, method: Method) -> System {
+fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
@@ -106,15 +106,13 @@ const ROUNDING: f64 = 1e-12;
 #[test]
 fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
     for_cases(|case| {
-        let oscillator = oscillator(501, Method::Rk4);
-        let device = case.device(&oscillator.grid);
-        let excitation = case.excitation(&oscillator.grid);
+        let system = system(501, Method::Rk4);
+        let device = case.device(&system.grid);
+        let excitation = case.excitation(&system.grid);
         let rest = State::default();
-        let both = oscillator.forward(&device, case.state(), Some(&excitation));
-        let free = oscillator.forward(&device, case.state(), None).unwrap();
-        let forced = oscillator
-            .forward(&device, rest, Some(&excitation))
-            .unwrap();
+        let both = system.forward(&device, case.state(), Some(&excitation));
+        let free = system.forward(&device, case.state(), None).unwrap();
+        let forced = system.forward(&device, rest, Some(&excitation)).unwrap();
         let sum: Vec<f64> = (free.displacement.iter().zip(&forced.displacement))
             .map(|(a, b)| a + b)
             .collect();
@@ -129,13 +127,13 @@ fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
 #[test]
 fn one_factor_of_all_functions_is_not_seen() {
     for_cases(|case| {
-        let oscillator = oscillator(501, Method::Midpoint);
-        let device = case.device(&oscillator.grid);
+        let system = system(501, Method::Midpoint);
+        let device = case.device(&system.grid);
         let mut scaled = device.clone();
         scaled
             .functions_mut()
             .for_each(|f| f.iter_mut().for_each(|p| *p *= 1.7));
-        let [a, b] = [&device, &scaled].map(|d| oscillator.forward(d, case.state(), None).unwrap());
+        let [a, b] = [&device, &scaled].map(|d| system.forward(d, case.state(), None).unwrap());
         let scale = size(&a.displacement);
         assert!(
             distance(&a.displacement, &b.displacement) <= ROUNDING * scale,
@@ -151,22 +149,20 @@ fn time_can_be_turned_round_to_the_order_of_the_stepper() {
     for (method, order) in [(Method::Midpoint, 2), (Method::Rk4, 4)] {
         for_cases(|case| {
             let error = |nodes: usize| -> f64 {
-                let oscillator = oscillator(nodes, method);
+                let system = system(nodes, method);
                 // Constant functions: sampled ones are lines between nodes, of order 2 whatever the stepper.
                 let constant = |f: usize| vec![case.functions[f][0]; nodes];
                 let device = |sign: f64| NodalCoefficients {
                     mass: constant(0),
                     coefficients: vec![constant(1).iter().map(|c| sign * c).collect(), constant(2)],
                 };
-                let there = oscillator
-                    .forward(&device(1.0), case.state(), None)
-                    .unwrap();
+                let there = system.forward(&device(1.0), case.state(), None).unwrap();
                 let last = nodes - 1;
                 let turned = State {
                     displacement: there.displacement[last],
                     velocity: -there.velocity[last],
                 };
-                let back = oscillator.forward(&device(-1.0), turned, None).unwrap();
+                let back = system.forward(&device(-1.0), turned, None).unwrap();
                 let Trajectory {
                     displacement,
                     velocity,
@@ -186,10 +182,10 @@ fn time_can_be_turned_round_to_the_order_of_the_stepper() {
 fn energy_is_balanced_to_the_order_of_the_stepper() {
     for_cases(|case| {
         let imbalance = |nodes: usize| -> [f64; 2] {
-            let oscillator = oscillator(nodes, Method::Rk4);
-            let grid = oscillator.grid;
+            let system = system(nodes, Method::Rk4);
+            let grid = system.grid;
             let excitation = case.excitation(&grid);
-            let motion = oscillator.forward(&case.device(&grid), case.state(), Some(&excitation));
+            let motion = system.forward(&case.device(&grid), case.state(), Some(&excitation));
             let Trajectory {
                 displacement: y,
                 velocity: v,
@@ -222,9 +218,9 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
 
 /// Readings of a case in a unit that is `per_metre` to the metre, `later` seconds later.
 fn record(case: Case, per_metre: f64, later: f64) -> Record {
-    let oscillator = oscillator(121, Method::Rk4);
-    let grid = oscillator.grid;
-    let motion = oscillator
+    let system = system(121, Method::Rk4);
+    let grid = system.grid;
+    let motion = system
         .forward(&case.device(&grid), case.state(), None)
         .unwrap();
     // A deterministic error, so that no fit is exact.
@@ -312,7 +308,7 @@ fn the_order_of_records_and_those_without_readings_do_not_matter() {
             displacement: 0.3,
             velocity: 0.0,
         };
-        let unused = Experiment::free("unused", state, both.oscillator.grid.nodes());
+        let unused = Experiment::free("unused", state, both.system.grid.nodes());
         more = more
             .with(|parts| {
                 parts.experiments.push(unused);
@@ -341,7 +337,7 @@ fn finer_knots_never_raise_the_optimum() {
                     let theta: Vec<f64> = (problem.functions.iter().zip(nodal.functions()))
                         .filter_map(|(f, values)| f.basis.as_ref().map(|basis| (basis, values)))
                         .flat_map(|(basis, values)| {
-                            basis.project(&problem.oscillator.grid, values).unwrap()
+                            basis.project(&problem.system.grid, values).unwrap()
                         })
                         .collect();
                     let settings = kmcfit_core::internals::solvers::FitSettings::default();

@@ -25,7 +25,7 @@ const INITIAL: State = State {
     velocity: 2.0,
 };
 
-fn oscillator() -> System {
+fn system() -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
@@ -100,11 +100,11 @@ fn problem(
     seed: u64,
 ) -> (Problem, NodalCoefficients) {
     let Reading { kind, noise, .. } = reading;
-    let oscillator = oscillator();
-    let grid = oscillator.grid;
+    let system = system();
+    let grid = system.grid;
     let truth = truth(&grid, basis);
     let maker = Truth {
-        oscillator: &oscillator,
+        system: &system,
         device: &truth,
         excitation: None,
         initial: INITIAL,
@@ -143,7 +143,7 @@ fn problem(
         };
     }
     (
-        Problem::new(oscillator, functions, vec![experiment]).unwrap(),
+        Problem::new(system, functions, vec![experiment]).unwrap(),
         truth,
     )
 }
@@ -199,7 +199,7 @@ fn check(basis: &Basis, reading: Reading, limit: f64) -> Vec<&'static str> {
 
 #[test]
 fn displacements_at_every_node_give_the_stiffness_to_a_thousandth() {
-    let grid = oscillator().grid;
+    let grid = system().grid;
     for basis in [spline(&grid), line(&grid)] {
         check(&basis, Reading::every_node(ChannelKind::Displacement), 1e-3);
     }
@@ -208,7 +208,7 @@ fn displacements_at_every_node_give_the_stiffness_to_a_thousandth() {
 #[test]
 fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
     let reading = Reading::every_node(ChannelKind::Acceleration);
-    check(&spline(&oscillator().grid), reading, 1e-3);
+    check(&spline(&system().grid), reading, 1e-3);
 }
 
 /// Five readings in the shortest period. Differences over them take several per cent off the
@@ -220,7 +220,7 @@ fn few_displacements_in_a_period_need_states_and_functions_at_once() {
         ..Reading::every_node(ChannelKind::Displacement)
     };
     // Four times fewer readings: errors twice as large.
-    let last = check(&line(&oscillator().grid), reading, 2e-3);
+    let last = check(&line(&system().grid), reading, 2e-3);
     assert_eq!(last, ["motion of the readings"; 2]);
 }
 
@@ -232,7 +232,7 @@ fn few_irregular_accelerations_need_states_and_functions_at_once() {
         irregular: true,
         ..Reading::every_node(ChannelKind::Acceleration)
     };
-    let last = check(&spline(&oscillator().grid), reading, 2e-3);
+    let last = check(&spline(&system().grid), reading, 2e-3);
     assert_eq!(last, ["motion of the readings"; 2]);
 }
 
@@ -243,6 +243,6 @@ fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
         noise: 0.2,
         ..Reading::every_node(ChannelKind::Displacement)
     };
-    let last = check(&spline(&oscillator().grid), reading, 2e-2);
+    let last = check(&spline(&system().grid), reading, 2e-2);
     assert_eq!(last, ["motion of the readings"; 2]);
 }

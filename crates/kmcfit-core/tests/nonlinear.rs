@@ -21,14 +21,14 @@ const REST: State = State {
 type Constant = (CoefficientKind, f64, f64);
 
 struct Case {
-    oscillator: System,
+    system: System,
     excitation: Excitation,
     constants: Vec<Constant>,
 }
 
 impl Case {
     fn device(&self) -> NodalCoefficients {
-        let nodes = self.oscillator.grid.nodes();
+        let nodes = self.system.grid.nodes();
         let values = |c: &Constant| vec![c.1; nodes];
         NodalCoefficients {
             mass: values(&self.constants[0]),
@@ -38,14 +38,14 @@ impl Case {
 
     fn motion(&self) -> Trajectory {
         let (device, excitation) = (self.device(), Some(&self.excitation));
-        self.oscillator.forward(&device, REST, excitation).unwrap()
+        self.system.forward(&device, REST, excitation).unwrap()
     }
 
     fn problem(&self, seed: u64) -> Problem {
-        let grid = self.oscillator.grid;
+        let grid = self.system.grid;
         let device = self.device();
         let truth = Truth {
-            oscillator: &self.oscillator,
+            system: &self.system,
             device: &device,
             excitation: Some(&self.excitation),
             initial: REST,
@@ -62,7 +62,7 @@ impl Case {
         let experiment = Experiment::free("driven", REST, nodes)
             .with_excitation(self.excitation.clone())
             .with_channel(channel);
-        Problem::new(self.oscillator.clone(), functions, vec![experiment]).unwrap()
+        Problem::new(self.system.clone(), functions, vec![experiment]).unwrap()
     }
 
     /// All constants to one per cent, and as near as the noise allows.
@@ -95,7 +95,7 @@ impl Case {
     }
 }
 
-fn oscillator(nodes: usize, duration: f64, terms: &[Term]) -> System {
+fn system(nodes: usize, duration: f64, terms: &[Term]) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
@@ -111,7 +111,7 @@ fn push(grid: &Grid, force: impl Fn(f64) -> f64) -> Excitation {
 fn duffing(factors: [f64; 4]) -> Case {
     let terms = [Term::Damping, Term::Stiffness, Term::CubicStiffness];
     // 30 to 60 steps in a period of the device, which is 2 to 4 s.
-    let oscillator = oscillator(1501, 100.0, &terms);
+    let system = system(1501, 100.0, &terms);
     let truth = [
         (CoefficientKind::Mass, 1.0),
         (CoefficientKind::Damping, 0.2),
@@ -120,11 +120,11 @@ fn duffing(factors: [f64; 4]) -> Case {
     ];
     let constants = truth.into_iter().zip(factors);
     Case {
-        excitation: push(&oscillator.grid, |t| {
+        excitation: push(&system.grid, |t| {
             2.0 * (1.2 * t).cos() + 1.5 * (2.3 * t).sin()
         }),
         constants: constants.map(|((q, p), f)| (q, p, f * p)).collect(),
-        oscillator,
+        system,
     }
 }
 
@@ -151,16 +151,16 @@ fn stick_slip() -> Case {
     let terms = [Term::Stiffness, Term::CoulombFriction { width: WIDTH }];
     // A step of 0.02 s: friction alone slows the mass within width m / F = 0.017 s while it sticks,
     // and the stepper is stable up to 2.8 of these.
-    let oscillator = oscillator(PERIODS * STEPS + 1, PERIODS as f64 * PERIOD, &terms);
+    let system = system(PERIODS * STEPS + 1, PERIODS as f64 * PERIOD, &terms);
     let w = std::f64::consts::TAU / PERIOD;
     Case {
-        excitation: push(&oscillator.grid, |t| 1.5 * (w * t).cos()),
+        excitation: push(&system.grid, |t| 1.5 * (w * t).cos()),
         constants: vec![
             (CoefficientKind::Mass, 1.0, 2.0),
             (CoefficientKind::Stiffness, 2.0, 1.0),
             (CoefficientKind::CoulombFriction, FRICTION, 0.25),
         ],
-        oscillator,
+        system,
     }
 }
 

@@ -17,13 +17,13 @@ const DECREASE: f64 = 1e-4;
 
 /// A known motion and noise, read with an offset that is sought, with readings' sigma.
 fn problem(sigma: f64) -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
+    let system = common::system(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
     let device = NodalCoefficients {
         mass: values[0].clone(),
         coefficients: values[1..].to_vec(),
     };
-    let motion = oscillator.forward(&device, common::INITIAL, None).unwrap();
+    let motion = system.forward(&device, common::INITIAL, None).unwrap();
     let observed = with_noise(&motion.displacement, 1.0, 7);
     let quantities = [
         CoefficientKind::Mass,
@@ -32,7 +32,7 @@ fn problem(sigma: f64) -> Problem {
     ];
     let list = quantities.into_iter().zip(values);
     let list = list.map(|(q, values)| CoefficientFunction::fixed(q, values));
-    let mut problem = common::problem_of(oscillator, list.collect(), observed, Some(sigma));
+    let mut problem = common::problem_of(system, list.collect(), observed, Some(sigma));
     let offset = ScalarParameter {
         name: "offset".into(),
         unit: "m".into(),

@@ -34,8 +34,8 @@ fn bases(grid: &Grid) -> [Basis; 6] {
 
 /// The answer: the mass of `basis` nearest to `m = 1 - 0.02 t`, c = 0.05, k = 1; the stiffness is
 /// known. Its smoothness costs nothing in any basis.
-fn truth(oscillator: &System, basis: &Basis) -> NodalCoefficients {
-    let grid = oscillator.grid;
+fn truth(system: &System, basis: &Basis) -> NodalCoefficients {
+    let grid = system.grid;
     let line: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let theta = basis.project(&grid, &line).unwrap();
     NodalCoefficients {
@@ -46,13 +46,13 @@ fn truth(oscillator: &System, basis: &Basis) -> NodalCoefficients {
 
 /// The mass in `basis`, a constant damping, a known stiffness, started at `(m, c)`.
 fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, NodalCoefficients) {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
-    let truth = truth(&oscillator, basis);
-    let observed = oscillator
+    let system = common::system(NODES, Method::Rk4);
+    let truth = truth(&system, basis);
+    let observed = system
         .forward(&truth, common::INITIAL, None)
         .unwrap()
         .displacement;
-    let grid = oscillator.grid;
+    let grid = system.grid;
     let list = vec![
         CoefficientFunction::free(
             CoefficientKind::Mass,
@@ -63,7 +63,7 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Nod
         CoefficientFunction::constant(CoefficientKind::Damping, start.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    let mut problem = common::problem_of(oscillator, list, observed, None);
+    let mut problem = common::problem_of(system, list, observed, None);
     // Weak enough not to move the answer, which it does not charge; it makes it the only one.
     let rows = basis.roughness(&grid, 2);
     problem.penalize(Penalty::new(0, 2, 1.0, rows)).unwrap();
@@ -80,7 +80,7 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Nod
 
 /// The mass is only lost, and the damping is never negative.
 fn constraints(problem: &Problem, basis: &Basis) -> Vec<RowGroup> {
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let mut falling = RowGroup::new("mass non-increasing");
     let times: Vec<f64> = grid.times().into_iter().step_by(4).collect();
     let values = basis.rows(&grid, &times, 0);
@@ -147,7 +147,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
 
 #[test]
 fn the_share_of_starts_that_reach_the_answer_does_not_fall() {
-    let grid = common::oscillator(NODES, Method::Rk4).grid;
+    let grid = common::system(NODES, Method::Rk4).grid;
     let lbfgs = Solver::Lbfgs { memory: 20 };
     // Gauss-Newton takes the curvature of the cost into account. The others have the gradient alone,
     // and with one value per node the penalty on the curvature of m is up to (pi/dt)^4 times stiffer

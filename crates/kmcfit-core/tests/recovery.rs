@@ -37,8 +37,8 @@ fn run(problem: &Problem, initial: Initial) -> Fit {
 }
 
 /// Degree 1 for the mass, constant damping, stiffness fixed at 1; start (2, 1).
-fn linear_mass(oscillator: System, observed: Vec<f64>, sigma: Option<f64>) -> Problem {
-    let grid = oscillator.grid;
+fn linear_mass(system: System, observed: Vec<f64>, sigma: Option<f64>) -> Problem {
+    let grid = system.grid;
     let degree_1 = Basis::Polynomial { degree: 1 };
     let list = vec![
         CoefficientFunction::free(
@@ -50,21 +50,21 @@ fn linear_mass(oscillator: System, observed: Vec<f64>, sigma: Option<f64>) -> Pr
         CoefficientFunction::constant(CoefficientKind::Damping, 1.0, grid.nodes()),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; grid.nodes()]),
     ];
-    common::problem_of(oscillator, list, observed, sigma)
+    common::problem_of(system, list, observed, sigma)
 }
 
 fn paper_data(nodes: usize) -> (System, NodalCoefficients, Vec<f64>) {
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
+    let system = common::system(nodes, Method::Midpoint);
     let truth = common::paper_device(nodes);
-    let motion = oscillator.forward(&truth, common::INITIAL, None).unwrap();
-    (oscillator, truth, motion.displacement)
+    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    (system, truth, motion.displacement)
 }
 
 #[test]
 fn a_linear_mass_is_recovered_to_1e_10() {
     for initial in [Initial::Functions, Initial::Data] {
-        let (oscillator, truth, observed) = paper_data(2000);
-        let problem = linear_mass(oscillator, observed, None);
+        let (system, truth, observed) = paper_data(2000);
+        let problem = linear_mass(system, observed, None);
         let found = run(&problem, initial);
         let errors = common::errors(&found.best.evaluation.device, &truth);
         assert!(errors[0] <= 1e-10, "{initial:?} {errors:?}");
@@ -73,8 +73,8 @@ fn a_linear_mass_is_recovered_to_1e_10() {
 
 #[test]
 fn knots_recover_all_three_functions_to_1e_6() {
-    let (oscillator, truth, observed) = paper_data(2000);
-    let grid = oscillator.grid;
+    let (system, truth, observed) = paper_data(2000);
+    let grid = system.grid;
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
@@ -88,7 +88,7 @@ fn knots_recover_all_three_functions_to_1e_6() {
         .zip([2.0, 1.0, 1.0])
         .map(|(q, start)| CoefficientFunction::free(q, basis.clone(), &grid, vec![start; 11]))
         .collect();
-    let mut problem = common::problem_of(oscillator, list, observed, None);
+    let mut problem = common::problem_of(system, list, observed, None);
     common::add_physics(&mut problem, 1.0, false);
     for initial in [Initial::Functions, Initial::Data] {
         let found = run(&problem, initial);
@@ -98,7 +98,7 @@ fn knots_recover_all_three_functions_to_1e_6() {
 }
 
 fn smooth_nodal(nodes: usize) -> (Problem, NodalCoefficients) {
-    let (oscillator, truth, observed) = paper_data(nodes);
+    let (system, truth, observed) = paper_data(nodes);
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,
@@ -109,7 +109,7 @@ fn smooth_nodal(nodes: usize) -> (Problem, NodalCoefficients) {
         .zip([2.0, 1.0, 1.0])
         .map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]))
         .collect();
-    let mut problem = common::problem_of(oscillator, list, observed, None);
+    let mut problem = common::problem_of(system, list, observed, None);
     common::add_physics(&mut problem, 1.0, true);
     (problem, truth)
 }
@@ -142,13 +142,13 @@ fn one_value_per_step_recovers_all_three_functions_from_the_start_of_the_paper()
 
 /// Readings from the closed form for m = 1 - 0.02 t.
 fn bessel_fit(nodes: usize, method: Method) -> f64 {
-    let oscillator = common::oscillator(nodes, method);
-    let times = oscillator.grid.times();
+    let system = common::system(nodes, method);
+    let times = system.grid.times();
     let observed = times
         .iter()
         .map(|t| Bessel::PAPER.displacement(*t))
         .collect();
-    let problem = linear_mass(oscillator, observed, None);
+    let problem = linear_mass(system, observed, None);
     let found = run(&problem, Initial::Data);
     let mass = &found.best.evaluation.device.mass;
     let errors = mass
@@ -191,8 +191,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
                 },
             };
             let motion = &here.trajectories[0];
-            reference::tangent(&problem.oscillator, &here.device, None, motion, &direction)
-                .displacement
+            reference::tangent(&problem.system, &here.device, None, motion, &direction).displacement
         })
         .collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -210,8 +209,8 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
 #[test]
 fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
     const SIGMA: f64 = 0.1;
-    let (oscillator, truth, clean) = paper_data(2000);
-    let problem = linear_mass(oscillator.clone(), clean, None);
+    let (system, truth, clean) = paper_data(2000);
+    let problem = linear_mass(system.clone(), clean, None);
     let exact = {
         let found = run(&problem, Initial::Data);
         found.best.parameters
@@ -219,8 +218,8 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
     let information = fisher(&problem, &exact, SIGMA);
     let mut sum = 0.0;
     for seed in 1..=20 {
-        let observed = common::noisy(&oscillator, &truth, SIGMA, seed);
-        let noisy = linear_mass(oscillator.clone(), observed, Some(SIGMA));
+        let observed = common::noisy(&system, &truth, SIGMA, seed);
+        let noisy = linear_mass(system.clone(), observed, Some(SIGMA));
         let found = run(&noisy, Initial::Data).best.parameters;
         let e: Vec<f64> = found.iter().zip(&exact).map(|(a, b)| a - b).collect();
         for (i, row) in information.iter().enumerate() {
@@ -239,8 +238,8 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
 /// seen, and one record gives one equation per instant for the two.
 #[test]
 fn positivity_alone_does_not_find_the_device() {
-    let (oscillator, truth, observed) = paper_data(2000);
-    let nodes = oscillator.grid.nodes();
+    let (system, truth, observed) = paper_data(2000);
+    let nodes = system.grid.nodes();
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,
@@ -251,7 +250,7 @@ fn positivity_alone_does_not_find_the_device() {
         .zip([2.0, 1.0, 1.0])
         .map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]))
         .collect();
-    let mut problem = common::problem_of(oscillator, list, observed, None);
+    let mut problem = common::problem_of(system, list, observed, None);
     common::add_physics(&mut problem, 1.0, true);
     problem = problem
         .with(|parts| {

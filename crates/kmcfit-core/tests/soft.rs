@@ -14,9 +14,9 @@ const NODES: usize = 201;
 
 /// The paper's mass, which falls from 1 to 0.5, by six knots, with noise; the stiffness is known.
 fn problem() -> Problem {
-    let oscillator = common::oscillator(NODES, Method::Rk4);
-    let grid = oscillator.grid;
-    let observed = common::noisy(&oscillator, &common::paper_device(NODES), 0.05, 5);
+    let system = common::system(NODES, Method::Rk4);
+    let grid = system.grid;
+    let observed = common::noisy(&system, &common::paper_device(NODES), 0.05, 5);
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 6),
     };
@@ -25,7 +25,7 @@ fn problem() -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    common::problem_of(oscillator, list, observed, None)
+    common::problem_of(system, list, observed, None)
 }
 
 /// `mass >= 0.7` at every knot, which the truth breaks after 15 s.

@@ -76,7 +76,7 @@ impl Setup {
         }
     }
 
-    fn oscillator(&self) -> System {
+    fn system(&self) -> System {
         System {
             grid: Grid::new(0.0, DURATION, NODES).unwrap(),
             method: Method::Rk4,
@@ -96,26 +96,26 @@ impl Setup {
     }
 
     fn clean(&self) -> Vec<f64> {
-        let oscillator = self.oscillator();
+        let system = self.system();
         let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
         let device = NodalCoefficients {
             mass: each[0].clone(),
             coefficients: each[1..].to_vec(),
         };
         let truth = Truth {
-            oscillator: &oscillator,
+            system: &system,
             device: &device,
             excitation: self.excitation.as_ref(),
             initial: INITIAL,
         };
-        let seen = truth.seen(self.kind, &oscillator.grid.times(), &[]);
+        let seen = truth.seen(self.kind, &system.grid.times(), &[]);
         let [gain, offset] = self.sensor.unwrap_or([1.0, 0.0]);
         seen.iter().map(|x| gain * x + offset).collect()
     }
 
     fn problem(&self, values: Vec<f64>, sigma: f64) -> Problem {
-        let oscillator = self.oscillator();
-        let grid = oscillator.grid;
+        let system = self.system();
+        let grid = system.grid;
         let quantities =
             std::iter::once(CoefficientKind::Mass).chain(self.terms.iter().map(|t| t.1));
         let list = quantities.zip(self.start.iter().zip(&self.truth));
@@ -154,12 +154,7 @@ impl Setup {
         let functions = Parameterization::new(list, NODES, grid.step())
             .unwrap()
             .with_scalars(scalars);
-        Problem::new(
-            oscillator,
-            functions,
-            vec![experiment.with_channel(channel)],
-        )
-        .unwrap()
+        Problem::new(system, functions, vec![experiment.with_channel(channel)]).unwrap()
     }
 
     /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
@@ -330,7 +325,7 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
     let setup = Setup::free(ChannelKind::Displacement);
     let covariance = |knots: usize, readings: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
-        let grid = problem.oscillator.grid;
+        let grid = problem.system.grid;
         let basis = Basis::PiecewiseLinear {
             knots: uniform_knots(&grid, knots),
         };
@@ -369,7 +364,7 @@ fn what_the_readings_do_not_see_has_no_covariance() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     let covariance = |setup: &Setup, readings: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
-        let grid = problem.oscillator.grid;
+        let grid = problem.system.grid;
         let times = grid.times()[50..50 + readings].to_vec();
         let values = setup.clean()[50..50 + readings].to_vec();
         let weighting = Weighting::Sigma(0.1);

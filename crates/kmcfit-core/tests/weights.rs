@@ -16,8 +16,8 @@ use std::ops::RangeInclusive;
 const SIGMA: f64 = 0.1;
 
 fn nodal_problem(truth: &NodalCoefficients, nodes: usize, bounded: bool, seed: u64) -> Problem {
-    let oscillator = common::oscillator(nodes, Method::Midpoint);
-    let observed = common::noisy(&oscillator, truth, SIGMA, seed);
+    let system = common::system(nodes, Method::Midpoint);
+    let observed = common::noisy(&system, truth, SIGMA, seed);
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,
@@ -28,7 +28,7 @@ fn nodal_problem(truth: &NodalCoefficients, nodes: usize, bounded: bool, seed: u
         .zip([2.0, 1.0, 1.0])
         .map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]))
         .collect();
-    let mut problem = common::problem_of(oscillator, list, observed, Some(SIGMA));
+    let mut problem = common::problem_of(system, list, observed, Some(SIGMA));
     common::add_physics(&mut problem, 1.0, bounded);
     problem
 }
@@ -112,7 +112,7 @@ fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f6
     let truth = curved_device(nodes);
     let each = (1..=seeds).map(|seed| {
         let mut problem = nodal_problem(&truth, nodes, false, seed);
-        let rows = Basis::Nodal.roughness(&problem.oscillator.grid, order_of_mass);
+        let rows = Basis::Nodal.roughness(&problem.system.grid, order_of_mass);
         problem = problem
             .with(|parts| {
                 parts.penalties[0] = Penalty::new(0, order_of_mass, 1.0, rows);

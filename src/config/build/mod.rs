@@ -266,7 +266,7 @@ impl Model {
     /// # Errors
     /// About the model file, with what may be needed and what is available.
     pub fn check_study_memory(&self) -> Result<(), InputError> {
-        let nodes = self.problem.oscillator.grid.nodes() as u64;
+        let nodes = self.problem.system.grid.nodes() as u64;
         let needed = nodes.saturating_mul(STUDY_PER_NODE) + self.memory;
         memory::check(needed).map_err(|available| {
             InputError::file(

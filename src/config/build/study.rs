@@ -204,7 +204,7 @@ fn equivalent(
     key: &str,
     spec: &EquivalentSpec,
 ) -> Result<Equivalent, InputError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let mass_key = format!("{key}.mass");
     let mass = values(file, grid, &mass_key, &spec.mass)?;
     if let Some(least) = mass.iter().find(|m| **m <= 0.0) {
@@ -244,7 +244,7 @@ fn within(
 
 /// Times on the grid; evenly spread where none are given.
 fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
         let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
         return Ok((0..TUBES).map(time).collect());
@@ -261,7 +261,7 @@ fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f6
 }
 
 fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<(), InputError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     match kmcfit_core::internals::system::TimePoint::of(grid, time) {
         Some(_) => Ok(()),
         None => Err(file
@@ -357,7 +357,7 @@ fn candidate(
     key: &str,
     spec: &CandidateSpec,
 ) -> Result<Candidate, InputError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let nodes = grid.nodes();
     let initial = State {
         displacement: spec.initial.displacement.0,

@@ -177,7 +177,7 @@ fn reaches(
 /// The true devices, each once, with its label and the run whose grid it is on.
 fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
     let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
-    let grid = |run: &'_ ComparedRun| run.finished.oscillator.grid;
+    let grid = |run: &'_ ComparedRun| run.finished.system.grid;
     for (run, truth) in runs
         .iter()
         .filter_map(|run| Some((run, run.finished.truth.as_ref()?)))

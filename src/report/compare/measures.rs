@@ -105,7 +105,7 @@ impl Measures {
             smallest_mass: smallest(&device.mass),
             smallest_damping: smallest(&device.coefficients[0]),
             max_violation: run.max_violation,
-            roughness: Roughness::of(device, run.finished.oscillator.grid.step()),
+            roughness: Roughness::of(device, run.finished.system.grid.step()),
             predictions: document.predictions.clone(),
             knowledge: document.identifiability.knowledge.clone(),
             open: document.identifiability.open.clone(),

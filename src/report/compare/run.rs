@@ -60,7 +60,7 @@ impl ComparedRun {
 
     /// Times of the nodes, s.
     pub fn times(&self) -> Vec<f64> {
-        self.finished.oscillator.grid.times()
+        self.finished.system.grid.times()
     }
 }
 

@@ -67,7 +67,7 @@ pub fn spectrum(at: Optimum) -> SpectrumPiece {
                 share: named.share,
             })
             .collect(),
-        times: at.problem.oscillator.grid.times(),
+        times: at.problem.system.grid.times(),
         best: records(spectrum.best(at.problem, DIRECTIONS)),
         worst: records(spectrum.worst(at.problem, DIRECTIONS)),
         singular_values: spectrum.singular_values().to_vec(),
@@ -104,7 +104,7 @@ pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -
         };
         band_record(band, factor, real)
     });
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let fixed = evaluation.trajectories.first().map(|m| anchors(grid, m));
     let [turning_points, zero_crossings] =
         fixed.map_or_else(Default::default, |a| [a.turning_points, a.zero_crossings]);
@@ -226,7 +226,7 @@ pub fn equivalents(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentRecord> {
         let mut coefficients = found.device.coefficients.into_iter();
         EquivalentRecord {
             name: found.name,
-            times: at.problem.oscillator.grid.times(),
+            times: at.problem.system.grid.times(),
             mass: found.device.mass,
             damping: coefficients.next().unwrap_or_default(),
             stiffness: coefficients.next().unwrap_or_default(),

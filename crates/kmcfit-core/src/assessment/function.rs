@@ -86,10 +86,9 @@ pub fn function_summaries(
             verdict: judged.map(|j| j.verdict.kind()),
             known_range: judged.and_then(|j| j.known_range),
             powers: match &function.basis {
-                Some(Basis::Polynomial { .. }) => Some(physical_powers(
-                    &problem.oscillator.grid,
-                    &theta[range.clone()],
-                )),
+                Some(Basis::Polynomial { .. }) => {
+                    Some(physical_powers(&problem.system.grid, &theta[range.clone()]))
+                }
                 _ => None,
             },
             standard_error: standard_error(function, range.start, covariance),

@@ -249,7 +249,7 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
             });
         }
     }
-    let step = problem.oscillator.grid.step();
+    let step = problem.system.grid.step();
     for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
         let force = experiment
             .excitation
@@ -294,7 +294,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     if !channels.all(alike) || experiments.any(|e| driven(&e.excitation)) {
         return None;
     }
-    let place = (problem.oscillator.terms.iter()).position(|term| *term == Term::Stiffness)?;
+    let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
     let device = &evaluation.device;
     let pairs = device.mass.iter().zip(&device.coefficients[place]);
     let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();

@@ -59,7 +59,7 @@ impl Builder {
         notices: &mut Vec<BuildNotice>,
     ) -> Result<(), BuildError> {
         let key = &constraint.key;
-        let grid = problem.oscillator.grid;
+        let grid = problem.system.grid;
         constraint.check()?;
         if let Statement::Bounds { min, max, .. } = &constraint.statement {
             uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;

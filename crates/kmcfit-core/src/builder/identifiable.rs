@@ -11,7 +11,7 @@ use crate::system::Term;
 pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     let scalars = problem.functions.scalars();
     let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
-    let terms = &problem.oscillator.terms;
+    let terms = &problem.system.terms;
     let shift_is_free = |t: &Term| t.is_linear() || *t == Term::Offset;
     if terms.iter().all(shift_is_free) {
         check_offsets(problem, &open)?;

@@ -58,7 +58,7 @@ impl Builder {
                     j,
                     order,
                     factor,
-                    basis.roughness(&problem.oscillator.grid, order),
+                    basis.roughness(&problem.system.grid, order),
                 );
                 if let Some(reference) = reference {
                     let residuals = residuals_at(problem, &basis, &key, reference, &penalty)?;
@@ -156,7 +156,7 @@ fn penalize_variation(
     if weight == 0.0 {
         return Ok(());
     }
-    let rows = basis.changes(&problem.oscillator.grid);
+    let rows = basis.changes(&problem.system.grid);
     let added = problem.penalize_variation(Variation {
         function,
         weight,
@@ -173,7 +173,7 @@ fn residuals_at(
     reference: &Limit,
     penalty: &Penalty,
 ) -> Result<Vec<f64>, BuildError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let key = format!("{key}.reference");
     let values = values_at_nodes(reference, &key, grid.nodes())?;
     // The part of the reference outside the basis adds a constant to the cost and nothing else.

@@ -123,10 +123,7 @@ impl Bands {
         let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
         let maker = Maker {
             problem,
-            times: nodes
-                .iter()
-                .map(|i| problem.oscillator.grid.time(*i))
-                .collect(),
+            times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
             nodes,
             factors: [&tight, &loose],
             directions: &information.sensitivity().directions,
@@ -354,7 +351,7 @@ impl Maker<'_> {
     /// Ratios of the main system by the delta method.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[Linearised]) -> Vec<Band> {
         let assembly = self.problem.functions.assembly(0);
-        let terms = &self.problem.oscillator.terms;
+        let terms = &self.problem.system.terms;
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;
             Some(assembly[place + 1])

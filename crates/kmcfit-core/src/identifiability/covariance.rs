@@ -65,7 +65,7 @@ impl Information {
             measured,
             pulled,
             sensitivity,
-            rounding: f64::EPSILON * largest * problem.oscillator.grid.nodes() as f64,
+            rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
         }
     }
 

@@ -27,7 +27,7 @@ impl Directions {
     /// about `coarse` directions in all.
     pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize, coarse: usize) -> Self {
         let sizes = problem.natural_scales(evaluation);
-        let duration = problem.oscillator.grid.duration();
+        let duration = problem.system.grid.duration();
         let metric = problem.functions.relative_metric(&sizes, duration);
         let unit = |j: usize| vec![(j, 1.0 / metric[j].sqrt())];
         let parameters = problem.parameters();

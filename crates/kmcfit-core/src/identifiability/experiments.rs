@@ -176,7 +176,7 @@ fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gau
 
 /// The candidate as an experiment; why it is none otherwise.
 fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, String> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let nodes = grid.nodes();
     if candidate.channels.is_empty() {
         return Err("it measures nothing".into());

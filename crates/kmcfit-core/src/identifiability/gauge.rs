@@ -317,7 +317,7 @@ fn change(
     factor: &[f64],
 ) -> Vec<f64> {
     let functions = &problem.functions;
-    let weights = trapezoid_weights(functions.nodes(), problem.oscillator.grid.step());
+    let weights = trapezoid_weights(functions.nodes(), problem.system.grid.step());
     let mut change = vec![0.0; problem.parameters()];
     for &f in &component.functions {
         let range = functions.ranges()[f].clone();

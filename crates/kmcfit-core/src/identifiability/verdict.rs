@@ -144,7 +144,7 @@ pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Ve
     let assembly = problem.functions.assembly(0);
     let mass = median_size(&evaluation.device.mass);
     let of = |term: Term| {
-        let place = problem.oscillator.terms.iter().position(|t| *t == term)?;
+        let place = problem.system.terms.iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
     let named = [("k/m", of(Term::Stiffness)), ("c/m", of(Term::Damping))];

@@ -53,7 +53,7 @@ impl Problem {
         let (by_mass, others) = gradient.split_at_mut(nodes);
         let (by_damping, by_stiffness) = others.split_at_mut(nodes);
         let (cost, initial) = least_squares(
-            &self.oscillator,
+            &self.system,
             [mass, damping, stiffness],
             experiment.initial,
             channel.observed(),
@@ -74,7 +74,7 @@ impl Problem {
         let [channel] = experiment.channels.as_slice() else {
             return None;
         };
-        let nodes = self.oscillator.grid.nodes();
+        let nodes = self.system.grid.nodes();
         let mut designs = self.functions.iter().map(|f| &f.design);
         let plain = experiment.nodes == nodes
             && channel.len() == nodes
@@ -132,7 +132,7 @@ mod tests {
             .collect::<Vec<_>>()
             .try_into()
             .unwrap();
-        let grid = problem.oscillator.grid;
+        let grid = problem.system.grid;
         let functions = Parameterization::with_devices(
             vec![k, m, c],
             vec![vec![1, 2, 0]],

@@ -189,7 +189,7 @@ impl Problem {
             &mut own,
         );
         let found = view.engine().discrete_adjoint_sums(
-            view.oscillator,
+            view.system,
             view.device,
             view.excitation,
             view.motion,
@@ -221,7 +221,7 @@ impl Problem {
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
             let share = continuous_adjoint(
-                &self.oscillator,
+                &self.system,
                 view.device,
                 view.excitation,
                 view.motion,
@@ -237,7 +237,7 @@ impl Problem {
             device.unwrap_or_else(|| self.functions.empty_device())
         };
         let nodal: Vec<NodalCoefficients> = nodal.into_iter().map(or_empty).collect();
-        let grid = &self.oscillator.grid;
+        let grid = &self.system.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let identity = |f: &CoefficientFunction| matches!(f.design, Design::Identity);
         if let ([total], true) = (nodal.as_slice(), self.functions.iter().all(identity)) {

@@ -80,7 +80,7 @@ impl Problem {
         loop {
             let errors = self.gradient_error(theta, kind, &steps)?;
             let check = GradientCheck {
-                nodes: self.oscillator.grid.nodes(),
+                nodes: self.system.grid.nodes(),
                 kind,
                 step: errors.iter().map(|e| e.step).collect(),
                 error: errors.iter().map(|e| e.error).collect(),

@@ -155,11 +155,11 @@ impl Problem {
             };
             let motion = &mut evaluation.trajectories[e];
             let initial = experiment.initial_state(&evaluation.scalars);
-            let (oscillator, excitation) = (&self.oscillator, experiment.excitation.as_ref());
-            let engine = Engine::choose(oscillator, excitation, motion.nodes(), purpose);
-            engine.forward_into(oscillator, device, initial, excitation, motion)?;
+            let (system, excitation) = (&self.system, experiment.excitation.as_ref());
+            let engine = Engine::choose(system, excitation, motion.nodes(), purpose);
+            engine.forward_into(system, device, initial, excitation, motion)?;
             let view = SimulatedRecord {
-                oscillator,
+                system,
                 device,
                 excitation,
                 motion,
@@ -181,7 +181,7 @@ impl Problem {
     pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> SimulatedRecord<'a> {
         let experiment = &self.experiments[e];
         SimulatedRecord {
-            oscillator: &self.oscillator,
+            system: &self.system,
             device: evaluation.device_of(experiment.device),
             excitation: experiment.excitation.as_ref(),
             motion: &evaluation.trajectories[e],
@@ -211,7 +211,7 @@ impl Problem {
                 },
             };
             let (device, excitation) = (view.device, view.excitation);
-            let motion = tangent(view.oscillator, device, excitation, view.motion, &direction);
+            let motion = tangent(view.system, device, excitation, view.motion, &direction);
             let along = RecordTangent {
                 device: &direction.device,
                 motion: &motion,
@@ -243,7 +243,7 @@ impl Problem {
         SimulationError {
             cause: Cause::CostOverflow,
             node,
-            time: self.oscillator.grid.time(node),
+            time: self.system.grid.time(node),
             value: worst.1,
         }
     }

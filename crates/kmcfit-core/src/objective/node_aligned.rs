@@ -48,7 +48,7 @@ impl Channel {
         seen: &mut Accelerations,
     ) {
         let nodes = NodalObservations {
-            oscillator: view.oscillator,
+            system: view.system,
             device: view.device,
             states: view.motion,
         };

@@ -13,7 +13,7 @@ impl Channel {
     /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
-            view.oscillator,
+            view.system,
             self.kind(),
             view.device,
             view.excitation,

@@ -27,13 +27,12 @@ impl Problem {
         &self,
         evaluation: &Evaluation,
     ) -> Result<Option<Refined>, SimulationError> {
-        let Some(grid) = (self.oscillator.grid).with_nodes(2 * self.oscillator.grid.nodes() - 1)
-        else {
+        let Some(grid) = (self.system.grid).with_nodes(2 * self.system.grid.nodes() - 1) else {
             return Ok(None);
         };
-        let oscillator = System {
+        let system = System {
             grid,
-            ..self.oscillator.clone()
+            ..self.system.clone()
         };
         let mut refined = Refined {
             step: grid.step(),
@@ -47,14 +46,14 @@ impl Problem {
             let device = halved(evaluation.device_of(experiment.device));
             let mut motion = Trajectory::zeros(experiment.nodes);
             reference::forward_into(
-                &oscillator,
+                &system,
                 &device,
                 experiment.initial_state(&evaluation.scalars),
                 experiment.excitation.as_ref(),
                 &mut motion,
             )?;
             let view = SimulatedRecord {
-                oscillator: &oscillator,
+                system: &system,
                 device: &device,
                 excitation: experiment.excitation.as_ref(),
                 motion: &motion,

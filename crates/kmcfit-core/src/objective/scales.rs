@@ -28,8 +28,8 @@ impl Problem {
     }
 
     fn sizes(&self, evaluation: &Evaluation, size_of: fn(&[f64]) -> f64) -> Vec<f64> {
-        let terms = &self.oscillator.terms;
-        let step = self.oscillator.grid.step();
+        let terms = &self.system.terms;
+        let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
             .map(|motion| squares(motion, terms, step))
             .collect();

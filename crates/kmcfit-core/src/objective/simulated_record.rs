@@ -7,7 +7,7 @@ use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 #[derive(Debug, Clone, Copy)]
 pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
-    pub oscillator: &'a System,
+    pub system: &'a System,
     /// The device that moves.
     pub device: &'a NodalCoefficients,
     /// What drives it.
@@ -33,18 +33,18 @@ impl SimulatedRecord<'_> {
     /// The engine of its response and derivatives.
     pub(crate) fn engine(&self) -> Engine {
         let nodes = self.motion.nodes();
-        Engine::choose(self.oscillator, self.excitation, nodes, Purpose::Estimation)
+        Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
     }
 
     /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
-            oscillator,
+            system,
             device,
             excitation,
             motion,
             ..
         } = self;
-        (self.engine()).discrete_adjoint(oscillator, device, *excitation, motion, source)
+        (self.engine()).discrete_adjoint(system, device, *excitation, motion, source)
     }
 }

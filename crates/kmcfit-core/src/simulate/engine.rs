@@ -42,17 +42,17 @@ const SHORTEST_IN_BLOCKS: usize = 64;
 impl Engine {
     /// The engine for a response over `nodes` nodes.
     pub fn choose(
-        oscillator: &System,
+        system: &System,
         excitation: Option<&Excitation>,
         nodes: usize,
         purpose: Purpose,
     ) -> Self {
-        let has_blocks = nodes > SHORTEST_IN_BLOCKS && is_linear_midpoint(oscillator);
+        let has_blocks = nodes > SHORTEST_IN_BLOCKS && is_linear_midpoint(system);
         match purpose {
             Purpose::Reproduction => Self::Reference,
             // The iterations of descents along the gradient alone depend on every bit; of linear free
             // responses the bits of the reference are kept where the record is not cut.
-            Purpose::Estimation if oscillator.is_linear_and_free(excitation) => match has_blocks {
+            Purpose::Estimation if system.is_linear_and_free(excitation) => match has_blocks {
                 true => Self::ParallelInTime,
                 false => Self::Reference,
             },
@@ -66,7 +66,7 @@ impl Engine {
     /// As [`reference::forward`].
     pub fn forward_into(
         self,
-        oscillator: &System,
+        system: &System,
         device: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
@@ -75,7 +75,7 @@ impl Engine {
         match self {
             Self::Reference => {}
             Self::ParallelInTime => {
-                if let Some(linear) = LinearDevice::of(oscillator, device, trajectory.nodes()) {
+                if let Some(linear) = LinearDevice::of(system, device, trajectory.nodes()) {
                     linear.forward(initial, trajectory);
                     if trajectory.is_finite() {
                         return Ok(());
@@ -83,23 +83,23 @@ impl Engine {
                 }
             }
             Self::Prefactored => {
-                require_positive_mass(&oscillator.grid, device)?;
+                require_positive_mass(&system.grid, device)?;
                 let nodes = trajectory.nodes();
-                let equation = EquationOfMotion::new(oscillator, device, excitation, nodes);
-                if prefactored::forward(equation, oscillator.method, initial, trajectory)
-                    && require_finite(&oscillator.grid, trajectory).is_ok()
+                let equation = EquationOfMotion::new(system, device, excitation, nodes);
+                if prefactored::forward(equation, system.method, initial, trajectory)
+                    && require_finite(&system.grid, trajectory).is_ok()
                 {
                     return Ok(());
                 }
             }
         }
-        reference::forward_into(oscillator, device, initial, excitation, trajectory)
+        reference::forward_into(system, device, initial, excitation, trajectory)
     }
 
     /// [`reference::discrete_adjoint`].
     pub fn discrete_adjoint(
         self,
-        oscillator: &System,
+        system: &System,
         device: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
@@ -109,18 +109,18 @@ impl Engine {
         let gradient = match self {
             Self::Reference => None,
             // What is not finite anywhere is not finite at the beginning.
-            Self::ParallelInTime => LinearDevice::of(oscillator, device, nodes)
+            Self::ParallelInTime => LinearDevice::of(system, device, nodes)
                 .map(|linear| linear.gradient(trajectory, source))
                 .filter(|gradient| gradient.initial.is_finite()),
             Self::Prefactored => {
-                let equation = EquationOfMotion::new(oscillator, device, excitation, nodes);
-                let method = oscillator.method;
+                let equation = EquationOfMotion::new(system, device, excitation, nodes);
+                let method = system.method;
                 Some(simd_adjoint::gradient(equation, method, trajectory, source))
                     .filter(SystemTangent::is_finite)
             }
         };
         gradient.unwrap_or_else(|| {
-            reference::discrete_adjoint(oscillator, device, excitation, trajectory, source)
+            reference::discrete_adjoint(system, device, excitation, trajectory, source)
         })
     }
 
@@ -128,17 +128,17 @@ impl Engine {
     /// and its initial state. `None` if the engine does not sum, or the sums leave the finite numbers.
     pub(crate) fn discrete_adjoint_sums(
         self,
-        oscillator: &System,
+        system: &System,
         device: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         source: &Trajectory,
     ) -> Option<(Vec<f64>, State)> {
         (self == Self::Prefactored).then_some(())?;
-        let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
-        let mut sums = vec![0.0; 1 + oscillator.terms.len()];
+        let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+        let mut sums = vec![0.0; 1 + system.terms.len()];
         let gradient = CoefficientGradient::Summed(&mut sums);
-        let initial = simd_adjoint::back(equation, oscillator.method, trajectory, source, gradient);
+        let initial = simd_adjoint::back(equation, system.method, trajectory, source, gradient);
         let is_finite = initial.is_finite() && sums.iter().all(|x| x.is_finite());
         is_finite.then_some((sums, initial))
     }
@@ -146,21 +146,21 @@ impl Engine {
 
 /// [`reference::continuous_adjoint`], to the bit.
 pub fn continuous_adjoint(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
 ) -> SystemTangent {
-    let equation = AdjointEquation::new(oscillator, device, trajectory, observed);
+    let equation = AdjointEquation::new(system, device, trajectory, observed);
     let adjoint = continuous_adjoint::solve(&equation);
-    equation.gradients(oscillator, excitation, trajectory, &adjoint)
+    equation.gradients(system, excitation, trajectory, &adjoint)
 }
 
 /// Whether a system has damping and stiffness alone and is stepped by the midpoint rule: its free responses are
 /// computed in blocks and in batches of steps.
-pub(crate) fn is_linear_midpoint(oscillator: &System) -> bool {
-    oscillator.method == Method::Midpoint && oscillator.terms == [Term::Damping, Term::Stiffness]
+pub(crate) fn is_linear_midpoint(system: &System) -> bool {
+    system.method == Method::Midpoint && system.terms == [Term::Damping, Term::Stiffness]
 }
 
 /// Cost `J = sum_i w_i (y_i - observed_i)^2` of the free response, with the weights of the inner nodes and of both
@@ -171,17 +171,17 @@ pub(crate) fn is_linear_midpoint(oscillator: &System) -> bool {
 /// # Panics
 /// If a function, the measurements or a part of the gradient has another length than the grid.
 pub(crate) fn least_squares(
-    oscillator: &System,
+    system: &System,
     functions: [&[f64]; 3],
     initial: State,
     observed: &[f64],
     weights: [f64; 2],
     gradient: [&mut [f64]; 3],
 ) -> Option<(f64, State)> {
-    let nodes = oscillator.grid.nodes();
+    let nodes = system.grid.nodes();
     assert_eq!(observed.len(), nodes, "a measurement per node");
-    let engine = Engine::choose(oscillator, None, nodes, Purpose::Estimation);
+    let engine = Engine::choose(system, None, nodes, Purpose::Estimation);
     (engine == Engine::ParallelInTime).then_some(())?;
-    let device = LinearDevice::new(functions, oscillator.grid.step(), nodes)?;
+    let device = LinearDevice::new(functions, system.grid.step(), nodes)?;
     Some(device.least_squares(initial, observed, weights, gradient))
 }

@@ -61,7 +61,7 @@ impl Iterate {
     /// [`Parameterization::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
     /// whole grid.
     pub(crate) fn relative_metric(&self, problem: &Problem) -> Vec<f64> {
-        let duration = problem.oscillator.grid.duration();
+        let duration = problem.system.grid.duration();
         (problem.functions).relative_metric(self.natural_scales(problem), duration)
     }
 

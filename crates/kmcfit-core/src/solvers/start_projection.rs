@@ -44,7 +44,7 @@ impl Problem {
             .collect();
         let metric = self
             .functions
-            .relative_metric(&sizes, self.oscillator.grid.duration());
+            .relative_metric(&sizes, self.system.grid.duration());
         let mut moved = start.to_vec();
         self.constraints.clip(&mut moved);
         if !self.constraints.hold(&moved, 0.0) {
@@ -118,9 +118,9 @@ impl Problem {
         let mut group = RowGroup::new("mass > 0");
         let parts = self.functions.iter().zip(self.functions.ranges());
         if let Some((mass, range)) = parts.into_iter().next() {
-            for i in 0..self.oscillator.grid.nodes() {
+            for i in 0..self.system.grid.nodes() {
                 let row = mass.design.row(i).map(|(j, b)| (range.start + j, b));
-                let time = self.oscillator.grid.time(i);
+                let time = self.system.grid.time(i);
                 let bounds = [least - mass.offset[i], f64::INFINITY];
                 group.push(row, bounds, [time, time]);
             }

@@ -22,7 +22,7 @@ pub fn predict_held_out(
     scalars: &[ScalarParameter],
     settings: &FitSettings,
 ) -> Result<(Problem, Evaluation), SimulationError> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let known = |(f, values): (&usize, &[f64])| {
         CoefficientFunction::fixed(problem.functions.get(*f).quantity, values.to_vec())
     };
@@ -36,7 +36,7 @@ pub fn predict_held_out(
         ..experiment.clone()
     };
     alone.name.clone_from(&experiment.name);
-    let alone = Problem::new(problem.oscillator.clone(), functions, vec![alone])
+    let alone = Problem::new(problem.system.clone(), functions, vec![alone])
         .expect("a record that fits the grid and its own scalars");
     let mut start = alone.start();
     let first = states_from_readings(&alone).into_iter().next().flatten();

@@ -58,12 +58,12 @@ impl Motion {
             .map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
-            let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
+            let terms = problem.system.terms.iter().zip(&device.coefficients);
             let (y, v) = (motion.displacement[i], motion.velocity[i]);
             let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
             (force[i] - resisting) / device.mass[i]
         };
-        let grid = problem.oscillator.grid;
+        let grid = problem.system.grid;
         let length = grid.step() * (nodes - 1) as f64;
         Self {
             grid: Grid::new(grid.start(), length, nodes).unwrap_or(grid),

@@ -42,8 +42,8 @@ pub fn equivalent_systems(
     let Some(experiment) = problem.experiments.first() else {
         return Vec::new();
     };
-    let is_linear = problem.oscillator.terms.iter().all(|t| t.is_linear());
-    if !is_linear || experiment.nodes != problem.oscillator.grid.nodes() {
+    let is_linear = problem.system.terms.iter().all(|t| t.is_linear());
+    if !is_linear || experiment.nodes != problem.system.grid.nodes() {
         return Vec::new();
     }
     let motion = Motion::of(problem, evaluation, 0);
@@ -58,10 +58,7 @@ pub fn equivalent_systems(
         let damping = damping.unwrap_or_else(|| device.coefficients[0].clone());
         let found = equivalent(&choice.mass, &motion, &Wish::near(damping, least)).ok()?;
         let excitation = experiment.excitation.as_ref();
-        let moved = problem
-            .oscillator
-            .forward(&found, initial, excitation)
-            .ok()?;
+        let moved = problem.system.forward(&found, initial, excitation).ok()?;
         let largest = (motion.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
         let pairs = moved.displacement.iter().zip(&motion.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));

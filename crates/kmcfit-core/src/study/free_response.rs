@@ -46,7 +46,7 @@ pub struct PredictedMotion {
 /// # Errors
 /// A [`SimulationError`] if a motion does not exist.
 pub fn predict(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     truth: Option<&NodalCoefficients>,
     states: &[State],
@@ -54,12 +54,12 @@ pub fn predict(
     states
         .iter()
         .map(|&state| {
-            let motion = oscillator.forward(device, state, None)?;
+            let motion = system.forward(device, state, None)?;
             let truth = truth
-                .map(|truth| oscillator.forward(truth, state, None))
+                .map(|truth| system.forward(truth, state, None))
                 .transpose()?;
             Ok(PredictedMotion {
-                summary: summarise(oscillator, state, &motion, truth.as_ref()),
+                summary: summarise(system, state, &motion, truth.as_ref()),
                 motion,
                 truth,
             })
@@ -68,7 +68,7 @@ pub fn predict(
 }
 
 fn summarise(
-    oscillator: &System,
+    system: &System,
     state: State,
     motion: &Trajectory,
     truth: Option<&Trajectory>,
@@ -77,7 +77,7 @@ fn summarise(
         let squares: Vec<f64> = (0..motion.displacement.len())
             .map(|i| f(i).powi(2))
             .collect();
-        trapezoid(&squares, oscillator.grid.step())
+        trapezoid(&squares, system.grid.step())
     };
     Prediction {
         displacement: state.displacement,

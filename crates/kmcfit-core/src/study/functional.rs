@@ -51,7 +51,7 @@ impl Linear {
     /// Value of function `function` at `time` (s), linear between the nodes as the stepper sees it;
     /// `None` outside the grid.
     pub fn value(problem: &Problem, function: usize, time: f64) -> Option<Self> {
-        let place = TimePoint::of(&problem.oscillator.grid, time)?;
+        let place = TimePoint::of(&problem.system.grid, time)?;
         let weights = [
             (place.step, 1.0 - place.fraction),
             (place.step + 1, place.fraction),
@@ -66,7 +66,7 @@ impl Linear {
 
     /// `1/T integral p dt` of function `function` by the trapezoid rule over the grid.
     pub fn mean(problem: &Problem, function: usize) -> Self {
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let shares = weights.into_iter().map(|w| w / grid.duration());
         let of = problem.functions.get(function);

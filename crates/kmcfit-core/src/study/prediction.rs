@@ -119,7 +119,7 @@ pub fn predict(
     }
     Ok(Prediction {
         name: run.name.clone(),
-        times: seen.oscillator.grid.times(),
+        times: seen.system.grid.times(),
         band,
         worst: furthest.is_some().then_some(envelope),
         furthest,
@@ -131,7 +131,7 @@ pub fn predict(
 /// The problem with the run as its only experiment, its displacement read at all nodes.
 fn with_run(problem: &Problem, run: &Run) -> Problem {
     let mut seen = problem.clone();
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let nodes = grid.nodes();
     let zeros = vec![0.0; nodes];
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);

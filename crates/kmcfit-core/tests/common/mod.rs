@@ -22,7 +22,7 @@ pub const INITIAL: State = State {
     velocity: 1.0,
 };
 
-pub fn oscillator(nodes: usize, method: Method) -> System {
+pub fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
@@ -43,9 +43,9 @@ pub fn paper_device(nodes: usize) -> NodalCoefficients {
 
 /// The paper's problem: one value per node, starting from constant `(m, c, k)`.
 pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
-    let oscillator = oscillator(nodes, Method::Midpoint);
-    let step = oscillator.grid.step();
-    let observed = oscillator
+    let system = system(nodes, Method::Midpoint);
+    let step = system.grid.step();
+    let observed = system
         .forward(&paper_device(nodes), INITIAL, None)
         .unwrap()
         .displacement;
@@ -60,10 +60,10 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .map(|(q, value)| CoefficientFunction::nodal(q, vec![value; nodes]))
         .collect();
     let weighting = Weighting::Integral { spacing: step };
-    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment]).unwrap()
+    Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
 /// Provides the clock of the process, without which timings are zero.
@@ -106,11 +106,11 @@ pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
 }
 
 /// Simulated displacement of `device` with Gaussian noise.
-pub fn noisy(oscillator: &System, device: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
+pub fn noisy(system: &System, device: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let motion = oscillator.forward(device, INITIAL, None).unwrap();
+    let motion = system.forward(device, INITIAL, None).unwrap();
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
     motion
         .displacement
@@ -121,20 +121,20 @@ pub fn noisy(oscillator: &System, device: &NodalCoefficients, sigma: f64, seed: 
 
 /// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
 pub fn problem_of(
-    oscillator: System,
+    system: System,
     list: Vec<CoefficientFunction>,
     observed: Vec<f64>,
     sigma: Option<f64>,
 ) -> Problem {
-    let (nodes, step) = (oscillator.grid.nodes(), oscillator.grid.step());
+    let (nodes, step) = (system.grid.nodes(), system.grid.step());
     let weighting = match sigma {
         Some(sigma) => Weighting::Sigma(sigma),
         None => Weighting::Integral { spacing: step },
     };
-    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &oscillator.grid);
+    let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
     let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
-    Problem::new(oscillator, functions, vec![experiment]).unwrap()
+    Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
 /// Adds the smoothness of the paper's recovery, weight on the curvature of m and the slopes of c
@@ -143,7 +143,7 @@ pub fn problem_of(
 pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
     use kmcfit_core::internals::constraints::RowGroup;
     use kmcfit_core::internals::functions::Penalty;
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let orders = [2, 1, 1];
     let ranges = problem.functions.ranges().to_vec();
     let bases: Vec<_> = problem.functions.iter().map(|f| f.basis.clone()).collect();

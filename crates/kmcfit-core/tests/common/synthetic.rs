@@ -16,7 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// What moves, what drives it and where it starts.
 pub struct Truth<'a> {
-    pub oscillator: &'a System,
+    pub system: &'a System,
     pub device: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub initial: State,
@@ -28,7 +28,7 @@ impl Truth<'_> {
     pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[InputSample]) -> Vec<f64> {
         let record = self.record();
         let states = record.motion();
-        let grid = &self.oscillator.grid;
+        let grid = &self.system.grid;
         let reading = |(n, t): (usize, &f64)| {
             let x = (t - grid.start()) / grid.step();
             let nearest = x.round();
@@ -50,17 +50,17 @@ impl Truth<'_> {
     }
 
     fn record(&self) -> Record<f64> {
-        let steps = self.oscillator.grid.nodes() - 1;
+        let steps = self.system.grid.nodes() - 1;
         let part = |choose: &dyn Fn(&Excitation) -> Option<StageSamples>| {
             let given = self.excitation.and_then(choose);
             let mut values = given.map_or(Vec::new(), |p| p.values().to_vec());
             values.resize(steps, [0.0; 3]);
             values
         };
-        let terms = self.oscillator.terms.iter().map(|term| response(*term));
+        let terms = self.system.terms.iter().map(|term| response(*term));
         Record {
-            method: self.oscillator.method,
-            dt: self.oscillator.grid.step(),
+            method: self.system.method,
+            dt: self.system.grid.step(),
             mass: self.device.mass.clone(),
             terms: terms
                 .zip(self.device.coefficients.iter().cloned())

@@ -11,7 +11,7 @@ const INITIAL: State = State {
     velocity: 1.0,
 };
 
-fn oscillator(nodes: usize, method: Method) -> System {
+fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, 12.0, nodes).unwrap(),
         method,
@@ -34,7 +34,7 @@ fn force(grid: &Grid) -> Excitation {
 
 /// The true motion at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
 fn motion(nodes: usize) -> Motion {
-    let fine = oscillator(32 * (nodes - 1) + 1, Method::Rk4);
+    let fine = system(32 * (nodes - 1) + 1, Method::Rk4);
     let device = truth(&fine.grid);
     let excitation = force(&fine.grid);
     let forces = excitation.force.as_ref().unwrap().at_nodes();
@@ -48,7 +48,7 @@ fn motion(nodes: usize) -> Motion {
         })
         .collect();
     Motion {
-        grid: oscillator(nodes, Method::Rk4).grid,
+        grid: system(nodes, Method::Rk4).grid,
         displacement: pick(y),
         velocity: pick(v),
         acceleration: pick(&acceleration),
@@ -83,10 +83,8 @@ fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, Motion) {
     let wish = Wish::near(vec![0.1; nodes], 0.05);
     let device = equivalent(&mass, &motion, &wish).unwrap();
     let excitation = Excitation::force_at_nodes(&motion.force);
-    let oscillator = oscillator(nodes, Method::Midpoint);
-    let moved = oscillator
-        .forward(&device, INITIAL, Some(&excitation))
-        .unwrap();
+    let system = system(nodes, Method::Midpoint);
+    let moved = system.forward(&device, INITIAL, Some(&excitation)).unwrap();
     let pairs = moved.displacement.iter().zip(&motion.displacement);
     let error = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
     (error, device, motion)

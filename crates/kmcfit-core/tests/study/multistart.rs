@@ -1,4 +1,4 @@
-use crate::problems::{REST, Record, bound, constants, device, oscillator, problem, readings};
+use crate::problems::{REST, Record, bound, constants, device, problem, readings, system};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::study::multistart::{
@@ -8,22 +8,15 @@ use kmcfit_core::internals::study::multistart::{
 /// One reading per second of an undamped motion from rest, `cos(w n)`: the frequencies
 /// `2 pi j +- w` give the same readings. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
 pub fn aliased(noise: f64) -> Problem {
-    let oscillator = oscillator(6.0, 601);
+    let system = system(6.0, 601);
     assert_eq!(REST.velocity, 0.0);
-    let values = readings(
-        &oscillator,
-        &device(601, [1.0, 0.0, 2.25]),
-        None,
-        100,
-        noise,
-        1,
-    );
+    let values = readings(&system, &device(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
     let list = constants(601, [None, None, Some(2.0)], [1.0, 0.0, 0.0]);
     let record = Record {
         weighting: Weighting::Sigma(0.05),
         ..Record::of(values, 100)
     };
-    let mut problem = problem(oscillator, list, Vec::new(), record);
+    let mut problem = problem(system, list, Vec::new(), record);
     bound(&mut problem, "stiffness from 1 to 65", 0, [1.0, 65.0]);
     problem
 }
@@ -120,10 +113,10 @@ fn the_threads_change_no_bit() {
 /// Starts with a negative mass have no motion: they are records, and the others are fitted.
 #[test]
 fn starts_without_a_motion_are_kept_with_their_reason() {
-    let oscillator = oscillator(6.0, 301);
-    let values = readings(&oscillator, &device(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
+    let system = system(6.0, 301);
+    let values = readings(&system, &device(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
     let list = constants(301, [Some(1.0), Some(0.1), None], [0.0, 0.0, 2.0]);
-    let problem = problem(oscillator, list, Vec::new(), Record::of(values, 5));
+    let problem = problem(system, list, Vec::new(), Record::of(values, 5));
     let how = Multistart {
         ranges: Ranges::Constants(vec![[-1.0, 2.0], [0.0, 0.5], [0.0, 0.0]]),
         starts: 12,

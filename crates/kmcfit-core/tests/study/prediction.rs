@@ -21,7 +21,7 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
         .best;
     let covariance = problem.covariance(&best.evaluation).unwrap();
     let force: Vec<f64> = problem
-        .oscillator
+        .system
         .grid
         .times()
         .iter()
@@ -101,7 +101,7 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
 fn devices_that_fit_alike_predict_apart() {
     let nodes = 200;
     let mut problem = common::paper_problem(nodes, [2.0, 1.0, 1.0]);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     for f in [0, 2] {
         for j in problem.functions.ranges()[f].clone() {
             crate::problems::bound(&mut problem, "positive", j, [0.05, f64::INFINITY]);

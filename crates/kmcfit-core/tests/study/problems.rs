@@ -16,7 +16,7 @@ pub const REST: State = State {
     velocity: 0.0,
 };
 
-pub fn oscillator(duration: f64, nodes: usize) -> System {
+pub fn system(duration: f64, nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
@@ -53,14 +53,14 @@ pub fn constants(
 
 /// Readings of `truth` at every `stride`-th node with noise of the seed.
 pub fn readings(
-    oscillator: &System,
+    system: &System,
     truth: &NodalCoefficients,
     excitation: Option<&Excitation>,
     stride: usize,
     sigma: f64,
     seed: u64,
 ) -> Vec<f64> {
-    let motion = oscillator.forward(truth, REST, excitation).unwrap();
+    let motion = system.forward(truth, REST, excitation).unwrap();
     let every: Vec<f64> = motion
         .displacement
         .iter()
@@ -72,12 +72,12 @@ pub fn readings(
 
 /// Readings from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
 pub fn problem(
-    oscillator: System,
+    system: System,
     list: Vec<CoefficientFunction>,
     scalars: Vec<ScalarParameter>,
     record: Record,
 ) -> Problem {
-    let grid = oscillator.grid;
+    let grid = system.grid;
     let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
     let channel =
         Channel::displacement_at_nodes(record.readings, record.stride, record.weighting, &grid)
@@ -85,12 +85,7 @@ pub fn problem(
     let mut experiment = Experiment::free("record", REST, grid.nodes()).with_channel(channel);
     experiment.excitation = record.excitation;
     experiment.sought = record.sought;
-    Problem::new(
-        oscillator,
-        functions.with_scalars(scalars),
-        vec![experiment],
-    )
-    .unwrap()
+    Problem::new(system, functions.with_scalars(scalars), vec![experiment]).unwrap()
 }
 
 pub struct Record {
@@ -128,9 +123,9 @@ pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> ScalarParameter {
 /// Initial displacement and velocity and the offset of the sensor are sought, the device is known:
 /// the predictions are linear in all three.
 pub fn linear(seed: u64) -> Problem {
-    let oscillator = oscillator(10.0, 201);
+    let system = system(10.0, 201);
     let truth = [1.0, 0.1, 2.0];
-    let values = readings(&oscillator, &device(201, truth), None, 4, SIGMA, seed);
+    let values = readings(&system, &device(201, truth), None, 4, SIGMA, seed);
     let sensor = Sensor {
         offset: Value::Sought(2),
         ..Sensor::default()
@@ -142,21 +137,16 @@ pub fn linear(seed: u64) -> Problem {
     };
     let names = ["displacement", "velocity", "offset"];
     let scalars = names.map(|name| scalar(name, 0.5, None)).to_vec();
-    problem(
-        oscillator,
-        constants(201, [None; 3], truth),
-        scalars,
-        record,
-    )
+    problem(system, constants(201, [None; 3], truth), scalars, record)
 }
 
 /// Damping and stiffness of a known mass.
 pub fn regular(seed: u64) -> Problem {
-    let oscillator = oscillator(10.0, 101);
+    let system = system(10.0, 101);
     let truth = device(101, [1.0, 0.2, 2.0]);
-    let values = readings(&oscillator, &truth, None, 2, SIGMA, seed);
+    let values = readings(&system, &truth, None, 2, SIGMA, seed);
     let list = constants(101, [None, Some(0.1), Some(1.9)], [1.0, 0.0, 0.0]);
-    problem(oscillator, list, Vec::new(), Record::of(values, 2))
+    problem(system, list, Vec::new(), Record::of(values, 2))
 }
 
 /// `low <= parameter j <= high`.
@@ -171,11 +161,11 @@ pub fn bound(problem: &mut Problem, name: &str, j: usize, bounds: [f64; 2]) {
 
 /// Stiffness linear between knots, damping constant, mass known.
 pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) -> Problem {
-    let oscillator = oscillator(10.0, 201);
-    let grid = oscillator.grid;
+    let system = system(10.0, 201);
+    let grid = system.grid;
     let mut moving = device(201, [1.0, 0.1, 2.0]);
     moving.coefficients[1] = grid.times().iter().map(|t| truth(*t)).collect();
-    let values = readings(&oscillator, &moving, None, 2, sigma, seed);
+    let values = readings(&system, &moving, None, 2, sigma, seed);
     let times = (0..knots).map(|i| 10.0 * i as f64 / (knots - 1) as f64);
     let basis = Basis::PiecewiseLinear {
         knots: times.collect(),
@@ -187,5 +177,5 @@ pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) ->
         weighting: Weighting::Sigma(sigma),
         ..Record::of(values, 2)
     };
-    problem(oscillator, list, Vec::new(), record)
+    problem(system, list, Vec::new(), record)
 }

@@ -1,6 +1,6 @@
 use crate::problems::knots;
 use crate::problems::{
-    Record, bound, constants, device, linear, oscillator, problem, readings, regular, scalar,
+    Record, bound, constants, device, linear, problem, readings, regular, scalar, system,
 };
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
@@ -78,8 +78,8 @@ fn initial_state_and_offset_have_the_intervals_of_linear_regression() {
 
 #[test]
 fn the_gain_of_a_driven_sensor_has_its_closed_form() {
-    let oscillator = oscillator(10.0, 201);
-    let force: Vec<f64> = oscillator
+    let system = system(10.0, 201);
+    let force: Vec<f64> = system
         .grid
         .times()
         .iter()
@@ -87,14 +87,7 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
     let truth = [1.0, 0.1, 2.0];
-    let values = readings(
-        &oscillator,
-        &device(201, truth),
-        Some(&excitation),
-        4,
-        0.05,
-        2,
-    );
+    let values = readings(&system, &device(201, truth), Some(&excitation), 4, 0.05, 2);
     let record = Record {
         sensor: Sensor {
             gain: Value::Sought(0),
@@ -105,12 +98,7 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
         ..Record::of(values, 4)
     };
     let scalars = vec![scalar("gain", 0.7, None), scalar("offset", 0.1, None)];
-    let problem = problem(
-        oscillator,
-        constants(201, [None; 3], truth),
-        scalars,
-        record,
-    );
+    let problem = problem(system, constants(201, [None; 3], truth), scalars, record);
     is_closed_form(&problem, &Linear::scalar(&problem, 0));
 }
 
@@ -134,10 +122,10 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
 /// Free motion shows k/m and c/m: of m, c and k together no number is seen.
 #[test]
 fn the_mass_of_a_free_motion_is_flat() {
-    let oscillator = oscillator(10.0, 101);
-    let values = readings(&oscillator, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let system = system(10.0, 101);
+    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
-    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 3", 0, [0.5, 3.0]);
     let found = of(&problem, 0);
     println!("{}", found.sentence());
@@ -157,10 +145,10 @@ fn the_mass_of_a_free_motion_is_flat() {
 /// The noise of the readings leaves room for no damping at all: below it ends at its own bound.
 #[test]
 fn a_damping_near_its_bound_is_one_sided() {
-    let oscillator = oscillator(10.0, 101);
-    let values = readings(&oscillator, &device(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
+    let system = system(10.0, 101);
+    let values = readings(&system, &device(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
     let list = constants(101, [None, Some(0.02), Some(2.0)], [1.0, 0.0, 0.0]);
-    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "damping >= 0", 0, [0.0, f64::INFINITY]);
     let found = of(&problem, 0);
     println!("{}", found.sentence());
@@ -174,10 +162,10 @@ fn a_damping_near_its_bound_is_one_sided() {
 /// worse, though the readings do not see the mass.
 #[test]
 fn a_rise_that_another_bound_makes_is_called_so() {
-    let oscillator = oscillator(10.0, 101);
-    let values = readings(&oscillator, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let system = system(10.0, 101);
+    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
-    let mut problem = problem(oscillator, list, Vec::new(), Record::of(values, 2));
+    let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 5", 0, [0.5, 5.0]);
     bound(&mut problem, "stiffness <= 3", 2, [f64::NEG_INFINITY, 3.0]);
     let found = of(&problem, 0);
@@ -220,13 +208,13 @@ fn a_better_optimum_on_the_way_is_reported() {
 #[test]
 fn a_nodal_function_has_a_profile() {
     let sigma = 0.02;
-    let oscillator = crate::common::oscillator(101, Method::Rk4);
+    let system = crate::common::system(101, Method::Rk4);
     let device = crate::common::paper_device(101);
-    let values = crate::common::noisy(&oscillator, &device, sigma, 5);
+    let values = crate::common::noisy(&system, &device, sigma, 5);
     let mut list = constants(101, [None; 3], [1.0, 0.0, 1.0]);
     list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
-    let mut problem = crate::common::problem_of(oscillator, list, values, Some(sigma));
-    let rows = Basis::Nodal.roughness(&problem.oscillator.grid, 2);
+    let mut problem = crate::common::problem_of(system, list, values, Some(sigma));
+    let rows = Basis::Nodal.roughness(&problem.system.grid, 2);
     problem.penalize(Penalty::new(0, 2, 1e4, rows)).unwrap();
     let settings = crate::common::synthetic::settings();
     let best = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
@@ -299,7 +287,7 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let q = Linear::mean(&problem, 2);
     let at = Linear::value(&problem, 2, 4.0).unwrap();
     let (device, theta) = (problem.functions.device(&best), &best);
-    let node = (4.0 / problem.oscillator.grid.step()).round() as usize;
+    let node = (4.0 / problem.system.grid.step()).round() as usize;
     assert!((at.of(theta) - device.coefficients[1][node]).abs() < 1e-12);
     assert!(Linear::value(&problem, 2, 10.1).is_none());
     let list = [q, at];

@@ -169,7 +169,7 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
                 assert!(problem.constraints.hold(&end.parameters, 1e-9));
                 assert_eq!(fresh.trajectories[0].displacement[0], INITIAL.displacement);
             }
-            let node = (time / problem.oscillator.grid.step()) as usize;
+            let node = (time / problem.system.grid.step()) as usize;
             let exact = truth[f * NODES + node];
             assert!(low.value < exact && exact < high.value, "{low:?} {high:?}");
             if let Some(rows) = &optimum {
@@ -190,11 +190,11 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
 #[test]
 fn ratios_have_tubes_of_their_own() {
     let problem = regular(3);
-    let oscillator = problem.oscillator.clone();
-    let n = oscillator.grid.nodes();
+    let system = problem.system.clone();
+    let n = system.grid.nodes();
     let list = crate::problems::constants(n, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     let functions =
-        kmcfit_core::internals::functions::Parameterization::new(list, n, oscillator.grid.step());
+        kmcfit_core::internals::functions::Parameterization::new(list, n, system.grid.step());
     let problem = problem
         .with(|parts| parts.functions = functions.unwrap())
         .unwrap();
@@ -236,7 +236,7 @@ fn roughness_budgets_bound_the_tubes() {
         &device.coefficients[1],
     ]
     .concat();
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let mut before: Option<[f64; 2]> = None;
     for budget in [1e-3, 1e-5] {
         let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));

@@ -45,7 +45,7 @@ fn a_stiffness_that_varies_is_found() {
     assert!(found.sentence().contains("varies"));
     // Smoothed, and with a sigma that nobody states.
     let mut problem = knots(&|t| 2.0 + 0.3 * (0.6 * t).sin(), 11, 0.05, 2);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let knots = (0..11).map(|i| i as f64).collect();
     let rows = Basis::PiecewiseLinear { knots }.roughness(&grid, 1);
     problem.penalize(Penalty::new(2, 1, 10.0, rows)).unwrap();
@@ -78,7 +78,7 @@ fn with_smoothness_the_rate_is_nominal_too() {
     let smoothed = |seed: u64| {
         let mut problem = knots(&|_| 2.0, 11, 0.05, 500 + seed);
         let knots = (0..11).map(|i| i as f64).collect();
-        let rows = Basis::PiecewiseLinear { knots }.roughness(&problem.oscillator.grid, 1);
+        let rows = Basis::PiecewiseLinear { knots }.roughness(&problem.system.grid, 1);
         problem.penalize(Penalty::new(2, 1, 10.0, rows)).unwrap();
         asked(&problem).p_value
     };

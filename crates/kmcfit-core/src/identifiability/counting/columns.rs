@@ -16,7 +16,7 @@ pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
 
 /// The last node whose values act on a reading; `None` if none does.
 pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint) -> Option<usize> {
-    match (kind, place.as_node(), problem.oscillator.method) {
+    match (kind, place.as_node(), problem.system.method) {
         (ChannelKind::Acceleration, Some(node), _) => Some(node),
         (_, Some(0), _) => None,
         // The midpoint rule takes the displacement at the end from the velocity half-way.

@@ -83,7 +83,7 @@ fn superposes(
     experiment: &Experiment,
     channel: &crate::record::Channel,
 ) -> bool {
-    problem.oscillator.terms.iter().all(|t| t.is_linear())
+    problem.system.terms.iter().all(|t| t.is_linear())
         && experiment.sought == [None; 2]
         && channel.sensor().indices() == [None; 3]
         && channel.filter().is_empty()
@@ -108,7 +108,7 @@ impl Inputs {
         span.add(records.iter().map(|r| r.initial.displacement).collect());
         span.add(records.iter().map(|r| r.initial.velocity).collect());
         let initially = span.len();
-        let steps = problem.oscillator.grid.nodes() - 1;
+        let steps = problem.system.grid.nodes() - 1;
         let base = |r: &Experiment, i: usize, s: usize| {
             let base = r.excitation.as_ref().and_then(|e| e.base.as_ref());
             base.and_then(|b| b.values().get(i)).map_or(0.0, |b| b[s])
@@ -149,7 +149,7 @@ impl Inputs {
                     .filter(plain)
                     .any(|c| c.stride() == Some(1))
         });
-        let method = problem.oscillator.method;
+        let method = problem.system.method;
         Self {
             stepwise: method == Method::Midpoint && nodal && sampled && records.iter().all(still),
             after,

@@ -64,7 +64,7 @@ impl Scale {
     }
 
     pub fn free_on(&self, problem: &Problem) -> Vec<[f64; 2]> {
-        let times = problem.oscillator.grid.times();
+        let times = problem.system.grid.times();
         match self.space {
             Space::Constant { .. } if !self.all_free() => Vec::new(),
             _ => spans(&times, |i| self.is_free(i)),
@@ -180,7 +180,7 @@ enum Space {
 
 impl Space {
     pub fn of(problem: &Problem, free: &[&CoefficientFunction]) -> Self {
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         let offset = |f: &&&CoefficientFunction| f.offset.iter().any(|b| *b != 0.0);
         if free.iter().find(offset).is_some() {
             return Self::Constant { nearly_more: false };

@@ -162,7 +162,7 @@ fn sweep(
         piece.restart(next);
     };
     let course = BaseTrajectory {
-        oscillator: view.oscillator,
+        system: view.system,
         device: view.device,
         excitation: view.excitation,
         motion: view.motion,
@@ -270,13 +270,13 @@ mod tests {
                     .with_channel(channel(ChannelKind::Displacement, thirds))
             }
         };
-        let oscillator = System {
+        let system = System {
             grid,
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness],
         };
         let records = vec![record(0, NODES), record(1, nodes)];
-        Problem::new(oscillator, functions.expect("functions"), records).unwrap()
+        Problem::new(system, functions.expect("functions"), records).unwrap()
     }
 
     /// Ends of tiles, of lanes and of records; pieces that come back with nothing but rubbish in them.

@@ -30,7 +30,7 @@ impl Accelerations {
 /// A response observed at its nodes.
 #[derive(Clone, Copy)]
 pub(crate) struct NodalObservations<'a> {
-    pub oscillator: &'a System,
+    pub system: &'a System,
     pub device: &'a NodalCoefficients,
     pub states: &'a Trajectory,
 }
@@ -46,7 +46,7 @@ impl NodalObservations<'_> {
         around: [Eight<A>; 2],
         out: &mut Accelerations,
     ) {
-        let terms = self.oscillator.terms.as_slice();
+        let terms = self.system.terms.as_slice();
         with_known!(terms, terms, TERMS => {
             self.of_terms::<A, TERMS>(arithmetic, terms, i, around, out);
         });

@@ -375,7 +375,7 @@ mod tests {
     /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
     #[test]
     fn functions_that_are_constant_at_first() {
-        let oscillator = System {
+        let system = System {
             grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
@@ -404,9 +404,9 @@ mod tests {
             let zeros = || Trajectory::zeros(41);
             let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
             Engine::Prefactored
-                .forward_into(&oscillator, &device, initial, drive, &mut fast)
+                .forward_into(&system, &device, initial, drive, &mut fast)
                 .expect("a motion");
-            reference::forward_into(&oscillator, &device, initial, drive, &mut plain)
+            reference::forward_into(&system, &device, initial, drive, &mut plain)
                 .expect("a motion");
             let pairs = (fast.displacement.iter().zip(&plain.displacement))
                 .chain(fast.velocity.iter().zip(&plain.velocity));

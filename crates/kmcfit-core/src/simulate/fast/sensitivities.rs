@@ -74,7 +74,7 @@ pub(crate) struct Tangents {
 /// The response about which tangents are taken.
 #[derive(Clone, Copy)]
 pub(crate) struct BaseTrajectory<'a> {
-    pub oscillator: &'a System,
+    pub system: &'a System,
     pub device: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub motion: &'a Trajectory,
@@ -159,14 +159,14 @@ impl Tangents {
     /// Goes on by a tile: over the steps `steps`, at most [`TILE`] and not the same as before.
     pub fn advance(&mut self, course: BaseTrajectory, steps: Range<usize>) {
         let BaseTrajectory {
-            oscillator,
+            system,
             device,
             excitation,
             motion,
         } = course;
         simd::run(Advance {
-            equation: EquationOfMotion::new(oscillator, device, excitation, motion.nodes()),
-            method: oscillator.method,
+            equation: EquationOfMotion::new(system, device, excitation, motion.nodes()),
+            method: system.method,
             motion,
             steps,
             tangents: self,

@@ -22,7 +22,7 @@ const PER_STEP: f64 = 40.0;
 /// A random system with a random record.
 #[derive(Debug, Clone)]
 struct Case {
-    oscillator: System,
+    system: System,
     device: NodalCoefficients,
     excitation: Option<Excitation>,
     initial: State,
@@ -32,7 +32,7 @@ struct Case {
 
 impl Case {
     fn nodes(&self) -> usize {
-        self.oscillator.grid.nodes()
+        self.system.grid.nodes()
     }
 
     fn excitation(&self) -> Option<&Excitation> {
@@ -40,13 +40,8 @@ impl Case {
     }
 
     fn response(&self) -> Trajectory {
-        reference::forward(
-            &self.oscillator,
-            &self.device,
-            self.initial,
-            self.excitation(),
-        )
-        .expect("a response")
+        reference::forward(&self.system, &self.device, self.initial, self.excitation())
+            .expect("a response")
     }
 
     /// The `which`-th series of random numbers, one a node.
@@ -65,8 +60,8 @@ impl Case {
     }
 
     fn engine(&self) -> Engine {
-        let (oscillator, excitation) = (&self.oscillator, self.excitation());
-        Engine::choose(oscillator, excitation, self.nodes(), Purpose::Estimation)
+        let (system, excitation) = (&self.system, self.excitation());
+        Engine::choose(system, excitation, self.nodes(), Purpose::Estimation)
     }
 
     /// Whether two series agree.
@@ -150,7 +145,7 @@ fn case_of(
             .collect();
         let excitation = (stepwise(nodes), stepwise(nodes))
             .prop_map(move |(force, base)| is_driven.then_some(Excitation { force, base }));
-        let oscillator = System {
+        let system = System {
             grid: Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid"),
             method,
             terms,
@@ -160,7 +155,7 @@ fn case_of(
             move |(functions, excitation, displacement, velocity, numbers)| {
                 let mut functions = functions.into_iter();
                 Case {
-                    oscillator: oscillator.clone(),
+                    system: system.clone(),
                     device: NodalCoefficients {
                         mass: functions.next().expect("a mass"),
                         coefficients: functions.collect(),
@@ -213,7 +208,7 @@ impl Kernel for Observe<'_> {
 
 /// A direction for each lane of a group: one series of numbers a function, or one number for a constant function.
 fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
-    let functions = 1 + case.oscillator.terms.len();
+    let functions = 1 + case.system.terms.len();
     std::array::from_fn(|lane| {
         let mut device = NodalCoefficients::zeros(case.nodes(), functions - 1);
         for (f, values) in device.functions_mut().enumerate() {
@@ -236,7 +231,7 @@ fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
 /// All tangents of a group.
 fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; LANES] {
     let directions = directions(case, holds);
-    let functions = 1 + case.oscillator.terms.len();
+    let functions = 1 + case.system.terms.len();
     let slots = (0..functions).map(|function| Slot { group: 0, function });
     let row = |f: &dyn Fn(&SystemTangent) -> f64| directions.each_ref().map(f);
     let initial = [
@@ -246,7 +241,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
     let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
     let course = BaseTrajectory {
-        oscillator: &case.oscillator,
+        system: &case.system,
         device: &case.device,
         excitation: case.excitation(),
         motion,
@@ -296,22 +291,22 @@ proptest! {
     #[test]
     fn prefactored_responses(case in any_case()) {
         let mut fast = Trajectory::zeros(case.nodes());
-        let (oscillator, device) = (&case.oscillator, &case.device);
+        let (system, device) = (&case.system, &case.device);
         Engine::Prefactored
-            .forward_into(oscillator, device, case.initial, case.excitation(), &mut fast)
+            .forward_into(system, device, case.initial, case.excitation(), &mut fast)
             .expect("a response");
         case.agree_responses(&fast, &case.response())?;
     }
 
     #[test]
     fn prefactored_adjoints_and_their_sums(case in any_case()) {
-        let (oscillator, device, excitation) = (&case.oscillator, &case.device, case.excitation());
+        let (system, device, excitation) = (&case.system, &case.device, case.excitation());
         let (motion, source) = (case.response(), case.source());
-        let exact = reference::discrete_adjoint(oscillator, device, excitation, &motion, &source);
+        let exact = reference::discrete_adjoint(system, device, excitation, &motion, &source);
         let engine = Engine::Prefactored;
-        let fast = engine.discrete_adjoint(oscillator, device, excitation, &motion, &source);
+        let fast = engine.discrete_adjoint(system, device, excitation, &motion, &source);
         case.agree_gradients(&fast, &exact)?;
-        let sums = engine.discrete_adjoint_sums(oscillator, device, excitation, &motion, &source);
+        let sums = engine.discrete_adjoint_sums(system, device, excitation, &motion, &source);
         let (sums, initial) = sums.expect("finite sums");
         prop_assert_eq!(initial, fast.initial);
         for (sum, values) in sums.iter().zip(exact.device.functions()) {
@@ -323,23 +318,23 @@ proptest! {
 
     #[test]
     fn responses_and_adjoints_in_blocks(case in linear_free_case()) {
-        let (oscillator, device) = (&case.oscillator, &case.device);
+        let (system, device) = (&case.system, &case.device);
         prop_assert_eq!(case.engine(), Engine::ParallelInTime);
         let motion = case.response();
         let mut fast = Trajectory::zeros(case.nodes());
         case.engine()
-            .forward_into(oscillator, device, case.initial, None, &mut fast)
+            .forward_into(system, device, case.initial, None, &mut fast)
             .expect("a response");
         case.agree_responses(&fast, &motion)?;
         let source = case.source();
-        let exact = reference::discrete_adjoint(oscillator, device, None, &motion, &source);
-        let fast = case.engine().discrete_adjoint(oscillator, device, None, &motion, &source);
+        let exact = reference::discrete_adjoint(system, device, None, &motion, &source);
+        let fast = case.engine().discrete_adjoint(system, device, None, &motion, &source);
         case.agree_gradients(&fast, &exact)?;
     }
 
     #[test]
     fn fused_least_squares(case in linear_free_case()) {
-        let (oscillator, device) = (&case.oscillator, &case.device);
+        let (system, device) = (&case.system, &case.device);
         let (motion, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
         let last = case.nodes() - 1;
         let mut source = Trajectory::zeros(case.nodes());
@@ -349,12 +344,12 @@ proptest! {
             cost += w * (y - o) * (y - o);
             source.displacement[i] = 2.0 * w * (y - o);
         }
-        let exact = reference::discrete_adjoint(oscillator, device, None, &motion, &source);
+        let exact = reference::discrete_adjoint(system, device, None, &motion, &source);
         let mut gradient = device.clone();
         let [c, k] = gradient.coefficients.as_mut_slice() else { unreachable!("two terms") };
         let functions = [&device.mass, &device.coefficients[0], &device.coefficients[1]];
         let found = least_squares(
-            oscillator,
+            system,
             functions.map(Vec::as_slice),
             case.initial,
             &observed,
@@ -369,7 +364,7 @@ proptest! {
     #[test]
     fn continuous_adjoints_have_the_bits_of_the_reference(case in any_case()) {
         let (motion, observed) = (case.response(), case.series(0));
-        let equation = AdjointEquation::new(&case.oscillator, &case.device, &motion, &observed);
+        let equation = AdjointEquation::new(&case.system, &case.device, &motion, &observed);
         let (exact, fast) = (equation.solve(), continuous_adjoint::solve(&equation));
         prop_assert_eq!(fast.displacement, exact.displacement);
         prop_assert_eq!(fast.first_slope, exact.first_slope);
@@ -380,30 +375,30 @@ proptest! {
         let motion = case.response();
         let fast = sensitivities(&case, &motion, holds);
         for (fast, direction) in fast.iter().zip(&directions(&case, holds)) {
-            let (oscillator, device) = (&case.oscillator, &case.device);
+            let (system, device) = (&case.system, &case.device);
             let exact =
-                reference::tangent(oscillator, device, case.excitation(), &motion, direction);
+                reference::tangent(system, device, case.excitation(), &motion, direction);
             case.agree_responses(fast, &exact)?;
         }
     }
 
     #[test]
     fn accelerations_at_nodes(case in any_case()) {
-        let (oscillator, device) = (&case.oscillator, &case.device);
+        let (system, device) = (&case.system, &case.device);
         let states = case.response();
         let around = [case.numbers[0], case.numbers[1]];
         let surroundings = crate::system::InputSample { force: around[0], base: around[1] };
         for first in (0..case.nodes()).step_by(LANES) {
-            let nodes = NodalObservations { oscillator, device, states: &states };
+            let nodes = NodalObservations { system, device, states: &states };
             let seen = simd::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
                 let place = TimePoint::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;
                 let exact = reference::observe(
-                    oscillator, kind, device, case.excitation(), &states, place, surroundings,
+                    system, kind, device, case.excitation(), &states, place, surroundings,
                 );
                 let (lane, side) = (node - first, usize::from(place.fraction == 1.0));
-                let functions = 1 + oscillator.terms.len();
+                let functions = 1 + system.terms.len();
                 let list = |value: f64, states: [f64; 2], functions: Vec<f64>| {
                     [vec![value], states.to_vec(), functions].concat()
                 };
@@ -424,8 +419,8 @@ proptest! {
 
     #[test]
     fn batches_of_steps(case in linear_free_case(), count in 1usize..50) {
-        let Case { oscillator, device, initial, .. } = &case;
-        let (step, observed) = (oscillator.grid.step(), case.series(0));
+        let Case { system, device, initial, .. } = &case;
+        let (step, observed) = (system.grid.step(), case.series(0));
         let direction = [case.series(1), case.series(2), case.series(3)];
         let ray = SearchRay {
             functions: [&device.mass, &device.coefficients[0], &device.coefficients[1]]
@@ -448,7 +443,7 @@ proptest! {
             for (values, direction) in device.functions_mut().zip(&direction) {
                 values.iter_mut().zip(direction).for_each(|(p, g)| *p -= a * g);
             }
-            let Ok(motion) = reference::forward(oscillator, &device, *initial, None) else {
+            let Ok(motion) = reference::forward(system, &device, *initial, None) else {
                 alone.push(f64::INFINITY);
                 continue;
             };

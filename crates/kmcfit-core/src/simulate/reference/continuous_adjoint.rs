@@ -26,15 +26,15 @@ use std::borrow::Cow;
 /// # Panics
 /// If the response, the measurements or a function of the device end before the grid does.
 pub fn continuous_adjoint(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
 ) -> SystemTangent {
-    let equation = AdjointEquation::new(oscillator, device, trajectory, observed);
+    let equation = AdjointEquation::new(system, device, trajectory, observed);
     let adjoint = equation.solve();
-    equation.gradients(oscillator, excitation, trajectory, &adjoint)
+    equation.gradients(system, excitation, trajectory, &adjoint)
 }
 
 /// The functions of time in Eq. 13, at the nodes.
@@ -53,13 +53,13 @@ pub(crate) struct Adjoint {
 
 impl<'a> AdjointEquation<'a> {
     pub fn new(
-        oscillator: &System,
+        system: &System,
         device: &'a NodalCoefficients,
         trajectory: &'a Trajectory,
         observed: &'a [f64],
     ) -> Self {
-        let dt = oscillator.grid.step();
-        let [c, k] = linearised_coefficients(oscillator, device, trajectory);
+        let dt = system.grid.step();
+        let [c, k] = linearised_coefficients(system, device, trajectory);
         let m = device.mass.as_slice();
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
         let y = trajectory.displacement.as_slice();
@@ -74,7 +74,7 @@ impl<'a> AdjointEquation<'a> {
             observed.into(),
         ];
         assert!(
-            functions.iter().all(|f| f.len() == oscillator.grid.nodes()),
+            functions.iter().all(|f| f.len() == system.grid.nodes()),
             "functions over the whole grid"
         );
         Self { dt, functions }
@@ -106,7 +106,7 @@ impl<'a> AdjointEquation<'a> {
     /// Eqs. 15-17, and the gradient with respect to the initial state.
     pub fn gradients(
         &self,
-        oscillator: &System,
+        system: &System,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         adjoint: &Adjoint,
@@ -136,7 +136,7 @@ impl<'a> AdjointEquation<'a> {
         SystemTangent {
             device: NodalCoefficients {
                 mass: gradient(&acceleration),
-                coefficients: oscillator.terms.iter().map(by_term).collect(),
+                coefficients: system.terms.iter().map(by_term).collect(),
             },
             initial: State {
                 displacement: c * z[0] - momentum_slope,
@@ -154,16 +154,16 @@ fn acceleration(functions: [f64; 8], z: f64, w: f64) -> f64 {
 
 /// `(C, K)` at the nodes: damping and stiffness of small disturbances of the response.
 fn linearised_coefficients<'a>(
-    oscillator: &System,
+    system: &System,
     device: &'a NodalCoefficients,
     trajectory: &Trajectory,
 ) -> [Cow<'a, [f64]>; 2] {
-    if oscillator.terms == [Term::Damping, Term::Stiffness] {
+    if system.terms == [Term::Damping, Term::Stiffness] {
         return [0, 1].map(|j| Cow::Borrowed(device.coefficients[j].as_slice()));
     }
     let nodes = trajectory.nodes();
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
-    for (term, p) in oscillator.terms.iter().zip(&device.coefficients) {
+    for (term, p) in system.terms.iter().zip(&device.coefficients) {
         for i in 0..nodes {
             let (phi_y, phi_v) = term.partials(trajectory.displacement[i], trajectory.velocity[i]);
             c[i] += p[i] * phi_v;

@@ -17,14 +17,14 @@ use crate::system::{
 /// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 pub fn discrete_adjoint(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
-    match oscillator.method {
+    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, source),
         Method::Rk4 => sweep(&RK4, equation, trajectory, source),
     }

@@ -29,12 +29,12 @@ impl<'a> EquationOfMotion<'a> {
     /// # Panics
     /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
     pub fn new(
-        oscillator: &'a System,
+        system: &'a System,
         device: &'a NodalCoefficients,
         excitation: Option<&'a Excitation>,
         nodes: usize,
     ) -> Self {
-        let System { grid, terms, .. } = oscillator;
+        let System { grid, terms, .. } = system;
         assert_eq!(
             device.coefficients.len(),
             terms.len(),

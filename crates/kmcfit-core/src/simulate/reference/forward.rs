@@ -14,13 +14,13 @@ use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State,
 /// # Panics
 /// If `device` or `excitation` does not fit the grid and the terms.
 pub fn forward(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
 ) -> Result<Trajectory, SimulationError> {
-    let mut trajectory = Trajectory::zeros(oscillator.grid.nodes());
-    forward_into(oscillator, device, initial, excitation, &mut trajectory)?;
+    let mut trajectory = Trajectory::zeros(system.grid.nodes());
+    forward_into(system, device, initial, excitation, &mut trajectory)?;
     Ok(trajectory)
 }
 
@@ -30,16 +30,16 @@ pub fn forward(
 /// # Errors
 /// As [`forward`].
 pub fn forward_into(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
     trajectory: &mut Trajectory,
 ) -> Result<(), SimulationError> {
-    let grid = &oscillator.grid;
+    let grid = &system.grid;
     require_positive_mass(grid, device)?;
-    let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
-    match oscillator.method {
+    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, initial, trajectory),
         Method::Rk4 => sweep(&RK4, equation, initial, trajectory),
     }

@@ -61,7 +61,7 @@ impl Observation {
 /// # Panics
 /// If `place` is not within `states`.
 pub fn observe(
-    oscillator: &System,
+    system: &System,
     kind: ChannelKind,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
@@ -70,10 +70,10 @@ pub fn observe(
     around: InputSample,
 ) -> Observation {
     let equation = EquationOfMotion {
-        terms: &oscillator.terms,
+        terms: &system.terms,
         device,
         excitation,
-        dt: oscillator.grid.step(),
+        dt: system.grid.step(),
     };
     match kind {
         ChannelKind::Displacement => displacement(equation.dt, states, place),

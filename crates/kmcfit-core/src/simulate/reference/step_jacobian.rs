@@ -33,14 +33,14 @@ enum Seed {
 
 /// All steps linearised about the node states `states`, which need not be a response.
 pub fn step_jacobians(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
 ) -> Vec<StepJacobian> {
-    let equation = EquationOfMotion::new(oscillator, device, excitation, states.nodes());
+    let equation = EquationOfMotion::new(system, device, excitation, states.nodes());
     let steps = 0..states.nodes() - 1;
-    match oscillator.method {
+    match system.method {
         Method::Midpoint => steps
             .map(|i| step(&MIDPOINT, equation, states, i))
             .collect(),

@@ -10,14 +10,14 @@ use crate::system::{
 /// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
 /// step, exact for the discrete response.
 pub fn tangent(
-    oscillator: &System,
+    system: &System,
     device: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     direction: &SystemTangent,
 ) -> Trajectory {
-    let equation = EquationOfMotion::new(oscillator, device, excitation, trajectory.nodes());
-    match oscillator.method {
+    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, direction),
         Method::Rk4 => sweep(&RK4, equation, trajectory, direction),
     }

@@ -17,7 +17,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        step_jacobians(view.oscillator, view.device, view.excitation, view.motion)
+        step_jacobians(view.system, view.device, view.excitation, view.motion)
     });
     each.collect()
 }

@@ -70,13 +70,13 @@ fn long_problem(knots: Option<u32>) -> Problem {
             .with_channel(channel(ChannelKind::Velocity, between))
             .with_channel(channel(ChannelKind::Acceleration, times.clone()))
     };
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let functions = functions.with_scalars(vec![speed]);
-    Problem::new(oscillator, functions, vec![record]).unwrap()
+    Problem::new(system, functions, vec![record]).unwrap()
 }
 
 /// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
@@ -197,7 +197,7 @@ fn a_long_record_on_two_threads() {
 #[test]
 fn a_long_record_by_the_continuous_gradient() {
     let mut problem = long_problem(None);
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };

@@ -153,7 +153,7 @@ fn has_mass(evaluation: &Evaluation) -> bool {
 
 fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
     let sizes = problem.natural_scales(evaluation);
-    let duration = problem.oscillator.grid.duration();
+    let duration = problem.system.grid.duration();
     let weight = PULL * problem.zero_response_misfit().max(f64::MIN_POSITIVE);
     let metric = problem.functions.relative_metric(&sizes, duration);
     for (d, m) in sub.proximal.iter_mut().zip(metric) {

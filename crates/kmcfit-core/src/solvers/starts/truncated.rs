@@ -36,7 +36,7 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
     };
     let parameters = problem.parameters();
-    let suits = problem.oscillator.grid.nodes() > LONG_RECORD_STEPS
+    let suits = problem.system.grid.nodes() > LONG_RECORD_STEPS
         && problem.penalties.is_empty()
         && problem.variations.is_empty()
         && problem.comes_in_pieces()
@@ -51,17 +51,17 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
 
 /// The first steps of a problem's records, with the same parameters.
 fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
-    let grid = problem.oscillator.grid;
+    let grid = problem.system.grid;
     let grid = Grid::new(grid.start(), grid.step() * steps as f64, steps + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
     let devices = functions.assemblies().to_vec();
-    let oscillator = System {
+    let system = System {
         grid,
-        ..problem.oscillator.clone()
+        ..problem.system.clone()
     };
     let mut part = Problem::new(
-        oscillator,
+        system,
         Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
             .with_scalars(functions.scalars().to_vec()),
         problem

@@ -48,9 +48,7 @@ impl Kinematics {
         match experiment.channels.as_slice() {
             [] => None,
             [channel] => match channel.stride() {
-                Some(stride) => {
-                    uniform::kinematics(channel, stride, problem.oscillator.grid.step())
-                }
+                Some(stride) => uniform::kinematics(channel, stride, problem.system.grid.step()),
                 None => by_spline(problem, experiment, scalars).map(|(near, _)| near),
             },
             _ => by_spline(problem, experiment, scalars).map(|(near, _)| near),

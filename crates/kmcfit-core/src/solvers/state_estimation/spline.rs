@@ -50,7 +50,7 @@ pub fn kinematics(
     experiment: &Experiment,
     scalars: &[f64],
 ) -> Option<(Kinematics, Trajectory)> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let nodes = experiment.nodes;
     if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
         return None;

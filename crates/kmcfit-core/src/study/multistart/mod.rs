@@ -147,7 +147,7 @@ pub fn starts(problem: &Problem, how: &Multistart) -> Vec<Vec<f64>> {
 }
 
 fn constants(problem: &Problem, levels: &[f64]) -> Vec<f64> {
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let mut theta = Vec::with_capacity(problem.parameters());
     for (function, level) in problem.functions.iter().zip(levels) {
         if let Some(basis) = &function.basis {

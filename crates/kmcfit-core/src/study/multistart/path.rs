@@ -60,7 +60,7 @@ fn along_gauge(
         return None;
     }
     let between = mixed(&one, &two, s);
-    let grid = &problem.oscillator.grid;
+    let grid = &problem.system.grid;
     let assembly = problem.functions.assembly(0);
     for (&f, values) in assembly.iter().zip(between.functions()) {
         let basis = problem.functions.get(f).basis.as_ref()?;

@@ -47,7 +47,7 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
     let mut held = problem.clone();
     let mut group = RowGroup::new(HELD);
     let right = value - of.constant;
-    let time = of.time.unwrap_or(problem.oscillator.grid.start());
+    let time = of.time.unwrap_or(problem.system.grid.start());
     group.push(of.entries.iter().copied(), [right, right], [time, time]);
     held.parts_mut().constraints.groups.push(group);
     held

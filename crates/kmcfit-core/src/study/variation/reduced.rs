@@ -16,7 +16,7 @@ pub struct Reduced {
 
 impl Reduced {
     pub fn new(problem: &Problem, function: usize) -> Self {
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         let whole = problem.functions.get(function);
         let one = match &whole.basis {
             Some(basis) => basis.constant(grid, 1.0),

@@ -43,12 +43,12 @@ pub(crate) struct LinearDevice<'a> {
 impl<'a> LinearDevice<'a> {
     /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
     /// the terms damping and stiffness.
-    pub fn of(oscillator: &System, device: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
+    pub fn of(system: &System, device: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
         let [damping, stiffness] = device.coefficients.as_slice() else {
             return None;
         };
         let functions = [device.mass.as_slice(), damping, stiffness];
-        Self::new(functions, oscillator.grid.step(), nodes)
+        Self::new(functions, system.grid.step(), nodes)
     }
 
     /// The same from mass, damping and stiffness, and the step `h` (s).

@@ -11,7 +11,7 @@ const INITIAL: State = State {
     velocity: -1.0,
 };
 
-fn oscillator(nodes: usize) -> System {
+fn system(nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, 25.0, nodes).unwrap(),
         method: Method::Midpoint,
@@ -74,10 +74,10 @@ const ROUNDING: f64 = 1e-12;
 #[test]
 fn motions_are_those_of_single_steps() {
     for nodes in NODES {
-        let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let one_by_one = oscillator.forward(&device, INITIAL, None).unwrap();
+        let (system, device) = (system(nodes), device(nodes));
+        let one_by_one = system.forward(&device, INITIAL, None).unwrap();
         let mut motion = Trajectory::zeros(nodes);
-        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
         linear.forward(INITIAL, &mut motion);
         for (a, b) in [
             (&motion.displacement, &one_by_one.displacement),
@@ -92,11 +92,11 @@ fn motions_are_those_of_single_steps() {
 #[test]
 fn gradients_are_those_of_single_steps() {
     for (nodes, by_velocity) in NODES.into_iter().flat_map(|n| [(n, 0.0), (n, 0.3)]) {
-        let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let (system, device) = (system(nodes), device(nodes));
+        let motion = system.forward(&device, INITIAL, None).unwrap();
         let source = source(&motion, by_velocity);
-        let expected = reference::discrete_adjoint(&oscillator, &device, None, &motion, &source);
-        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+        let expected = reference::discrete_adjoint(&system, &device, None, &motion, &source);
+        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
         let found = linear.gradient(&motion, &source);
         for (a, b) in found.device.functions().zip(expected.device.functions()) {
             let error = distance(a, b) / largest(b);
@@ -112,8 +112,8 @@ fn gradients_are_those_of_single_steps() {
 fn squares_are_motion_and_gradient_in_one() {
     let weights = [0.7, 0.2];
     for nodes in NODES {
-        let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let (system, device) = (system(nodes), device(nodes));
+        let motion = system.forward(&device, INITIAL, None).unwrap();
         let readings = readings(&motion);
         let mut source = Trajectory::zeros(nodes);
         let mut cost = 0.0;
@@ -123,13 +123,13 @@ fn squares_are_motion_and_gradient_in_one() {
             cost += w * r * r;
             source.displacement[i] = 2.0 * w * r;
         }
-        let expected = reference::discrete_adjoint(&oscillator, &device, None, &motion, &source);
+        let expected = reference::discrete_adjoint(&system, &device, None, &motion, &source);
         let mut gradient = device.clone();
         let [c, k] = gradient.coefficients.as_mut_slice() else {
             unreachable!("two terms")
         };
         let (found, initial) = crate::simulate::least_squares(
-            &oscillator,
+            &system,
             [
                 &device.mass,
                 &device.coefficients[0],
@@ -163,9 +163,9 @@ impl simd::Kernel for Whole<'_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<u64> {
-        let Self(oscillator, device) = self;
+        let Self(system, device) = self;
         let nodes = device.mass.len();
-        let linear = LinearDevice::of(oscillator, device, nodes).unwrap();
+        let linear = LinearDevice::of(system, device, nodes).unwrap();
         let mut motion = Trajectory::zeros(nodes);
         let mut gradient = NodalCoefficients::zeros(nodes, 2);
         with_workspace(|workspace| {
@@ -214,8 +214,8 @@ impl simd::Kernel for Whole<'_> {
 #[test]
 fn all_arithmetics_give_the_same_bits() {
     for nodes in NODES {
-        let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let outputs = simd::on_each(|| Whole(&oscillator, &device));
+        let (system, device) = (system(nodes), device(nodes));
+        let outputs = simd::on_each(|| Whole(&system, &device));
         assert!(
             outputs.iter().all(|output| output == &outputs[0]),
             "{nodes}"
@@ -228,17 +228,17 @@ fn all_arithmetics_give_the_same_bits() {
 #[test]
 fn what_blocks_cannot_do_is_done_step_by_step() {
     let nodes = 500;
-    let oscillator = oscillator(nodes);
+    let system = system(nodes);
     let mut tiny = device(nodes);
     for f in tiny.functions_mut() {
         f.iter_mut().for_each(|x| *x *= 1e-200);
     }
-    assert!(LinearDevice::of(&oscillator, &tiny, nodes).is_none());
+    assert!(LinearDevice::of(&system, &tiny, nodes).is_none());
     let mut motion = Trajectory::zeros(nodes);
     Engine::ParallelInTime
-        .forward_into(&oscillator, &tiny, INITIAL, None, &mut motion)
+        .forward_into(&system, &tiny, INITIAL, None, &mut motion)
         .unwrap();
-    let expected = oscillator.forward(&tiny, INITIAL, None).unwrap();
+    let expected = system.forward(&tiny, INITIAL, None).unwrap();
     let error = distance(&motion.displacement, &expected.displacement);
     assert!(
         error < ROUNDING * largest(&expected.displacement),
@@ -247,9 +247,8 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
 
     let mut stiff = device(nodes);
     stiff.coefficients[1].fill(1e30);
-    let expected = oscillator.forward(&stiff, INITIAL, None).unwrap_err();
-    let found =
-        Engine::ParallelInTime.forward_into(&oscillator, &stiff, INITIAL, None, &mut motion);
+    let expected = system.forward(&stiff, INITIAL, None).unwrap_err();
+    let found = Engine::ParallelInTime.forward_into(&system, &stiff, INITIAL, None, &mut motion);
     assert_eq!(found.unwrap_err(), expected);
 }
 
@@ -257,12 +256,11 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
 #[test]
 fn mass_is_required_behind_the_end_of_a_record() {
     let nodes = 500;
-    let (oscillator, mut device) = (oscillator(nodes), device(nodes));
+    let (system, mut device) = (system(nodes), device(nodes));
     device.mass[nodes - 1] = -1.0;
     let mut short = Trajectory::zeros(300);
-    let expected = reference::forward_into(&oscillator, &device, INITIAL, None, &mut short);
-    let found =
-        Engine::ParallelInTime.forward_into(&oscillator, &device, INITIAL, None, &mut short);
+    let expected = reference::forward_into(&system, &device, INITIAL, None, &mut short);
+    let found = Engine::ParallelInTime.forward_into(&system, &device, INITIAL, None, &mut short);
     assert!(expected.is_err());
     assert_eq!(found, expected);
 }
@@ -273,8 +271,8 @@ fn mass_is_required_behind_the_end_of_a_record() {
 #[test]
 fn squares_lose_nothing_near_the_readings() {
     let nodes = 2000;
-    let (oscillator, device) = (oscillator(nodes), device(nodes));
-    let one_by_one = oscillator.forward(&device, INITIAL, None).unwrap();
+    let (system, device) = (system(nodes), device(nodes));
+    let one_by_one = system.forward(&device, INITIAL, None).unwrap();
     let wave = |(i, y): (usize, &f64)| y + 1e-8 * (0.11 * i as f64).sin();
     let readings: Vec<f64> = one_by_one
         .displacement
@@ -282,7 +280,7 @@ fn squares_lose_nothing_near_the_readings() {
         .enumerate()
         .map(wave)
         .collect();
-    let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
+    let linear = LinearDevice::of(&system, &device, nodes).unwrap();
     let mut in_blocks = Trajectory::zeros(nodes);
     linear.forward(INITIAL, &mut in_blocks);
     let [expected, other] = [&in_blocks, &one_by_one].map(|motion| {
@@ -290,7 +288,7 @@ fn squares_lose_nothing_near_the_readings() {
         for (i, s) in source.displacement.iter_mut().enumerate() {
             *s = 2.0 * (motion.displacement[i] - readings[i]);
         }
-        reference::discrete_adjoint(&oscillator, &device, None, motion, &source)
+        reference::discrete_adjoint(&system, &device, None, motion, &source)
     });
     let mut gradient = device.clone();
     let [c, k] = gradient.coefficients.as_mut_slice() else {
@@ -307,9 +305,9 @@ fn squares_lose_nothing_near_the_readings() {
 #[test]
 fn every_cut_gives_the_same_bits() {
     for nodes in [2000, 4097, 20_000] {
-        let (oscillator, device) = (oscillator(nodes), device(nodes));
-        let linear = LinearDevice::of(&oscillator, &device, nodes).unwrap();
-        let motion = oscillator.forward(&device, INITIAL, None).unwrap();
+        let (system, device) = (system(nodes), device(nodes));
+        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
+        let motion = system.forward(&device, INITIAL, None).unwrap();
         let readings = readings(&motion);
         let of = squares_of(linear, &readings);
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();

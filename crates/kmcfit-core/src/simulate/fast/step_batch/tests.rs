@@ -41,13 +41,12 @@ fn device_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
 /// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
 fn by_itself(ray: &SearchRay, length: f64) -> Option<(Trajectory, f64)> {
     let nodes = ray.readings.len();
-    let oscillator = System {
+    let system = System {
         grid: Grid::new(0.0, ray.step * (nodes - 1) as f64, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let motion =
-        reference::forward(&oscillator, &device_at(ray, length), ray.initial, None).ok()?;
+    let motion = reference::forward(&system, &device_at(ray, length), ray.initial, None).ok()?;
     let pairs = motion.displacement.iter().zip(ray.readings);
     let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
     let cost = trapezoid(&squares, ray.step);

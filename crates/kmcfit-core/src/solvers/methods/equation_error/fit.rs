@@ -310,7 +310,7 @@ impl<'a> Cost<'a> {
             let Some(measured) = measured else { continue };
             let experiment = &problem.experiments[e];
             evaluation.trajectories[e] =
-                measured.trajectory(&problem.oscillator.grid, experiment.nodes);
+                measured.trajectory(&problem.system.grid, experiment.nodes);
             let view = problem.view(evaluation, e);
             let channels = experiment.channels.iter();
             let predictions = channels.map(|channel| measured.predict(problem, channel, view));

@@ -146,7 +146,7 @@ impl Measured {
             a: motion.a.clone(),
             force,
             base,
-            weight: stride.unwrap_or(1) as f64 * problem.oscillator.grid.step(),
+            weight: stride.unwrap_or(1) as f64 * problem.system.grid.step(),
             frequency: rms(&motion.v) / rms(&motion.y),
             corner: None,
         }
@@ -156,7 +156,7 @@ impl Measured {
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
-            term => problem.oscillator.terms[term - 1].phi(self.y[i], self.v[i]),
+            term => problem.system.terms[term - 1].phi(self.y[i], self.v[i]),
         }
     }
 
@@ -302,7 +302,7 @@ impl Measurements {
     /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
     /// only forces proportional to the motion do without.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
-        let terms = problem.oscillator.terms.iter();
+        let terms = problem.system.terms.iter();
         if terms.clone().all(|term| term.is_linear()) {
             return Vec::new();
         }

@@ -135,7 +135,7 @@ fn minimise(
 ) -> Result<Minimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
     sub.constrain(&constraints, start);
-    let duration = problem.oscillator.grid.duration();
+    let duration = problem.system.grid.duration();
     let metric = problem.functions.relative_metric(sizes, duration);
     let weight = PULL * sub.value(&vec![0.0; sub.variables]).max(f64::MIN_POSITIVE);
     for (proximal, m) in sub.proximal.iter_mut().zip(&metric) {
@@ -193,7 +193,7 @@ fn root_weight(
 ) -> f64 {
     let device = device(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let terms = problem.oscillator.terms.iter().zip(&device.coefficients);
+    let terms = problem.system.terms.iter().zip(&device.coefficients);
     let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
     let springs = springs.map(|(_, k)| size(k) * size(&motion.y));
     let force_scale = springs.fold(size(&device.mass) * size(&motion.a), f64::max)
@@ -245,7 +245,7 @@ fn add_rows(
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
     if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
-        let grid = &problem.oscillator.grid;
+        let grid = &problem.system.grid;
         let mut ones = problem.functions.empty_device();
         ones.mass
             .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));

@@ -79,11 +79,11 @@ fn move_to(
     evaluation: &mut Evaluation,
 ) -> bool {
     (problem.functions).device_into(parameters, 0, &mut evaluation.device);
-    let (oscillator, device) = (&problem.oscillator, &evaluation.device);
+    let (system, device) = (&problem.system, &evaluation.device);
     let motion = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
-    let is_whole = reconstruct(device, initial, states, oscillator.grid.step(), motion);
-    if !is_whole && reference::forward_into(oscillator, device, initial, None, motion).is_err() {
+    let is_whole = reconstruct(device, initial, states, system.grid.step(), motion);
+    if !is_whole && reference::forward_into(system, device, initial, None, motion).is_err() {
         return false;
     }
     evaluation.predictions[0][0].clone_from(&motion.displacement);
@@ -95,11 +95,11 @@ fn move_to(
 /// any other.
 pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
-    let oscillator = &problem.oscillator;
+    let system = &problem.system;
     let nodes = experiment.nodes;
     let is_integral = matches!(channel.weighting(), Weighting::Integral { .. });
     let fits = is_integral
-        && is_linear_midpoint(oscillator)
+        && is_linear_midpoint(system)
         && experiment.excitation.is_none()
         && !problem.is_regularised()
         && point.parameters.len() == 3 * nodes;
@@ -113,7 +113,7 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<Search
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,
         readings: channel.observed(),
-        step: oscillator.grid.step(),
+        step: system.grid.step(),
     })
 }
 

@@ -12,7 +12,7 @@ const NODES: usize = 401;
 /// The paper's problem, smaller.
 fn problem() -> Problem {
     let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
-    let oscillator = System {
+    let system = System {
         grid,
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
@@ -36,7 +36,7 @@ fn problem() -> Problem {
         velocity: 0.0,
     };
     let experiment = Experiment::free("decay", initial, NODES).with_channel(channel);
-    Problem::new(oscillator, functions, vec![experiment]).unwrap()
+    Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
 /// A search of some steps.
