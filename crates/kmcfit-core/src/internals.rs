@@ -18,7 +18,7 @@ pub mod builder {
 }
 pub mod constraints {
     pub use crate::constraints::{
-        Cone, Constraints, Impossible, Limit, RowGroup, Rows, Shape, Statement, TOLERANCE,
+        Cone, Constraints, Impossible, RowGroup, Rows, Shape, Statement, TOLERANCE, TimeHistory,
     };
 }
 pub mod diagnostics {

@@ -84,7 +84,7 @@ pub use builder::{
     BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec,
     SensorSpec, Start,
 };
-pub use constraints::{Limit, Shape, Statement};
+pub use constraints::{Shape, Statement, TimeHistory};
 pub use functions::{CoefficientKind, Prior};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, Loss, Weighting};

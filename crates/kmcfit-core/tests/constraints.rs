@@ -2,7 +2,7 @@
 //! message about constraints in model files.
 
 use kmcfit_core::internals::constraints::{
-    Constraints, Impossible, Limit, RowGroup, Shape, Statement,
+    Constraints, Impossible, RowGroup, Shape, Statement, TimeHistory,
 };
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
@@ -114,8 +114,8 @@ fn inside(constraints: &Constraints, functions: &Parameterization, seed: u64) ->
 fn bounds(of: CoefficientKind, min: f64, max: f64) -> Statement {
     Statement::Bounds {
         of,
-        min: Some(Limit::Number(min)),
-        max: Some(Limit::Number(max)),
+        min: Some(TimeHistory::Constant(min)),
+        max: Some(TimeHistory::Constant(max)),
     }
 }
 
@@ -210,7 +210,7 @@ fn one_row_for_every_value_that_can_differ() {
     };
     let positive = Statement::Bounds {
         of: MASS,
-        min: Some(Limit::Number(0.0)),
+        min: Some(TimeHistory::Constant(0.0)),
         max: None,
     };
     let falls = shape(MASS, Shape::NonIncreasing);
@@ -236,7 +236,7 @@ fn what_is_projected_satisfies_the_statement_between_the_nodes() {
     let limit = |t: f64| 0.2 + 0.3 * (t - 1.0) / 10.0 * ((t - 1.0) * 2.0).sin();
     let moving = Statement::Bounds {
         of: MASS,
-        min: Some(Limit::Nodal {
+        min: Some(TimeHistory::Nodal {
             name: "a column".into(),
             values: grid().times().iter().map(|t| limit(*t)).collect(),
         }),

@@ -10,7 +10,7 @@ use crate::error::InputError;
 use kmcfit_core::internals::builder::{
     self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
 };
-use kmcfit_core::internals::constraints::Limit;
+use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
@@ -274,10 +274,10 @@ pub(super) fn history(
     grid: &Grid,
     key: &str,
     given: &NumberOrColumn,
-) -> Result<Limit, InputError> {
+) -> Result<TimeHistory, InputError> {
     match given {
-        NumberOrColumn::Number(value) => Ok(Limit::Number(value.0)),
-        NumberOrColumn::Column(c) => Ok(Limit::Nodal {
+        NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(value.0)),
+        NumberOrColumn::Column(c) => Ok(TimeHistory::Nodal {
             name: format!("{} of {}", c.column, c.data),
             values: column(file, grid, key, c)?,
         }),
@@ -292,8 +292,8 @@ pub(super) fn values(
     given: &NumberOrColumn,
 ) -> Result<Vec<f64>, InputError> {
     match history(file, grid, key, given)? {
-        Limit::Number(value) => Ok(vec![value; grid.nodes()]),
-        Limit::Nodal { values, .. } => Ok(values),
+        TimeHistory::Constant(value) => Ok(vec![value; grid.nodes()]),
+        TimeHistory::Nodal { values, .. } => Ok(values),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::BuildError;
 use super::basis::{BasisSpec, Knots};
-use crate::constraints::Limit;
+use crate::constraints::TimeHistory;
 use crate::functions::basis::from_physical_powers;
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::solvers::WeightRule;
@@ -43,7 +43,7 @@ pub enum PenaltySpec {
         /// Weight.
         weight: PenaltyWeight,
         /// Values that a penalty of order 0 pulls towards; zero without. Other orders have none.
-        reference: Option<Limit>,
+        reference: Option<TimeHistory>,
     },
     /// `weight * total variation of p`: a jump costs no more than a slow change.
     TotalVariation {
@@ -55,7 +55,7 @@ pub enum PenaltySpec {
 /// Known, or estimated in a basis.
 #[derive(Debug, Clone, PartialEq)]
 enum Form {
-    Fixed(Limit),
+    Fixed(TimeHistory),
     Estimated(BasisSpec, Start),
 }
 
@@ -64,8 +64,8 @@ enum Form {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientSpec {
     form: Form,
-    pub(super) min: Option<Limit>,
-    pub(super) max: Option<Limit>,
+    pub(super) min: Option<TimeHistory>,
+    pub(super) max: Option<TimeHistory>,
     pub(super) penalties: Vec<PenaltySpec>,
     pub(super) width: Option<f64>,
 }
@@ -82,19 +82,19 @@ impl CoefficientSpec {
     }
 
     /// Known values.
-    pub fn known(values: Limit) -> Self {
+    pub fn known(values: TimeHistory) -> Self {
         Self::new(Form::Fixed(values))
     }
 
     /// Known, and the same at all times.
     pub fn fixed(value: f64) -> Self {
-        Self::known(Limit::Number(value))
+        Self::known(TimeHistory::Constant(value))
     }
 
     /// Known, one value per node.
     pub fn fixed_at_nodes(values: Vec<f64>) -> Self {
         let name = "values at the nodes".to_owned();
-        Self::known(Limit::Nodal { name, values })
+        Self::known(TimeHistory::Nodal { name, values })
     }
 
     /// Estimated in a basis.
@@ -144,18 +144,18 @@ impl CoefficientSpec {
     /// Bounded below, in the unit of the function.
     #[must_use]
     pub fn min(self, min: f64) -> Self {
-        self.bounds(Some(Limit::Number(min)), None)
+        self.bounds(Some(TimeHistory::Constant(min)), None)
     }
 
     /// Bounded above, in the unit of the function.
     #[must_use]
     pub fn max(self, max: f64) -> Self {
-        self.bounds(None, Some(Limit::Number(max)))
+        self.bounds(None, Some(TimeHistory::Constant(max)))
     }
 
     /// Bounds that may change with time; `None` keeps the present one.
     #[must_use]
-    pub fn bounds(mut self, min: Option<Limit>, max: Option<Limit>) -> Self {
+    pub fn bounds(mut self, min: Option<TimeHistory>, max: Option<TimeHistory>) -> Self {
         self.min = min.or(self.min);
         self.max = max.or(self.max);
         self
@@ -240,7 +240,7 @@ impl CoefficientSpec {
                 .found(format!("`fixed` and `{name}`"))
                 .expected("one of the two"));
         }
-        let bound = |name: &str, bound: &Option<Limit>| match bound {
+        let bound = |name: &str, bound: &Option<TimeHistory>| match bound {
             Some(values) => {
                 values_at_nodes(values, &format!("{key}.{name}"), grid.nodes()).map(drop)
             }
@@ -294,8 +294,8 @@ impl PenaltySpec {
 /// Refuses bounds of which the lower one is above the upper one; their keys are `min` and `max` below `key`.
 pub(super) fn uncrossed(
     key: &str,
-    min: Option<&Limit>,
-    max: Option<&Limit>,
+    min: Option<&TimeHistory>,
+    max: Option<&TimeHistory>,
     grid: &Grid,
 ) -> Result<(), BuildError> {
     let (Some(min), Some(max)) = (min, max) else {
@@ -324,13 +324,13 @@ fn check_weight(key: &str, weight: f64) -> Result<(), BuildError> {
 
 /// Finite values at all nodes.
 pub(super) fn values_at_nodes(
-    values: &Limit,
+    values: &TimeHistory,
     key: &str,
     nodes: usize,
 ) -> Result<Vec<f64>, BuildError> {
     let values = match values {
-        Limit::Number(value) => vec![*value; nodes],
-        Limit::Nodal { values, .. } => values.clone(),
+        TimeHistory::Constant(value) => vec![*value; nodes],
+        TimeHistory::Nodal { values, .. } => values.clone(),
     };
     if values.len() != nodes {
         return Err(BuildError::new(key, "there is not one value per node")

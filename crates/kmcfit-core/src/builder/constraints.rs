@@ -3,7 +3,7 @@
 use super::assembly::Slot;
 use super::coefficient::uncrossed;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
-use crate::constraints::{Constraints, Impossible, Limit, Shape, Statement, TOLERANCE};
+use crate::constraints::{Constraints, Impossible, Shape, Statement, TOLERANCE, TimeHistory};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
 use crate::solvers::StartProjection;
@@ -113,9 +113,9 @@ impl Builder {
 
     /// Whether bounds keep the common scale from falling and from rising.
     fn bounded_on_both_sides(&self) -> bool {
-        let positive = |limit: &&Limit| match limit {
-            Limit::Number(value) => *value > 0.0,
-            Limit::Nodal { .. } => true,
+        let positive = |limit: &&TimeHistory| match limit {
+            TimeHistory::Constant(value) => *value > 0.0,
+            TimeHistory::Nodal { .. } => true,
         };
         let slots = self.slots();
         let own = slots.iter().map(|slot| (&slot.spec.min, &slot.spec.max));

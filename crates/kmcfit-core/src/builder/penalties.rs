@@ -2,7 +2,7 @@
 
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
-use crate::constraints::Limit;
+use crate::constraints::TimeHistory;
 use crate::functions::{Basis, Penalty, Variation};
 use crate::problem::Problem;
 use crate::record::Weighting;
@@ -170,7 +170,7 @@ fn residuals_at(
     problem: &Problem,
     basis: &Basis,
     key: &str,
-    reference: &Limit,
+    reference: &TimeHistory,
     penalty: &Penalty,
 ) -> Result<Vec<f64>, BuildError> {
     let grid = &problem.system.grid;

@@ -8,6 +8,6 @@ mod soft;
 mod violation;
 
 pub use crate::rows::Rows;
-pub use build::{Impossible, Limit, Shape, Statement};
+pub use build::{Impossible, Shape, Statement, TimeHistory};
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
 pub use violation::TOLERANCE;

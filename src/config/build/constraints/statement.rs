@@ -5,7 +5,7 @@ use crate::config::build::functions::history;
 use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::constraints::{Limit, Shape, Statement};
+use kmcfit_core::internals::constraints::{Shape, Statement, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 
@@ -214,7 +214,7 @@ impl Reader<'_> {
         &self,
         name: &str,
         given: Option<&NumberOrColumn>,
-    ) -> Result<Option<Limit>, InputError> {
+    ) -> Result<Option<TimeHistory>, InputError> {
         let read = |given| history(self.file, self.grid, &self.below(name), given);
         given.map(read).transpose()
     }

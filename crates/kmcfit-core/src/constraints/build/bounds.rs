@@ -2,17 +2,17 @@
 
 use super::form::group;
 use super::sampling::{nodal, value};
-use super::{All, Impossible, Limit};
+use super::{All, Impossible, TimeHistory};
 use crate::constraints::RowGroup;
 
 pub(super) fn build(
     all: &All<'_>,
     j: usize,
-    min: Option<&Limit>,
-    max: Option<&Limit>,
+    min: Option<&TimeHistory>,
+    max: Option<&TimeHistory>,
 ) -> Result<Vec<RowGroup>, Impossible> {
     let name = all.name(j);
-    if let (Some(Limit::Number(min)), Some(Limit::Number(max))) = (min, max)
+    if let (Some(TimeHistory::Constant(min)), Some(TimeHistory::Constant(max))) = (min, max)
         && min == max
     {
         let forms = all.sum(&[value(j, 1.0)], &[]);
@@ -20,10 +20,10 @@ pub(super) fn build(
             [*min, *max]
         })?]);
     }
-    let one = |limit: &Limit, sign: &str, upper: bool| {
+    let one = |limit: &TimeHistory, sign: &str, upper: bool| {
         let also = match limit {
-            Limit::Number(_) => Vec::new(),
-            Limit::Nodal { values, .. } => all.breaks(values),
+            TimeHistory::Constant(_) => Vec::new(),
+            TimeHistory::Nodal { values, .. } => all.breaks(values),
         };
         let forms = all.sum(&[value(j, 1.0)], &also);
         group(format!("{name} {sign} {limit}"), &forms, |t| {
@@ -39,9 +39,9 @@ pub(super) fn build(
     min.into_iter().chain(max).collect()
 }
 
-fn at(all: &All<'_>, limit: &Limit, t: f64) -> f64 {
+fn at(all: &All<'_>, limit: &TimeHistory, t: f64) -> f64 {
     match limit {
-        Limit::Number(value) => *value,
-        Limit::Nodal { values, .. } => nodal(all.grid, values, 0, t),
+        TimeHistory::Constant(value) => *value,
+        TimeHistory::Nodal { values, .. } => nodal(all.grid, values, 0, t),
     }
 }

@@ -27,43 +27,45 @@ use crate::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use crate::system::Grid;
 use std::fmt;
 
-/// A limit of a function, in its unit.
+/// Values of a coefficient function, in its unit: a known function, a bound or a reference.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Limit {
+pub enum TimeHistory {
     /// The same at all times.
-    Number(f64),
+    Constant(f64),
     /// Values at the nodes, linear in between.
     Nodal {
-        /// What names of rows call it.
+        /// Name for rows and messages.
         name: String,
         /// One value per node.
         values: Vec<f64>,
     },
 }
 
-impl Limit {
+impl TimeHistory {
     /// Its value at node `i`.
     pub fn at(&self, i: usize) -> f64 {
         match self {
-            Limit::Number(value) => *value,
-            Limit::Nodal { values, .. } => values[i],
+            TimeHistory::Constant(value) => *value,
+            TimeHistory::Nodal { values, .. } => values[i],
         }
     }
 
     /// Its smallest value.
     pub fn least(&self) -> f64 {
         match self {
-            Limit::Number(value) => *value,
-            Limit::Nodal { values, .. } => values.iter().copied().fold(f64::INFINITY, f64::min),
+            TimeHistory::Constant(value) => *value,
+            TimeHistory::Nodal { values, .. } => {
+                values.iter().copied().fold(f64::INFINITY, f64::min)
+            }
         }
     }
 }
 
-impl fmt::Display for Limit {
+impl fmt::Display for TimeHistory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Limit::Number(value) => write!(f, "{value}"),
-            Limit::Nodal { name, .. } => f.write_str(name),
+            TimeHistory::Constant(value) => write!(f, "{value}"),
+            TimeHistory::Nodal { name, .. } => f.write_str(name),
         }
     }
 }
@@ -76,9 +78,9 @@ pub enum Statement {
         /// The function `p`.
         of: CoefficientKind,
         /// Smallest value.
-        min: Option<Limit>,
+        min: Option<TimeHistory>,
         /// Largest value.
-        max: Option<Limit>,
+        max: Option<TimeHistory>,
     },
     /// `min <= p'(t) <= max`, in (unit of p)/s; for `piecewise-constant` functions of the divided
     /// differences between the centres of neighbouring cells.
