@@ -6,7 +6,7 @@
 
 use super::history::number_or_nan;
 use super::iterate::Iterate;
-use super::linearization::linearise;
+use super::linearization::{Linearization, linearise};
 use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
@@ -95,8 +95,7 @@ impl Optimality {
         cost <= NEGLIGIBLE * problem.zero_response_misfit()
     }
 
-    /// At `point`, with its gradient and the Jacobian that its linearisation has, which may be that of a point nearby: it sets the
-    /// metric in which the gradient is measured, and the gradient vanishes in any. `None` if the linearised problem could not be solved, or does not fit into memory.
+    /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
     pub fn at(problem: &Problem, point: &Iterate, tolerance: f64) -> Option<Self> {
         let cost = point.evaluation.cost;
         let worst = problem.constraints.largest_violation(&point.parameters);
@@ -119,7 +118,7 @@ impl Optimality {
             problem,
             &point.parameters,
             &point.evaluation,
-            point.linearization(),
+            &Linearization::Fresh,
             &mut Timings::default(),
         );
         let scales = point.relative_metric(problem);
