@@ -145,15 +145,15 @@ impl Subproblem {
             && self.is_finite()
             && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
         {
-            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-            let excess = match kkt.is_solution() {
-                true => 0.0,
-                false => 2.0 * (found.gap + found.decrease),
-            };
             let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+            let excess = 2.0 * (found.gap + found.decrease);
             if excess <= 2.0 * Self::STEP_GAP * decrease {
+                return (self.unjudged(found.point), excess);
+            }
+            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+            if kkt.is_solution() {
                 let found = Some((found.point, kkt));
-                return (self.solution(ConicStatus::Solved, found, 1), excess);
+                return (self.solution(ConicStatus::Solved, found, 1), 0.0);
             }
         }
         (self.solve_within(iterations), 0.0)
@@ -268,6 +268,19 @@ impl Subproblem {
             z: candidate.z,
             kkt,
             attempts,
+        }
+    }
+
+    /// A point whose cost is known to be near enough to the minimum.
+    fn unjudged(&self, point: PrimalDual) -> Solution {
+        Solution {
+            status: ConicStatus::Solved,
+            multipliers: point.inequalities,
+            equality_multipliers: point.equalities,
+            cone_multipliers: Vec::new(),
+            z: point.z,
+            kkt: None,
+            attempts: 1,
         }
     }
 

@@ -14,6 +14,8 @@ use crate::solvers::timings::timed;
 
 /// A clipped step is used if it keeps this share of the plain step's predicted decrease.
 const CLIPPED: f64 = 0.9;
+/// Distance of an active bound, relative to the largest distance of a bound.
+const ACTIVE: f64 = 1e-4;
 /// A predicted decrease below this share of J that does not come true is within the accuracy to
 /// which a quadratic program is solved.
 const PROGRAM_ACCURACY: f64 = 1e-9;
@@ -89,7 +91,7 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
         })
     };
     // Where bounds are active they mostly stay so, and the stages take no longer than one plain step.
-    let is_plain_likely = sub.layout.is_none() || !sub.is_active_at_zero(constraints::TOLERANCE);
+    let is_plain_likely = sub.layout.is_none() || !sub.is_active_at_zero(ACTIVE);
     let plain = is_plain_likely.then(|| work.algebra(|| sub.solve_plain()));
     let plain = plain.flatten().map(|z| (cost - sub.value(&z), z));
     if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
