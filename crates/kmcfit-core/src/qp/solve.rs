@@ -138,25 +138,21 @@ impl Subproblem {
         self.solve_until(iterations, Kkt::is_solution)
     }
 
-    /// A step of a fit: a point that satisfies the constraints and brings the cost down to the minimum but for
-    /// [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed the minimum.
-    pub fn solve_step(&self, iterations: u32) -> (Solution, f64) {
-        if iterations > 0
-            && self.is_finite()
-            && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
-        {
-            let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
-            let excess = 2.0 * (found.gap + found.decrease);
-            if excess <= 2.0 * Self::STEP_GAP * decrease {
-                return (self.unjudged(found.point), excess);
-            }
-            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-            if kkt.is_solution() {
-                let found = Some((found.point, kkt));
-                return (self.solution(ConicStatus::Solved, found, 1), 0.0);
-            }
+    /// A step of a fit on the stages of [`Subproblem::layout`]: a point that satisfies the constraints and brings the cost down
+    /// to the minimum but for [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed
+    /// the minimum, zero for the minimum itself. `None` where there is none.
+    pub fn step_on_stages(&self, iterations: u32) -> Option<(Solution, f64)> {
+        let is_usable = iterations > 0 && self.layout.is_some() && self.is_finite();
+        is_usable.then_some(())?;
+        let found = self.minimise_on_stages(iterations, Self::STEP_GAP)?;
+        let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+        let excess = 2.0 * (found.gap + found.decrease);
+        if excess <= 2.0 * Self::STEP_GAP * decrease {
+            return Some((self.unjudged(found.point), excess));
         }
-        (self.solve_within(iterations), 0.0)
+        let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+        let found = kkt.is_solution().then_some(Some((found.point, kkt)))?;
+        Some((self.solution(ConicStatus::Solved, found, 1), 0.0))
     }
 
     /// Share of the decrease of the cost that a step may fall short by: the next linearisation brings it, like the error of
