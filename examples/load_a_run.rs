@@ -12,8 +12,8 @@ pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = run.system.forward(&run.device, let_go, None)?;
-    let most = motion
+    let response = run.system.forward(&run.device, let_go, None)?;
+    let most = response
         .displacement
         .iter()
         .fold(0.0, |most: f64, y| most.max(y.abs()));

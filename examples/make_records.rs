@@ -43,11 +43,11 @@ impl Run<'_> {
     }
 
     /// Displacement and acceleration at the times of the readings.
-    fn motion(&self) -> (Vec<f64>, Vec<f64>) {
+    fn response(&self) -> (Vec<f64>, Vec<f64>) {
         let nodes = FINE * (self.count - 1) + 1;
         let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
         let at_nodes = |f: Function| grid.times().iter().map(|t| f(*t)).collect();
-        let device = NodalCoefficients {
+        let nodal = NodalCoefficients {
             mass: vec![self.mass; nodes],
             coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
         };
@@ -67,11 +67,11 @@ impl Run<'_> {
             force: self.force.map(steps),
             base: self.base.map(steps),
         };
-        let motion: Trajectory = system
-            .forward(&device, self.initial, Some(&excitation))
+        let response: Trajectory = system
+            .forward(&nodal, self.initial, Some(&excitation))
             .expect("a motion");
-        let readings = 0..self.count;
-        let acceleration = readings.clone().map(|i| {
+        let samples = 0..self.count;
+        let acceleration = samples.clone().map(|i| {
             let around = InputSample {
                 force: self.force.map_or(0.0, |f| f(self.time(i))),
                 base: self.base.map_or(0.0, |b| b(self.time(i))),
@@ -79,11 +79,11 @@ impl Run<'_> {
             let place = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
-            reference::observe(&system, kind, &device, excitation, &motion, place, around).value
+            reference::observe(&system, kind, &nodal, excitation, &response, place, around).value
         });
         let acceleration = acceleration.collect();
         (
-            readings.map(|i| motion.displacement[FINE * i]).collect(),
+            samples.map(|i| response.displacement[FINE * i]).collect(),
             acceleration,
         )
     }
@@ -127,18 +127,18 @@ pub fn accelerometer() -> String {
         rate: 400.0,
         count: 1201,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(11);
     let mut text = String::from(
         "Data logger DL-4\r\nChannel 1: accelerometer\r\nSample rate: 400 Hz\r\n\r\nTime;Acc 1\r\ns;g\r\n",
     );
     for (i, a) in acceleration.iter().enumerate() {
-        let reading = a / GRAVITY + 0.05 + noise.next(0.01);
+        let sample = a / GRAVITY + 0.05 + noise.next(0.01);
         let lost = i % 397 == 300;
         let field = if lost {
             String::new()
         } else {
-            format!("{reading:.4}")
+            format!("{sample:.4}")
         };
         let line = format!("{:.4};{field}\r\n", run.time(i));
         text += &line.replace('.', ",");
@@ -161,12 +161,12 @@ pub fn hammer(number: u64) -> String {
         rate: 100.0,
         count: 301,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(20 + number);
     let mut text = String::from("t_s,y [mm]\n");
     for (i, y) in y.iter().enumerate() {
-        let reading = 1e3 * y + noise.next(0.02);
-        let _ = writeln!(text, "{:.2},{reading:.4}", run.time(i));
+        let sample = 1e3 * y + noise.next(0.02);
+        let _ = writeln!(text, "{:.2},{sample:.4}", run.time(i));
     }
     text
 }
@@ -184,13 +184,13 @@ pub fn shaker() -> String {
         rate: 200.0,
         count: 1601,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(30);
     let mut text = String::from("t_s,f_N,a_m_per_s2\n");
     for (i, a) in acceleration.iter().enumerate() {
         let t = run.time(i);
-        let reading = a + noise.next(0.02);
-        let _ = writeln!(text, "{t:.3},{:.6},{reading:.5}", sweep(t));
+        let sample = a + noise.next(0.02);
+        let _ = writeln!(text, "{t:.3},{:.6},{sample:.5}", sweep(t));
     }
     text
 }
@@ -236,13 +236,13 @@ pub fn friction() -> String {
 }
 
 fn with_force(run: &Run, force: Function, sigma: f64, seed: u64) -> String {
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(seed);
     let mut text = String::from("t_s,f_N,y_m\n");
     for (i, y) in y.iter().enumerate() {
         let t = run.time(i);
-        let reading = y + noise.next(sigma);
-        let _ = writeln!(text, "{t:.3},{:.6},{reading:.6}", force(t));
+        let sample = y + noise.next(sigma);
+        let _ = writeln!(text, "{t:.3},{:.6},{sample:.6}", force(t));
     }
     text
 }
@@ -262,12 +262,12 @@ pub fn roll() -> String {
         rate: 20.0,
         count: 1001,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(60);
     let mut text = String::from("t_s\troll [deg]\n");
     for (i, y) in y.iter().enumerate() {
-        let reading = y.to_degrees() + noise.next(0.02);
-        let _ = writeln!(text, "{:.2}\t{reading:.3}", run.time(i));
+        let sample = y.to_degrees() + noise.next(0.02);
+        let _ = writeln!(text, "{:.2}\t{sample:.3}", run.time(i));
     }
     text
 }
@@ -302,13 +302,13 @@ pub fn moving_support() -> String {
         rate: 400.0,
         count: 2401,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut text = String::from("t_s,a_m_per_s2,true_f_Hz\n");
     for (i, a) in acceleration.iter().enumerate() {
         let t = run.time(i);
         let frequency = stiffness(t).sqrt() / TAU;
-        let reading = a + random.next(0.2);
-        let _ = writeln!(text, "{t:.4},{reading:.4},{frequency:.5}");
+        let sample = a + random.next(0.2);
+        let _ = writeln!(text, "{t:.4},{sample:.4},{frequency:.5}");
     }
     text
 }
@@ -330,7 +330,7 @@ pub fn table() -> String {
         rate: 200.0,
         count: 1001,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(80);
     let mut text = String::from("t_s,table (g),mass (g)\n");
     for (i, a) in acceleration.iter().enumerate() {
@@ -353,7 +353,7 @@ pub fn camera() -> String {
         rate: 1000.0,
         count: 15001,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut random = Noise::new(90);
     let mut text = String::from("t_s,y_m\n");
     let mut i = 0usize;
@@ -362,7 +362,7 @@ pub fn camera() -> String {
         let good = y[i] + 0.002 * t + random.next(0.002);
         let far = random.next(1.0);
         let blind = random.next(1.0);
-        let reading = if far.abs() > 1.96 {
+        let sample = if far.abs() > 1.96 {
             good + 0.1 * far
         } else {
             good
@@ -370,7 +370,7 @@ pub fn camera() -> String {
         if !(6.0..7.5).contains(&t) {
             match blind.abs() > 2.0 {
                 true => _ = writeln!(text, "{t:.3},"),
-                false => _ = writeln!(text, "{t:.3},{reading:.5}"),
+                false => _ = writeln!(text, "{t:.3},{sample:.5}"),
             }
         }
         // From 15 to some 50 ms to the next picture.

@@ -13,14 +13,14 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(table.column("t_s")?, table.column("y_m")?);
-    let device = [
+    let nodal = [
         // Positive, and bent as little as the record lets it be.
         CoefficientSpec::nodal(2.0).min(0.05).tikhonov(2, 1e-3),
         CoefficientSpec::nodal(1.0).min(0.0).tikhonov(2, 1e-3),
         // Free motion shows ratios alone: one function must be known.
         CoefficientSpec::fixed(1.0),
     ];
-    let problem = Builder::new(device)
+    let problem = Builder::new(nodal)
         .record(record)
         .method(Method::Midpoint)
         .constrain(Statement::Shape {
@@ -31,7 +31,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let fit = problem.fit()?;
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
 
-    let mass = &fit.best.evaluation.device.mass;
+    let mass = &fit.best.evaluation.nodal.mass;
     let count = mass.len() as f64;
     let truth = (1..=mass.len()).map(|i| 1.0 - 0.5 * i as f64 / count);
     let errors = mass.iter().zip(truth).map(|(m, truth)| (m - truth).abs());

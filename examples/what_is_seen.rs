@@ -16,7 +16,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let nodes = grid.nodes();
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.1; nodes], vec![4.0; nodes]],
     };
@@ -27,8 +27,8 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let decay = system.forward(&device, plucked, None)?;
-    let shaken = system.forward(&device, State::default(), Some(&excitation))?;
+    let decay = system.forward(&nodal, plucked, None)?;
+    let shaken = system.forward(&nodal, State::default(), Some(&excitation))?;
 
     let free = Record::new("free decay")
         .from_state(1.0, 0.0)

@@ -195,7 +195,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         write!(
             text,
             "chi-square per degree of freedom {reduced:.4} ({} readings, {} parameters)",
-            statistics.readings, statistics.parameters
+            statistics.samples, statistics.parameters
         )?;
         match (statistics.aic, statistics.bic) {
             (Some(aic), Some(bic)) => writeln!(text, ", AIC {aic:.2}, BIC {bic:.2}")?,
@@ -206,7 +206,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         Some(half) => writeln!(
             text,
             "on half the step the model's readings change by at most {:.1e} of the largest one",
-            half.change_per_reading
+            half.change_per_sample
         ),
         None if !document.is_simulated() => Ok(()),
         None => writeln!(text, "on half the step there is no motion"),

@@ -82,14 +82,14 @@ pub mod solvers {
         ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, Fit, FitSettings,
         Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
         Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
-        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error, fit,
-        fit_from, fit_with_noise, fit_with_noise_watched, number_or_nan, predict_held_out,
-        states_from_readings, timed, without_motion,
+        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error,
+        estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response,
+        number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, Linear, PredictedMotion, Prediction, Profile, ProfileSettings,
+        Choice, EquivalentSystem, Linear, PredictedResponse, Prediction, Profile, ProfileSettings,
         Target, bootstrap, equivalent, equivalent_systems, multistart, predict, prediction,
         profile, profiles, pull_apart, variation,
     };

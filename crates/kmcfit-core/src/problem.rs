@@ -91,7 +91,7 @@ impl ProblemParts {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let terms = self.system.terms.len();
-        for found in self.functions.assemblies().iter().map(Vec::len) {
+        for found in self.functions.coefficient_sets().iter().map(Vec::len) {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
             }
@@ -137,14 +137,14 @@ impl ProblemParts {
     fn mismatch(&self, record: &Experiment) -> Option<&'static str> {
         let scalars = self.functions.scalars().len();
         let sensors = record.channels.iter().flat_map(|c| c.sensor().indices());
-        let mut indices = sensors.chain(record.sought).flatten();
+        let mut indices = sensors.chain(record.initial_parameters).flatten();
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         match () {
             () if !(2..=self.system.grid.nodes()).contains(&record.nodes) => {
                 Some("fewer than two nodes, or more than the grid has")
             }
-            () if record.device >= self.functions.assemblies().len() => {
+            () if record.coefficient_set >= self.functions.coefficient_sets().len() => {
                 Some("a set of functions that is not there")
             }
             () if indices.any(|i| i >= scalars) => Some("a nuisance parameter that is not there"),
@@ -238,7 +238,7 @@ impl Problem {
     /// If `theta` has another number of parameters.
     pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
         let functions = &self.functions;
-        let mut shared = functions.assembly(0).iter();
+        let mut shared = functions.coefficient_set(0).iter();
         let index = *shared.find(|&&f| functions.get(f).quantity == kind)?;
         let mut values = vec![0.0; functions.nodes()];
         let range = functions.ranges()[index].clone();
@@ -270,7 +270,7 @@ impl Problem {
     }
 
     /// Number of readings of all experiments.
-    pub fn reading_count(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.channels().map(Channel::len).sum()
     }
 

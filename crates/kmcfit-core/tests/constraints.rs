@@ -347,9 +347,9 @@ fn equal_functions() {
 }
 
 /// The rows hold where functions known at the nodes satisfy them.
-fn holds(constraints: &Constraints, device: [&dyn Fn(f64) -> f64; 3]) -> bool {
+fn holds(constraints: &Constraints, nodal: [&dyn Fn(f64) -> f64; 3]) -> bool {
     let values = |f: &dyn Fn(f64) -> f64| grid().times().into_iter().map(f).collect::<Vec<_>>();
-    let theta = device.map(values).concat();
+    let theta = nodal.map(values).concat();
     constraints.hold(&theta, 1e-9)
 }
 

@@ -23,7 +23,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let damping = match damping {
         Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
         None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
@@ -33,7 +33,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
         damping,
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let mut problem = common::problem_of(system, list, motion.displacement, None);
+    let mut problem = common::problem_of(system, list, response.displacement, None);
     if silent_force {
         problem = problem
             .with(|parts| {
@@ -125,12 +125,12 @@ fn a_spring_alone_has_an_equation_too() {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![1.5; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let problem = common::problem_of(system, list, motion.displacement, None);
+    let problem = common::problem_of(system, list, response.displacement, None);
     let found = equation_error(&problem, &problem.functions.start()).unwrap();
     close(found[0], 1.5);
 }
@@ -149,7 +149,7 @@ fn irregular_velocities_are_integrated() {
     };
     let maker = Truth {
         system: &problem.system,
-        device: &truth,
+        nodal: &truth,
         excitation: None,
         initial: common::INITIAL,
     };

@@ -38,22 +38,22 @@ const PLAIN: Units = Units {
 /// both. The noise is as large, so that a step leaves half of the cost.
 fn problem(units: Units) -> Problem {
     let system = common::system(NODES, Method::Rk4);
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.1; NODES], vec![1.0; NODES]],
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let times = system.grid.times();
-    let drifted = motion.displacement.iter().zip(&times);
+    let drifted = response.displacement.iter().zip(&times);
     let drifted: Vec<f64> = drifted.map(|(y, t)| y + 1.0 + 0.05 * t).collect();
     let observed = with_noise(&drifted, 1.0, 7)
         .iter()
         .map(|y| units.length * y)
         .collect();
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
-        CoefficientFunction::fixed(CoefficientKind::Damping, device.coefficients[0].clone()),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, device.coefficients[1].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Damping, nodal.coefficients[0].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, nodal.coefficients[1].clone()),
     ];
     let sigma = units.length * units.sigma;
     let mut problem = common::problem_of(system, list, observed, Some(sigma));

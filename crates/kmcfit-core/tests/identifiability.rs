@@ -53,7 +53,7 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
 fn with_records(
     system: &System,
     list: Vec<CoefficientFunction>,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     records: &[Record],
 ) -> Problem {
     let grid = system.grid;
@@ -61,11 +61,11 @@ fn with_records(
     let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let records = records.iter().map(|(initial, force)| {
         let excitation = force.as_ref().map(|f| Excitation::force_at_nodes(f));
-        let motion = system
-            .forward(device, *initial, excitation.as_ref())
+        let response = system
+            .forward(nodal, *initial, excitation.as_ref())
             .unwrap();
         let weighting = Weighting::Sigma(1e-3);
-        let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
+        let channel = Channel::displacement_at_nodes(response.displacement, 1, weighting, &grid);
         let mut record = Experiment::free("record", *initial, nodes).with_channel(channel);
         record.excitation = excitation;
         record
@@ -74,10 +74,10 @@ fn with_records(
 }
 
 /// One value per node for each function, starting at the device itself.
-fn nodal(system: &System, device: &NodalCoefficients, records: &[Record]) -> Problem {
-    let list = QUANTITIES.into_iter().zip(device.functions());
+fn nodal_problem(system: &System, nodal: &NodalCoefficients, records: &[Record]) -> Problem {
+    let list = QUANTITIES.into_iter().zip(nodal.functions());
     let list = list.map(|(q, p)| CoefficientFunction::nodal(q, p.to_vec()));
-    with_records(system, list.collect(), device, records)
+    with_records(system, list.collect(), nodal, records)
 }
 
 fn spectrum(problem: &Problem) -> Spectrum {
@@ -91,7 +91,7 @@ fn linear_mass(system: &System, record: Record) -> Problem {
     let nodes = grid.nodes();
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let degree_1 = Basis::Polynomial { degree: 1 };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
         mass: mass.clone(),
     };
@@ -101,14 +101,14 @@ fn linear_mass(system: &System, record: Record) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    with_records(system, list, &device, &[record])
+    with_records(system, list, &nodal, &[record])
 }
 
 #[test]
 fn the_count_and_the_rank_are_those_of_the_table() {
     let nodes = 200;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let grid = system.grid;
     let drive = |i, silent| forced(i, &grid, silent);
     let table: [(&str, Vec<Record>, usize, Symmetry); 8] = [
@@ -147,7 +147,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         ),
     ];
     for (words, records, expected, symmetry) in table {
-        let problem = nodal(&system, &device, &records);
+        let problem = nodal_problem(&system, &nodal, &records);
         let counted = count(&problem);
         let seen = spectrum(&problem);
         println!(
@@ -170,11 +170,11 @@ fn the_count_and_the_rank_are_those_of_the_table() {
 fn a_force_that_pauses_sees_less_while_it_does() {
     let nodes = 80;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let (state, force) = forced(2, &system.grid, 0);
     let mut force = force.unwrap();
     force[30..50].fill(0.0);
-    let problem = nodal(&system, &device, &[free(0), free(1), (state, Some(force))]);
+    let problem = nodal_problem(&system, &nodal, &[free(0), free(1), (state, Some(force))]);
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
     assert_eq!(count(&problem).seen_at_most, 3 * 79 - 19);
     assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
@@ -220,13 +220,13 @@ proptest! {
             grid.times().iter().map(|t| base + swing * (pace * t).sin()).collect()
         };
         let [mass, damping, stiffness] = shape.map(function);
-        let device = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
+        let nodal = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
         let records: Vec<Record> = states.iter().map(|&(y, v, drive)| {
             let mut force = forced(0, &grid, 0).1.unwrap();
             force[from..from + pause].fill(0.0);
             (state(y, v), drive.then_some(force))
         }).collect();
-        let problem = nodal(&system, &device, &records);
+        let problem = nodal_problem(&system, &nodal, &records);
         let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
@@ -279,14 +279,17 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
         let off = |nodes: usize| {
             let system = common::system(nodes, method);
             let times = system.grid.times();
-            let device = common::paper_device(nodes);
-            let mut scaled = device.clone();
+            let nodal = common::paper_system(nodes);
+            let mut scaled = nodal.clone();
             for values in scaled.functions_mut() {
                 let factors = times.iter().map(|t| 1.0 + 0.4 * (0.5 * t).sin());
                 values.iter_mut().zip(factors).for_each(|(p, s)| *p *= s);
             }
-            let motion = |d: &NodalCoefficients| system.forward(d, STATES[0], None).unwrap();
-            largest(&motion(&device).displacement, &motion(&scaled).displacement)
+            let response = |d: &NodalCoefficients| system.forward(d, STATES[0], None).unwrap();
+            largest(
+                &response(&nodal).displacement,
+                &response(&scaled).displacement,
+            )
         };
         let rate = (off(401) / off(801)).log2();
         println!(
@@ -303,9 +306,9 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
 fn what_holds_the_scale_and_what_only_its_constant_factor() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let both = [free(0), free(1)];
-    let open = nodal(&system, &device, &both);
+    let open = nodal_problem(&system, &nodal, &both);
     let gauge = |problem: &Problem| Gauge::at(problem, &problem.start());
     let found = gauge(&open);
     assert_eq!(found.constant().count(), 1);
@@ -322,12 +325,12 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
     assert_eq!(named[1].name, "scale over time s(t) of (m, c, k)");
 
     let drive = forced(2, &system.grid, 0);
-    let with_force = nodal(&system, &device, &[free(0), free(1), drive]);
+    let with_force = nodal_problem(&system, &nodal, &[free(0), free(1), drive]);
     assert!(gauge(&with_force).is_empty());
 
     let mut fixed = open.clone();
     let list = vec![
-        CoefficientFunction::nodal(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::nodal(CoefficientKind::Mass, nodal.mass.clone()),
         CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
@@ -603,13 +606,13 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
 fn a_bound_that_is_active_makes_the_band_one_sided() {
     let nodes = 200;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    let mut problem = with_records(&system, list, &device, &[free(0)]);
+    let mut problem = with_records(&system, list, &nodal, &[free(0)]);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let open = Bands::at(&problem, &theta, &here, &BandSettings::default());
@@ -633,7 +636,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     // With the damping held the stiffness is known better, and never worse.
     let (held, free) = (&bands.functions[2], &open.functions[2]);
     assert!(held.standard_error[5] <= free.standard_error[5] * (1.0 + 1e-9));
-    assert_eq!(bands.functions[0].pointwise(0), [device.mass[0]; 2]);
+    assert_eq!(bands.functions[0].pointwise(0), [nodal.mass[0]; 2]);
     assert_eq!(verdicts(&problem, &here, &bands)[0].verdict, Verdict::Fixed);
 }
 
@@ -697,10 +700,10 @@ fn candidate(name: &str, (initial, force): Record) -> Candidate {
 fn the_next_experiment_is_the_one_that_sees_something_new() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let drive = forced(2, &system.grid, 0);
     let ranked = |records: &[Record], candidates: &[Candidate]| {
-        let problem = nodal(&system, &device, records);
+        let problem = nodal_problem(&system, &nodal, records);
         let theta = problem.start();
         let here = problem.evaluate(&theta).unwrap();
         let found = rank_experiments(&problem, &theta, &here, candidates, false);
@@ -766,11 +769,11 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
 fn tangents_and_adjoints_give_the_same_jacobian() {
     let nodes = 40;
     let system = common::system(nodes, Method::Rk4);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let drive = forced(1, &system.grid, 0);
     // 40 readings of 120 parameters: adjoints. Four times as many: tangents.
-    let one = nodal(&system, &device, std::slice::from_ref(&drive));
-    let four = nodal(&system, &device, &vec![drive; 4]);
+    let one = nodal_problem(&system, &nodal, std::slice::from_ref(&drive));
+    let four = nodal_problem(&system, &nodal, &vec![drive; 4]);
     let jacobian = |p: &Problem| {
         let here = p.evaluate(&p.start()).unwrap();
         Sensitivity::of(p, &here).jacobian
@@ -789,7 +792,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
@@ -798,7 +801,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let problem = with_records(&system, list, &device, &[free(0)]);
+    let problem = with_records(&system, list, &nodal, &[free(0)]);
     let part = problem.experiments[0].channels[0].first(half);
     let (times, values) = (part.times().to_vec(), part.observed().to_vec());
     let weighting = part.weighting().clone();
@@ -838,7 +841,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 9),
     };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
@@ -847,7 +850,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
         CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let bare = with_records(&system, list, &device, &[free(0)]);
+    let bare = with_records(&system, list, &nodal, &[free(0)]);
     let mut problem = bare.clone();
     let rows = basis.roughness(&grid, 2);
     problem.penalize(Penalty::new(0, 2, 3e4, rows)).unwrap();
@@ -877,7 +880,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let mut squares = vec![0.0; nodes];
     for seed in 0..seeds {
         let fit = run(&record(&problem, with_noise(&clean, sigma, 1000 + seed)));
-        let mass = &fit.best.evaluation.device.mass;
+        let mass = &fit.best.evaluation.nodal.mass;
         squares
             .iter_mut()
             .zip(mass)
@@ -903,17 +906,17 @@ fn the_scale_by_bases_and_drives() {
     let nodes = 61;
     let system = common::system(nodes, Method::Rk4);
     let grid = system.grid;
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: grid.times().iter().map(|t| 1.0 - 0.02 * t).collect(),
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
     let with = |bases: [Basis; 3], records: &[Record]| {
-        let parts = QUANTITIES.into_iter().zip(bases).zip(device.functions());
+        let parts = QUANTITIES.into_iter().zip(bases).zip(nodal.functions());
         let list = parts.map(|((quantity, basis), values)| {
             let start = basis.project(&grid, values).unwrap();
             CoefficientFunction::free(quantity, basis, &grid, start)
         });
-        with_records(&system, list.collect(), &device, records)
+        with_records(&system, list.collect(), &nodal, records)
     };
     let all = |basis: Basis| [basis.clone(), basis.clone(), basis];
     let knots = |count| uniform_knots(&grid, count);
@@ -970,7 +973,7 @@ fn the_scale_by_bases_and_drives() {
     }
 
     // A base that moves pushes with m b'': that scales too.
-    let mut problem = nodal(&system, &device, &[free(0)]);
+    let mut problem = nodal_problem(&system, &nodal, &[free(0)]);
     problem = problem
         .with(|parts| {
             parts.experiments[0].excitation = Some(Excitation {
@@ -989,7 +992,7 @@ fn the_scale_by_bases_and_drives() {
     let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];
-    let linear = count(&nodal(&system, &device, &records)).equations;
-    let bent = count(&nodal(&cubic, &device, &records)).equations;
+    let linear = count(&nodal_problem(&system, &nodal, &records)).equations;
+    let bent = count(&nodal_problem(&cubic, &nodal, &records)).equations;
     assert_eq!((linear, bent), (2 * (nodes - 1), 3 * (nodes - 1)));
 }

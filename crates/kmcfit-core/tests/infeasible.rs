@@ -25,14 +25,14 @@ fn problem(basis: &Basis) -> Problem {
         mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
         CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    common::problem_of(system, list, motion.displacement, None)
+    common::problem_of(system, list, response.displacement, None)
 }
 
 fn knots() -> Basis {
@@ -217,7 +217,7 @@ fn a_start_is_moved_to_where_there_is_a_mass() {
         .unwrap();
     let start = problem.functions.start();
     let least = |theta: &[f64]| {
-        let mass = problem.functions.device(theta).mass;
+        let mass = problem.functions.nodal(theta).mass;
         mass.into_iter().fold(f64::INFINITY, f64::min)
     };
     let metric = problem.functions.gram_diagonal();

@@ -32,8 +32,8 @@ fn problem() -> Problem {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
-    let observed: Vec<f64> = motion.displacement.into_iter().step_by(STRIDE).collect();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let observed: Vec<f64> = response.displacement.into_iter().step_by(STRIDE).collect();
     let step = system.grid.step();
     // Known to be free of noise: so few readings look like noise to a rule that does not know.
     let weighting = Weighting::Sigma(1e-8);
@@ -118,7 +118,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![truth[0]; nodes],
         coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
     };
@@ -134,8 +134,8 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         displacement: 0.0,
         velocity: 0.0,
     };
-    let motion = system.forward(&device, rest, Some(&excitation)).unwrap();
-    let observed = motion.displacement.into_iter().step_by(4).collect();
+    let response = system.forward(&nodal, rest, Some(&excitation)).unwrap();
+    let observed = response.displacement.into_iter().step_by(4).collect();
     let weighting = Weighting::Sigma(1e-4);
     let channel = Channel::displacement_at_nodes(observed, 4, weighting, &system.grid);
     let experiment = Experiment::free("two sines", rest, nodes)

@@ -19,12 +19,12 @@ const DECREASE: f64 = 1e-4;
 fn problem(sigma: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: values[0].clone(),
         coefficients: values[1..].to_vec(),
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
-    let observed = with_noise(&motion.displacement, 1.0, 7);
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let observed = with_noise(&response.displacement, 1.0, 7);
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,

@@ -86,8 +86,10 @@ impl Setup {
 
     /// The true parameters, in the order of the problem's.
     fn theta(&self) -> Vec<f64> {
-        let sought = self.truth.iter().zip(&self.start);
-        let mut theta: Vec<f64> = sought.filter_map(|(p, start)| start.map(|_| *p)).collect();
+        let estimated = self.truth.iter().zip(&self.start);
+        let mut theta: Vec<f64> = estimated
+            .filter_map(|(p, start)| start.map(|_| *p))
+            .collect();
         if self.state {
             theta.extend([INITIAL.displacement, INITIAL.velocity]);
         }
@@ -98,13 +100,13 @@ impl Setup {
     fn clean(&self) -> Vec<f64> {
         let system = self.system();
         let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
-        let device = NodalCoefficients {
+        let nodal = NodalCoefficients {
             mass: each[0].clone(),
             coefficients: each[1..].to_vec(),
         };
         let truth = Truth {
             system: &system,
-            device: &device,
+            nodal: &nodal,
             excitation: self.excitation.as_ref(),
             initial: INITIAL,
         };
@@ -139,7 +141,7 @@ impl Setup {
         let mut experiment = Experiment::free("record", INITIAL, NODES);
         experiment.excitation = self.excitation.clone();
         if self.state {
-            experiment.sought = [Some(0), Some(1)];
+            experiment.initial_parameters = [Some(0), Some(1)];
             scalars.extend([scalar(1.3), scalar(-0.6)]);
         }
         if self.sensor.is_some() {
@@ -323,7 +325,7 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
 #[test]
 fn a_covariance_is_formed_of_up_to_64_parameters() {
     let setup = Setup::free(ChannelKind::Displacement);
-    let covariance = |knots: usize, readings: usize| {
+    let covariance = |knots: usize, samples: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
         let grid = problem.system.grid;
         let basis = Basis::PiecewiseLinear {
@@ -339,8 +341,8 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
                 parts.functions = Parameterization::new(list, NODES, grid.step()).unwrap();
             })
             .unwrap();
-        let times = grid.times()[..readings].to_vec();
-        let values = setup.clean()[..readings].to_vec();
+        let times = grid.times()[..samples].to_vec();
+        let values = setup.clean()[..samples].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
         problem = problem
@@ -362,11 +364,11 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
 #[test]
 fn what_the_readings_do_not_see_has_no_covariance() {
     let mut setup = Setup::free(ChannelKind::Displacement);
-    let covariance = |setup: &Setup, readings: usize| {
+    let covariance = |setup: &Setup, samples: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
         let grid = problem.system.grid;
-        let times = grid.times()[50..50 + readings].to_vec();
-        let values = setup.clean()[50..50 + readings].to_vec();
+        let times = grid.times()[50..50 + samples].to_vec();
+        let values = setup.clean()[50..50 + samples].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
         problem = problem
@@ -424,14 +426,14 @@ fn the_sigma_is_the_sample_standard_deviation() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let clean = setup.clean();
-    let readings: Vec<f64> = (with_noise(&clean, 0.05, 9).iter())
+    let samples: Vec<f64> = (with_noise(&clean, 0.05, 9).iter())
         .map(|x| x + 0.3)
         .collect();
-    let problem = with_an_offset(readings.clone(), &setup);
+    let problem = with_an_offset(samples.clone(), &setup);
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigma, fit) = found.unwrap();
     let n = NODES as f64;
-    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c);
+    let residuals = samples.iter().zip(&clean).map(|(r, c)| r - c);
     let mean = residuals.clone().sum::<f64>() / n;
     let squares: f64 = residuals.map(|r| (r - mean).powi(2)).sum();
     let expected = (squares / (n - 1.0)).sqrt();
@@ -465,8 +467,8 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     let (with_sigmas, fit) = found.unwrap();
 
     let n = NODES as f64;
-    let residuals = noisy.each_ref().map(|readings| -> Vec<f64> {
-        let pairs = readings.iter().zip(&clean);
+    let residuals = noisy.each_ref().map(|samples| -> Vec<f64> {
+        let pairs = samples.iter().zip(&clean);
         pairs.map(|(r, c)| r - c).collect()
     });
     let means = residuals.each_ref().map(|r| r.iter().sum::<f64>() / n);
@@ -501,12 +503,12 @@ fn a_robust_sigma_is_that_of_the_median() {
     setup.start = vec![None; 3];
     setup.loss = Loss::Huber { threshold: 1.345 };
     let clean = setup.clean();
-    let readings = with_outliers(&clean, 0.05, 3);
-    let problem = with_an_offset(readings.clone(), &setup);
+    let samples = with_outliers(&clean, 0.05, 3);
+    let problem = with_an_offset(samples.clone(), &setup);
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigma, fit) = found.unwrap();
     let offset = fit.best.parameters[0];
-    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c - offset);
+    let residuals = samples.iter().zip(&clean).map(|(r, c)| r - c - offset);
     let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
     sizes.sort_by(f64::total_cmp);
     let n = NODES as f64;

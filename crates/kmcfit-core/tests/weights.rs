@@ -47,15 +47,15 @@ fn settings() -> FitSettings {
 }
 
 fn relative_errors(problem: &Problem, theta: &[f64], truth: &NodalCoefficients) -> [f64; 2] {
-    let device = problem.functions.device(theta);
+    let nodal = problem.functions.nodal(theta);
     let relative = |a: &[f64], b: &[f64]| {
         a.iter()
             .zip(b)
             .fold(0.0f64, |most, (a, b)| most.max((a / b - 1.0).abs()))
     };
-    let (found, exact) = (Ratios::of(&device), Ratios::of(truth));
+    let (found, exact) = (Ratios::of(&nodal), Ratios::of(truth));
     [
-        relative(&device.mass, &truth.mass),
+        relative(&nodal.mass, &truth.mass),
         relative(&found.k_over_m, &exact.k_over_m),
     ]
 }
@@ -70,7 +70,7 @@ fn path(problem: &Problem, rule: WeightRule) -> (WeightPath, Vec<f64>) {
 /// Chi-square of the noise and the largest weight below it: a straight mass is what the penalty
 /// favours, so the smooth fit must find it well.
 fn the_paper_s_device_in_the_noise(nodes: usize, bounded: bool, seeds: RangeInclusive<u64>) {
-    let truth = common::paper_device(nodes);
+    let truth = common::paper_system(nodes);
     for seed in seeds {
         let problem = nodal_problem(&truth, nodes, bounded, seed);
         let (path, theta) = path(&problem, WeightRule::Discrepancy);
@@ -119,7 +119,7 @@ fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f6
             })
             .unwrap();
         let (path, _) = path(&problem, WeightRule::Gcv);
-        let error = |theta: &[f64]| common::errors(&problem.functions.device(theta), &truth)[0];
+        let error = |theta: &[f64]| common::errors(&problem.functions.nodal(theta), &truth)[0];
         let errors: Vec<f64> = path.points.iter().map(|p| error(&p.parameters)).collect();
         let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
         // The effective degrees of freedom grow as the weight falls.

@@ -163,8 +163,8 @@ fn about_steps(document: &ResultDocument) -> Option<Advice> {
         false => half.change_per_residual,
     };
     // A tenth of the residuals is hidden by them.
-    let times = (half.change_per_reading / COARSE).max(10.0 * beside_residuals);
-    if half.change_per_reading <= COARSE && beside_residuals <= 1.0 {
+    let times = (half.change_per_sample / COARSE).max(10.0 * beside_residuals);
+    if half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
     let stepper = match document.model.stepper == Method::Midpoint.name() {

@@ -145,7 +145,10 @@ fn write_pattern(
     pattern: &ResidualPattern,
 ) -> fmt::Result {
     match pattern {
-        ResidualPattern::Outliers { readings, first } => {
+        ResidualPattern::Outliers {
+            samples: readings,
+            first,
+        } => {
             match readings {
                 1 => write!(f, "one reading of the {kind} lies far off, at {first} s")?,
                 _ => write!(

@@ -217,7 +217,7 @@ pub struct EquivalentRecord {
     /// Stiffness, N/m.
     pub stiffness: Vec<f64>,
     /// Largest distance of its motion from the fit's, as a share of the largest displacement.
-    pub motion_error: f64,
+    pub response_error: f64,
 }
 
 /// Fits from many starts.

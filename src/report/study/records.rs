@@ -223,14 +223,14 @@ pub fn equivalents(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentRecord> {
     };
     let choices: Vec<Choice> = asked.iter().map(choice).collect();
     let record = |found: EquivalentSystem| {
-        let mut coefficients = found.device.coefficients.into_iter();
+        let mut coefficients = found.nodal.coefficients.into_iter();
         EquivalentRecord {
             name: found.name,
             times: at.problem.system.grid.times(),
-            mass: found.device.mass,
+            mass: found.nodal.mass,
             damping: coefficients.next().unwrap_or_default(),
             stiffness: coefficients.next().unwrap_or_default(),
-            motion_error: found.motion_error,
+            response_error: found.response_error,
         }
     };
     let found = equivalent_systems(at.problem, at.evaluation, &choices);
@@ -253,7 +253,7 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartPiece {
     let waterfall = multistart::multistart(problem, &how);
     let tolerance = multistart::Distance {
         ratios: plan.same,
-        motions: plan.same,
+        responses: plan.same,
     };
     let clusters = waterfall.clusters(problem, tolerance);
     let findings = waterfall.findings(problem, at.theta, &clusters);
@@ -391,7 +391,7 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
         Some(PredictionRecord {
             name: found.name,
             times: found.times,
-            displacement: found.motion.displacement,
+            displacement: found.response.displacement,
             band: found.band,
             worst: found.worst,
             furthest: found.furthest,

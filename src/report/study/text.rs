@@ -53,7 +53,7 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             lines(&study.equivalents, |e| {
                 format!(
                     "{}: moves like the fit to {:.1e} of the largest displacement",
-                    e.name, e.motion_error
+                    e.name, e.response_error
                 )
             }),
         ),

@@ -24,7 +24,7 @@ pub enum ResidualPattern {
     #[serde(rename = "far-off")]
     Outliers {
         /// Number of outliers.
-        readings: usize,
+        samples: usize,
         /// Time of the first, s.
         first: f64,
     },
@@ -55,7 +55,7 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     let far = far_off(&residuals);
     if let (Some(first), Loss::Squares) = (far.first(), channel.loss()) {
         return Some(ResidualPattern::Outliers {
-            readings: far.len(),
+            samples: far.len(),
             first: channel.times()[*first],
         });
     }
@@ -73,8 +73,8 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
 fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
     channel.weighting().sigma(0)?;
     let spacing = even_spacing(channel.times())?;
-    let [own, readings] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
-    let (own, beside) = (own?, readings?.dominant());
+    let [own, samples] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
+    let (own, beside) = (own?, samples?.dominant());
     let [low, high] = own.band(HALF);
     let frequency = own.dominant();
     let is_narrow = high - low <= NARROW * frequency.max(own.resolution());

@@ -45,7 +45,7 @@ impl FitAssessment {
         let step_check = step_check(problem, &best.evaluation);
         let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let tells_errors = few && problem.reading_count() > problem.parameters();
+        let tells_errors = few && problem.sample_count() > problem.parameters();
         let mut plausibility = Plausibility::of(
             problem,
             &best.evaluation,

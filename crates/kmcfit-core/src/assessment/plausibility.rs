@@ -166,7 +166,7 @@ fn meaningless(
 ) -> Option<Unidentified> {
     match step_check {
         Err(breakdown) => return Some(Unidentified::NoResponseOnHalfStep(*breakdown)),
-        Ok(Some(half)) if half.change_per_reading > STEPPER => {
+        Ok(Some(half)) if half.change_per_sample > STEPPER => {
             return Some(Unidentified::StepDependent);
         }
         Ok(_) => {}
@@ -183,7 +183,7 @@ fn meaningless(
 /// a constant for each channel; a search among many frequencies has as many chances. Outliers tell nothing of either.
 fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
     let predictions = evaluation.predictions.iter().flatten();
-    let (mut gain, mut readings) = (0.0, 0);
+    let (mut gain, mut samples) = (0.0, 0);
     for (channel, predicted) in problem.channels().zip(predictions) {
         let n = channel.len() as f64;
         let mean = channel.observed().iter().sum::<f64>() / n;
@@ -194,16 +194,16 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
             return false;
         }
         gain += n * (constant / left).ln();
-        readings += channel.len();
+        samples += channel.len();
     }
     // As many parameters as readings match anything: no ratio tells noise from a device then.
     let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
         return false;
     };
-    if problem.parameters() >= readings {
+    if problem.parameters() >= samples {
         return false;
     }
-    let frequencies = readings as f64 / 2.0;
+    let frequencies = samples as f64 / 2.0;
     gain.is_finite() && frequencies * law.sf(gain.max(0.0)) > CHANCE
 }
 
@@ -235,9 +235,9 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     ];
     let values = problem
         .functions
-        .assembly(0)
+        .coefficient_set(0)
         .iter()
-        .zip(evaluation.device.functions());
+        .zip(evaluation.nodal.functions());
     for (&f, values) in values {
         let function = problem.functions.get(f);
         let mut sorted = values.to_vec();
@@ -250,7 +250,7 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         }
     }
     let step = problem.system.grid.step();
-    for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
+    for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
         let force = experiment
             .excitation
             .as_ref()
@@ -258,8 +258,8 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let Some(force) = force.filter(|force| !force.is_zero()) else {
             continue;
         };
-        let mass = &evaluation.device_of(experiment.device).mass;
-        let inertia = motion.velocity.windows(2).zip(mass);
+        let mass = &evaluation.nodal_of(experiment.coefficient_set).mass;
+        let inertia = response.velocity.windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
             warnings.push(FitWarning::NegligibleForce {
@@ -295,8 +295,8 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
         return None;
     }
     let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
-    let device = &evaluation.device;
-    let pairs = device.mass.iter().zip(&device.coefficients[place]);
+    let nodal = &evaluation.nodal;
+    let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
     let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     squares.sort_by(f64::total_cmp);
     // That of most times: at the ends of a record k/m may be anything.

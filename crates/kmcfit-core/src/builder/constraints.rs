@@ -1,7 +1,7 @@
 //! Constraints of a builder: rows of its statements, and a start inside them.
 
-use super::assembly::Slot;
 use super::coefficient::uncrossed;
+use super::coefficient_sets::Slot;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
 use crate::constraints::{Constraints, Impossible, Shape, Statement, TOLERANCE, TimeHistory};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
@@ -17,7 +17,7 @@ pub(super) struct Constraint {
     /// Weight of its violation in J; it must hold without.
     pub soft: Option<f64>,
     /// Index of the set of coefficient functions that it is about.
-    pub assembly: usize,
+    pub coefficient_set: usize,
 }
 
 /// The name of a group of rows, and the key that states it.
@@ -28,14 +28,14 @@ pub(super) struct RowKey {
 }
 
 /// The constraints of the bounds of a function.
-pub(super) fn of_bounds(slot: &Slot, assembly: usize) -> Vec<Constraint> {
+pub(super) fn of_bounds(slot: &Slot, coefficient_set: usize) -> Vec<Constraint> {
     let (of, key) = (slot.kind, slot.key.as_str());
     let (min, max) = (slot.spec.min.clone(), slot.spec.max.clone());
     let constraint = |name: &str, min, max| Constraint {
         key: format!("{key}.{name}"),
         statement: Statement::Bounds { of, min, max },
         soft: None,
-        assembly,
+        coefficient_set,
     };
     match (min, max) {
         (None, None) => Vec::new(),
@@ -65,7 +65,7 @@ impl Builder {
             uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
         }
         let statement = &constraint.statement;
-        let rows = statement.build_for(&grid, &problem.functions, constraint.assembly);
+        let rows = statement.build_for(&grid, &problem.functions, constraint.coefficient_set);
         let mut rows = rows.map_err(|why| impossible(key, why))?;
         if rows.is_empty() {
             notices.push(BuildNotice::AlwaysHolds { key: key.clone() });
@@ -204,7 +204,7 @@ fn names(constraints: &Constraints) -> impl Iterator<Item = &String> {
 fn impossible(key: &str, why: Impossible) -> BuildError {
     match why {
         Impossible::Absent(kind) => {
-            BuildError::new(key, format!("the device has no {}", kind.name()))
+            BuildError::new(key, format!("the system has no {}", kind.name()))
         }
         Impossible::Fixed(list) => {
             let names = listed(list.iter().map(|kind| kind.name()));

@@ -29,9 +29,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod assembly;
 mod basis;
 mod coefficient;
+mod coefficient_sets;
 mod constraints;
 mod error;
 mod identifiable;
@@ -218,7 +218,7 @@ impl Builder {
             key,
             statement,
             soft,
-            assembly: 0,
+            coefficient_set: 0,
         });
         self
     }
@@ -241,7 +241,7 @@ impl Builder {
             }
             Some(i) => {
                 let key = format!("experiments[{i}]");
-                return Err(BuildError::new(key, "this experiment has no readings")
+                return Err(BuildError::new(key, "this experiment has no samples")
                     .found(format!("no channel of {}", self.records[i].name))
                     .expected("samples of displacement, velocity or acceleration"));
             }

@@ -132,7 +132,7 @@ impl Builder {
         match without {
             Some((i, _)) if rule == WeightRule::Discrepancy => Err(BuildError::new(
                 key,
-                "the rule `discrepancy` needs the noise of the readings",
+                "the rule `discrepancy` needs the noise of the samples",
             )
             .found(format!("no `sigma` in experiments[{i}]"))
             .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),

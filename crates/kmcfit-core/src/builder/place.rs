@@ -15,7 +15,7 @@ pub(super) struct Placement<'a> {
     pub record: &'a Record,
     pub grid: &'a Grid,
     /// Index of its set of coefficient functions.
-    pub assembly: usize,
+    pub coefficient_set: usize,
     /// Whether the fit compares the equation of motion, and no response, with the samples.
     pub is_equation_error: bool,
     /// Whether the channels are left out of the experiment.
@@ -70,10 +70,10 @@ impl Placement<'_> {
             Some([_, end]) => nodes_until(self.grid, end),
             None => self.grid.nodes(),
         };
-        let (initial, sought) = self.initial(scalars)?;
+        let (initial, estimated) = self.initial(scalars)?;
         let mut experiment = Experiment::free(&record.name, initial, nodes);
-        experiment.sought = sought;
-        experiment.device = self.assembly;
+        experiment.initial_parameters = estimated;
+        experiment.coefficient_set = self.coefficient_set;
         experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
         experiment.drive = input;
         let compared = match self.simulation {
@@ -103,7 +103,7 @@ impl Placement<'_> {
         let angular = channels.iter().any(|c| c.angular);
         let kinds = [ChannelKind::Displacement, ChannelKind::Velocity];
         let mut state = [0.0; 2];
-        let mut sought = [None; 2];
+        let mut estimated = [None; 2];
         for (q, kind) in kinds.into_iter().enumerate() {
             let scalar = Scalar {
                 key: format!("{}.initial.{}", self.key, kind.name()),
@@ -115,7 +115,7 @@ impl Placement<'_> {
             match scalar.value(self.record.initial[q], scalars)? {
                 Value::Known(number) => state[q] = number,
                 Value::Sought(index) => {
-                    sought[q] = Some(index);
+                    estimated[q] = Some(index);
                     state[q] = scalars[index].start;
                 }
             }
@@ -125,7 +125,7 @@ impl Placement<'_> {
             displacement,
             velocity,
         };
-        Ok((state, sought))
+        Ok((state, estimated))
     }
 
     fn channel(
@@ -146,8 +146,8 @@ impl Placement<'_> {
         let nodes = experiment.nodes;
         let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
         let channel = channel.ok_or_else(|| {
-            BuildError::new("grid", "the readings do not lie on the grid")
-                .found(format!("readings until {} s", times[times.len() - 1]))
+            BuildError::new("grid", "the samples do not lie on the grid")
+                .found(format!("samples until {} s", times[times.len() - 1]))
                 .expected(format!(
                     "a grid from {} s to {} s",
                     grid.start(),
@@ -192,9 +192,9 @@ impl Placement<'_> {
         if !asked.unwrap_or(kind == ChannelKind::Acceleration) {
             return Ok(None);
         }
-        let motion = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
-        let motion: Option<Vec<f64>> = motion.collect();
-        motion.map(Some).ok_or_else(|| {
+        let response = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
+        let response: Option<Vec<f64>> = response.collect();
+        response.map(Some).ok_or_else(|| {
             BuildError::new(key, format!("the {} of the base is not known", kind.name()))
                 .found("the acceleration of the base only")
                 .expected("`columns: {base_displacement: …}`, or no `absolute: true`")

@@ -28,9 +28,9 @@ impl fmt::Display for Whiteness {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Reason::FewReadings => write!(f, "there are fewer than {FEWEST_READINGS} readings"),
+            Reason::FewReadings => write!(f, "there are fewer than {FEWEST_READINGS} samples"),
             Reason::FewLags => write!(f, "there are too few lags for the parameters of the noise"),
-            Reason::NoResiduals => write!(f, "the model goes through every reading"),
+            Reason::NoResiduals => write!(f, "the model goes through every sample"),
         }
     }
 }
@@ -102,11 +102,11 @@ mod tests {
         let say = |values: &[f64]| test(values).to_string();
         assert_eq!(
             say(&[1.0; 19]),
-            "the residuals were not tested: there are fewer than 20 readings"
+            "the residuals were not tested: there are fewer than 20 samples"
         );
         assert_eq!(
             say(&[0.0; 40]),
-            "the residuals were not tested: the model goes through every reading"
+            "the residuals were not tested: the model goes through every sample"
         );
     }
 

@@ -82,10 +82,10 @@ mod tests {
 
     fn problem(statement: Statement) -> Problem {
         let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
         let record = Record::new("decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::constant(1.0),
             CoefficientSpec::constant(0.4),

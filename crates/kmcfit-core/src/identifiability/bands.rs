@@ -104,8 +104,8 @@ impl Bands {
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
-        let readings = problem.reading_count().max(1) as f64;
-        let affordable = (MOST_WORK / readings).sqrt() as usize;
+        let samples = problem.sample_count().max(1) as f64;
+        let affordable = (MOST_WORK / samples).sqrt() as usize;
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
@@ -350,7 +350,7 @@ impl Maker<'_> {
 
     /// Ratios of the main system by the delta method.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[Linearised]) -> Vec<Band> {
-        let assembly = self.problem.functions.assembly(0);
+        let assembly = self.problem.functions.coefficient_set(0);
         let terms = &self.problem.system.terms;
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;

@@ -59,8 +59,8 @@ impl Information {
         for penalty in &problem.penalties {
             pulled = stacked(&pulled, &roughness(problem, penalty, directions));
         }
-        let readings = problem.channels().flat_map(|c| c.observed());
-        let largest = readings.fold(0.0f64, |most, y| most.max(y.abs()));
+        let samples = problem.channels().flat_map(|c| c.observed());
+        let largest = samples.fold(0.0f64, |most, y| most.max(y.abs()));
         Self {
             measured,
             pulled,
@@ -113,12 +113,12 @@ impl Information {
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
-            let readings = self
+            let samples = self
                 .sensitivity
                 .roots
                 .iter()
                 .zip(&self.sensitivity.has_sigma);
-            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(readings) {
+            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(samples) {
                 if !has_sigma {
                     row *= root * variance.sqrt();
                 }
@@ -172,8 +172,8 @@ impl Problem {
     /// not count. `None` where some direction is not identifiable, there are too many parameters, or
     /// noise is neither given nor left by the fit.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
-        let (n, readings) = (self.parameters(), self.reading_count());
-        if n == 0 || n > FEW_PARAMETERS || readings <= n {
+        let (n, samples) = (self.parameters(), self.sample_count());
+        if n == 0 || n > FEW_PARAMETERS || samples <= n {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
@@ -182,7 +182,7 @@ impl Problem {
         let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
         let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
             true => 1.0,
-            false => squares / (readings - n) as f64,
+            false => squares / (samples - n) as f64,
         };
         // A fit that leaves nothing says nothing of the noise.
         (factorisation.rank == n && scale > 0.0).then(|| {

@@ -172,8 +172,8 @@ mod tests {
     /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is sought.
     fn coarse() -> (Problem, Directions) {
         let times: Vec<f64> = (0..=200).map(|i| 0.05 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
-        let record = Record::new("decay").displacement(&times, &readings);
+        let samples: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
         let parts = [
             CoefficientSpec::nodal(1.0),
             CoefficientSpec::constant(0.1),

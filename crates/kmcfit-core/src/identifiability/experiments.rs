@@ -216,7 +216,7 @@ fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, Str
             grid,
             nodes,
         );
-        experiment = experiment.with_channel(made.ok_or("its readings are not on the grid")?);
+        experiment = experiment.with_channel(made.ok_or("its samples are not on the grid")?);
     }
     Ok(experiment)
 }

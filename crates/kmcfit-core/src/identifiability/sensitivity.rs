@@ -44,7 +44,7 @@ impl Sensitivity {
     /// [`Sensitivity::along`], 2000 readings of 6000 parameters in a second; its decomposition takes a
     /// minute.
     pub fn of(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let (rows, columns) = (problem.reading_count() as f64, problem.parameters() as f64);
+        let (rows, columns) = (problem.sample_count() as f64, problem.parameters() as f64);
         let fits = rows * columns * rows.min(columns) <= MOST_WORK;
         let most = if fits { usize::MAX } else { COARSE };
         Self::along(
@@ -103,9 +103,9 @@ fn by_tangents(
     problem: &Problem,
     evaluation: &Evaluation,
     directions: &Directions,
-    readings: usize,
+    samples: usize,
 ) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(readings, directions.len());
+    let mut jacobian = DMatrix::zeros(samples, directions.len());
     for k in 0..directions.len() {
         let changes = problem.predictions_tangent(evaluation, &directions.column(k));
         let all = changes.iter().flatten().flatten();
@@ -202,9 +202,9 @@ impl Spectrum {
     pub fn sentence(&self) -> String {
         let (rank, of) = (self.rank(), self.of());
         match self.directions.is_coarse() {
-            false => format!("the readings see {rank} of {of} directions"),
+            false => format!("the samples see {rank} of {of} directions"),
             true => format!(
-                "the readings see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
+                "the samples see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
                  best (of {} parameters; below that the stepper's own error shows)",
                 self.directions.parameters()
             ),

@@ -141,8 +141,8 @@ fn is_known(band: &Band, size: f64, i: usize) -> bool {
 /// Verdicts on every function of the list, then on `k/m` and `c/m`.
 pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
     let sizes = problem.median_scales(evaluation);
-    let assembly = problem.functions.assembly(0);
-    let mass = median_size(&evaluation.device.mass);
+    let assembly = problem.functions.coefficient_set(0);
+    let mass = median_size(&evaluation.nodal.mass);
     let of = |term: Term| {
         let place = problem.system.terms.iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
@@ -204,7 +204,7 @@ fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement 
             format!("{name} is not identified by itself, only the ratio {ratio} is")
         }
         Verdict::OnlyOn(spans) => format!("{name} is identified only on {}", span_words(spans)),
-        Verdict::NotSeen => format!("{name} is not seen by the readings"),
+        Verdict::NotSeen => format!("{name} is not seen by the samples"),
         Verdict::Fixed => format!("{name} is given"),
     };
     let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));

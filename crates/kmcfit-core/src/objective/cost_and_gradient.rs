@@ -80,7 +80,7 @@ impl Problem {
             && channel.len() == nodes
             && channel.stride() == Some(1)
             && self.functions.scalars().is_empty()
-            && matches!(self.functions.assemblies(), [only] if only == &[0, 1, 2])
+            && matches!(self.functions.coefficient_sets(), [only] if only == &[0, 1, 2])
             && designs.all(|d| matches!(d, Design::Identity))
             && experiment
                 .excitation
@@ -101,10 +101,10 @@ mod tests {
     fn problem() -> Problem {
         let grid = Grid::new(0.0, 25.0, 200).unwrap();
         let times = grid.times();
-        let readings: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
         let record = Record::new("free decay")
             .from_state(3.3, 1.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         Builder::new([2.0, 0.5, 1.0].map(CoefficientSpec::nodal))
             .record(record)
             .method(Method::Midpoint)
@@ -133,7 +133,7 @@ mod tests {
             .try_into()
             .unwrap();
         let grid = problem.system.grid;
-        let functions = Parameterization::with_devices(
+        let functions = Parameterization::with_coefficient_sets(
             vec![k, m, c],
             vec![vec![1, 2, 0]],
             grid.nodes(),

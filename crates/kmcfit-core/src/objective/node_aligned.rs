@@ -31,7 +31,7 @@ impl Channel {
             let [forces, bases] = &mut rows;
             let lanes = forces.iter_mut().zip(bases).enumerate();
             for (l, (force, base)) in lanes.take(self.len() - i) {
-                let around = self.around_reading(excitation, i + l);
+                let around = self.around_sample(excitation, i + l);
                 (*force, *base) = (around.force, around.base);
             }
         }
@@ -49,8 +49,8 @@ impl Channel {
     ) {
         let nodes = NodalObservations {
             system: view.system,
-            device: view.device,
-            states: view.motion,
+            nodal: view.nodal,
+            states: view.response,
         };
         let around = self.around_eight(arithmetic, view.excitation, i);
         nodes.accelerations(arithmetic, i, around, seen);
@@ -138,8 +138,8 @@ impl Kernel for AddTranspose<'_, '_> {
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
             match direct {
-                CoefficientGradient::AtNodes(device) => {
-                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                CoefficientGradient::AtNodes(nodal) => {
+                    for (values, by) in nodal.functions_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }

@@ -31,26 +31,27 @@ impl Problem {
         let terms = &self.system.terms;
         let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
-            .map(|motion| squares(motion, terms, step))
+            .map(|response| squares(response, terms, step))
             .collect();
         let any_read = self.experiments.iter().any(Experiment::is_read);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
-        for (which, assembly) in self.functions.assemblies().iter().enumerate() {
-            let device = evaluation.device_of(which);
+        for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
+            let nodal = evaluation.nodal_of(which);
             // Of the accelerations first, then of what each term sees.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
-                let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
+                let own =
+                    own.filter(|(e, _)| e.coefficient_set == which && (e.is_read() || !any_read));
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = size_of(&device.mass);
+            let mass = size_of(&nodal.mass);
             let inertia = mass * root(0);
             let natural = |j: usize| match root(j + 1) {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
             let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
-            let own = device.functions().map(size_of);
+            let own = nodal.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
@@ -86,11 +87,11 @@ impl Problem {
 }
 
 /// The sums over the nodes of `y''^2` and of `phi^2` of each term.
-fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
-    let (y, v) = (&motion.displacement, &motion.velocity);
+fn squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    let (y, v) = (&response.displacement, &response.velocity);
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
-        return squares_in_order(motion, terms, step);
+        return squares_in_order(response, terms, step);
     }
     let inertia = sum_of_squares(nodes, |i| curvature_at(y, step, i));
     let of = |term: &Term| match term {
@@ -104,9 +105,9 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
 
 /// [`squares`] of a short record: descents along the gradient alone depend on every bit, so all are added in order, those of
 /// four columns side by side, as each sum waits for itself.
-fn squares_in_order(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+fn squares_in_order(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     const PART: usize = 256;
-    let (y, v) = (&motion.displacement, &motion.velocity);
+    let (y, v) = (&response.displacement, &response.velocity);
     let mut sums = vec![0.0; terms.len() + 1];
     let mut part = [[0.0; PART]; 4];
     for (first, sums) in (0..).step_by(4).zip(sums.chunks_mut(4)) {
@@ -172,7 +173,7 @@ mod tests {
     #[test]
     fn the_state_of_a_sine_has_its_size_whatever_was_read() {
         let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
-        let readings = |size: f64, phase: f64| -> Vec<f64> {
+        let samples = |size: f64, phase: f64| -> Vec<f64> {
             let at = |i: usize| size * (5.0 + (omega * spacing * i as f64 + phase).sin());
             (0..400).map(at).collect()
         };
@@ -188,7 +189,7 @@ mod tests {
         ];
         let rms = amplitude / 2f64.sqrt();
         for (kind, size, phase) in cases {
-            let [displacement, velocity] = state_scales(kind, &readings(size, phase), spacing);
+            let [displacement, velocity] = state_scales(kind, &samples(size, phase), spacing);
             // The dominant frequency is known to a small part of its distance to the next.
             assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
             assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
@@ -201,13 +202,13 @@ mod tests {
     fn swinging(size: f64, other_is_read: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let record = |name: &str, size: f64| {
-            let readings: Vec<f64> = times
+            let samples: Vec<f64> = times
                 .iter()
                 .map(|t| size * (TAU * t / 10.0).cos())
                 .collect();
             Record::new(name)
                 .from_state(size, 0.0)
-                .displacement(&times, &readings)
+                .displacement(&times, &samples)
         };
         let stiffness = (TAU / 10.0).powi(2);
         let parts = [1.0, 0.0, stiffness].map(CoefficientSpec::fixed);

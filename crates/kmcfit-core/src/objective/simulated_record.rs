@@ -9,11 +9,11 @@ pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
     pub system: &'a System,
     /// The device that moves.
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     /// What drives it.
     pub excitation: Option<&'a Excitation>,
     /// Its motion.
-    pub motion: &'a Trajectory,
+    pub response: &'a Trajectory,
     /// Values of all scalars.
     pub scalars: &'a [f64],
 }
@@ -22,9 +22,9 @@ pub struct SimulatedRecord<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct RecordTangent<'a> {
     /// Change of the device.
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     /// Change of the motion.
-    pub motion: &'a Trajectory,
+    pub response: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
 }
@@ -32,7 +32,7 @@ pub struct RecordTangent<'a> {
 impl SimulatedRecord<'_> {
     /// The engine of its response and derivatives.
     pub(crate) fn engine(&self) -> Engine {
-        let nodes = self.motion.nodes();
+        let nodes = self.response.nodes();
         Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
     }
 
@@ -40,11 +40,11 @@ impl SimulatedRecord<'_> {
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
+            response,
             ..
         } = self;
-        (self.engine()).discrete_adjoint(system, device, *excitation, motion, source)
+        (self.engine()).discrete_adjoint(system, nodal, *excitation, response, source)
     }
 }

@@ -81,8 +81,8 @@ impl Channel {
         let times = (0..values.len()).map(|i| grid.time(i * stride)).collect();
         let kind = ChannelKind::Displacement;
         let channel = Self::new(kind, times, values, weighting, grid, grid.nodes());
-        let channel = channel.expect("readings on the nodes of the grid");
-        assert!(stride > 0, "readings advance");
+        let channel = channel.expect("samples on the nodes of the grid");
+        assert!(stride > 0, "samples advance");
         channel
     }
 
@@ -114,7 +114,7 @@ impl Channel {
     /// If there is not one for each reading.
     #[must_use]
     pub fn with_surroundings(mut self, around: Vec<InputSample>) -> Self {
-        assert_eq!(around.len(), self.times.len(), "one for each reading");
+        assert_eq!(around.len(), self.times.len(), "one for each sample");
         let forces = around.iter().map(|a| a.force).collect();
         let bases = around.iter().map(|a| a.base).collect();
         self.around = Some([forces, bases]);
@@ -128,7 +128,7 @@ impl Channel {
     /// If there is not one for each reading.
     #[must_use]
     pub fn with_base(mut self, base: Vec<f64>) -> Self {
-        assert_eq!(base.len(), self.times.len(), "one for each reading");
+        assert_eq!(base.len(), self.times.len(), "one for each sample");
         self.base = base;
         self
     }
@@ -140,7 +140,7 @@ impl Channel {
             self.unfiltered = std::mem::take(&mut self.observed);
         }
         self.filter = filter;
-        self.filter_readings();
+        self.filter_samples();
         self
     }
 
@@ -151,8 +151,8 @@ impl Channel {
     /// If there is not one of each for every reading.
     #[must_use]
     pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
-        assert_eq!(predicted.len(), self.len(), "one for each reading");
-        assert_eq!(noise.len(), self.len(), "one for each reading");
+        assert_eq!(predicted.len(), self.len(), "one for each sample");
+        assert_eq!(noise.len(), self.len(), "one for each sample");
         let filtered = match self.filter.is_empty() {
             true => noise.to_vec(),
             false => zero_phase(&self.filter, noise),
@@ -163,7 +163,7 @@ impl Channel {
         self
     }
 
-    fn filter_readings(&mut self) {
+    fn filter_samples(&mut self) {
         if !self.unfiltered.is_empty() {
             self.observed = zero_phase(&self.filter, &self.unfiltered);
         }
@@ -197,7 +197,7 @@ impl Channel {
             filter: self.filter.clone(),
             on_every_node: self.on_every_node,
         };
-        part.filter_readings();
+        part.filter_samples();
         part
     }
 
@@ -281,7 +281,7 @@ impl Channel {
     }
 
     /// Force and base at reading `i`: as given, or else linear over the step.
-    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
+    pub(crate) fn around_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.around, excitation) {
             (Some([forces, bases]), _) => InputSample {
                 force: forces[i],

@@ -11,7 +11,7 @@ pub struct Experiment {
     /// Displacement and velocity at the first node; where they are sought, the start of the search.
     pub initial: State,
     /// The scalars that displacement and velocity at the first node are, where they are sought.
-    pub sought: [Option<usize>; 2],
+    pub initial_parameters: [Option<usize>; 2],
     /// What drives the motion, on the grid; `None` is free motion.
     pub excitation: Option<Excitation>,
     /// What it was made from; empty where it was given on the grid.
@@ -19,7 +19,7 @@ pub struct Experiment {
     /// Number of nodes of its motion: a record may end before the grid does.
     pub nodes: usize,
     /// Which device of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies) moves.
-    pub device: usize,
+    pub coefficient_set: usize,
     /// What was measured; none for an experiment that is only simulated.
     pub channels: Vec<Channel>,
 }
@@ -30,11 +30,11 @@ impl Experiment {
         Self {
             name: name.into(),
             initial,
-            sought: [None; 2],
+            initial_parameters: [None; 2],
             excitation: None,
             drive: Input::default(),
             nodes,
-            device: 0,
+            coefficient_set: 0,
             channels: Vec::new(),
         }
     }
@@ -55,10 +55,10 @@ impl Experiment {
 
     /// The state at the first node, for the values `scalars` of all scalars.
     pub fn initial_state(&self, scalars: &[f64]) -> State {
-        let value = |sought: Option<usize>, known: f64| sought.map_or(known, |i| scalars[i]);
+        let value = |estimated: Option<usize>, known: f64| estimated.map_or(known, |i| scalars[i]);
         State {
-            displacement: value(self.sought[0], self.initial.displacement),
-            velocity: value(self.sought[1], self.initial.velocity),
+            displacement: value(self.initial_parameters[0], self.initial.displacement),
+            velocity: value(self.initial_parameters[1], self.initial.velocity),
         }
     }
 
@@ -94,7 +94,7 @@ impl Experiment {
     }
 
     /// Number of readings of all channels.
-    pub fn reading_count(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.channels.iter().map(Channel::len).sum()
     }
 }

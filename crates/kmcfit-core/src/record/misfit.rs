@@ -15,10 +15,10 @@ impl Channel {
     pub(crate) fn residuals_of<'a>(
         &'a self,
         predicted: &'a [f64],
-        readings: Range<usize>,
+        samples: Range<usize>,
     ) -> impl Iterator<Item = f64> + 'a {
-        let pairs = predicted[readings.clone()].iter();
-        pairs.zip(&self.observed()[readings]).map(|(y, o)| y - o)
+        let pairs = predicted[samples.clone()].iter();
+        pairs.zip(&self.observed()[samples]).map(|(y, o)| y - o)
     }
 
     /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or

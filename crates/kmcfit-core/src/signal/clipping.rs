@@ -39,5 +39,5 @@ pub fn clipped(values: &[f64]) -> Option<(usize, f64)> {
     let ends = [piled_up(1.0), piled_up(-1.0)];
     ends.into_iter()
         .flatten()
-        .max_by_key(|(readings, _)| *readings)
+        .max_by_key(|(samples, _)| *samples)
 }

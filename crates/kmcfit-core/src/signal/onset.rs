@@ -53,7 +53,7 @@ mod tests {
     }
 
     fn record(still: i32, noise: f64) -> Vec<f64> {
-        let reading = |i: i32| {
+        let sample = |i: i32| {
             let (t, shock) = (f64::from(i - still), shock(i));
             let swing = match t >= 0.0 {
                 true => (-0.01 * t).exp() * (0.2 * t).sin(),
@@ -61,7 +61,7 @@ mod tests {
             };
             swing + noise * shock
         };
-        (0..500).map(reading).collect()
+        (0..500).map(sample).collect()
     }
 
     #[test]

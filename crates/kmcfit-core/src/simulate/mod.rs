@@ -36,10 +36,10 @@ impl System {
     /// If `device` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        reference::forward(self, device, initial, excitation)
+        reference::forward(self, nodal, initial, excitation)
     }
 }

@@ -79,7 +79,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     }
 
     /// The motions at a point that was there before, computed again without counting.
-    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
+    pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
         problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;

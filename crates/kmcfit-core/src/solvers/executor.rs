@@ -208,8 +208,8 @@ impl Run<'_, '_> {
         if !fits(&standing.parameters.0) {
             return None;
         }
-        let motions = |parameters: &[f64]| match fits(parameters) {
-            true => work.motions_again(parameters).ok(),
+        let responses = |parameters: &[f64]| match fits(parameters) {
+            true => work.responses_again(parameters).ok(),
             false => None,
         };
         if rows.len() as u64 != standing.iterations {
@@ -217,7 +217,7 @@ impl Run<'_, '_> {
         }
         let snapshots = standing.snapshots.into_iter();
         let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
+        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, responses)?;
         let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
             && !(self.method).restore(standing.memory, work.problem(), &mut point)

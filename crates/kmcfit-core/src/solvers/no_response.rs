@@ -21,7 +21,7 @@ use crate::simulate::SimulationError;
 /// # Errors
 /// The `breakdown`, if `given` satisfies the constraints or has no motion either: then the start is
 /// to blame, and there is nothing to keep.
-pub fn without_motion(
+pub fn no_response(
     problem: &Problem,
     given: &[f64],
     settings: &FitSettings,

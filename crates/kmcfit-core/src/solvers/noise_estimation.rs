@@ -99,8 +99,8 @@ fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
 
 /// Puts the sigmas of the residuals into the problem; the largest relative change.
 fn update(problem: &mut Problem, found: &Fit) -> f64 {
-    let readings = problem.reading_count() as f64;
-    let share = (problem.parameters() as f64 / readings).min(0.5);
+    let samples = problem.sample_count() as f64;
+    let share = (problem.parameters() as f64 / samples).min(0.5);
     let mut largest = 0.0f64;
     let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
@@ -147,10 +147,10 @@ mod tests {
     fn a_fit_with_another_round_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),

@@ -55,13 +55,13 @@ pub enum Reason {
     #[error("there is nothing to fit: every function is fixed")]
     NoParameters,
     /// The readings, or their squares, are zero.
-    #[error("there is nothing to explain: the readings, or their squares, are zero")]
+    #[error("there is nothing to explain: the samples, or their squares, are zero")]
     ZeroReadings,
     /// The cost at the start is zero.
     #[error("the start fits exactly")]
     ExactStart,
     /// The squares of the readings overflow.
-    #[error("the squares of the readings leave the range of numbers: give them in a larger unit")]
+    #[error("the squares of the samples leave the range of numbers: give them in a larger unit")]
     Overflow,
     /// The cost is zero to machine precision.
     #[error("the cost is zero to rounding")]
@@ -173,7 +173,7 @@ pub enum MissingMeasurement {
     )]
     FilteredDrive,
     /// Readings.
-    #[error("there are too few readings")]
+    #[error("there are too few samples")]
     Readings,
     /// Anything that moves.
     #[error("nothing moves")]
@@ -208,7 +208,7 @@ fn equation_error(program: Option<ConicStatus>, has_mass: bool) -> String {
     let but = match has_mass {
         true => "",
         false => {
-            "; its mass is not positive at all times, so no device moves so: give the mass a `min`"
+            "; its mass is not positive at all times, so the equation of motion cannot be solved: give the mass a `min`"
         }
     };
     format!("the equation error is convex, and its minimum was found by {how}{but}")

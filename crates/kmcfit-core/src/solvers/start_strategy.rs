@@ -355,7 +355,7 @@ impl Problem {
     /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.channels().all(|c| c.weighting().is_sigma());
-        known.then(|| largest_chi_square(self.reading_count()))
+        known.then(|| largest_chi_square(self.sample_count()))
     }
 }
 
@@ -367,8 +367,8 @@ impl Channel {
     }
 }
 
-fn largest_chi_square(readings: usize) -> f64 {
-    let n = readings as f64;
+fn largest_chi_square(samples: usize) -> f64 {
+    let n = samples as f64;
     n + 2.0 * (2.0 * n).sqrt()
 }
 
@@ -384,10 +384,10 @@ mod tests {
     fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),

@@ -239,7 +239,7 @@ impl Walk<'_, '_> {
         self.elapsed += found.elapsed;
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
-        let n = problem.reading_count() as f64;
+        let n = problem.sample_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
         let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
@@ -311,7 +311,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         ..
     } = &found.best;
     let fresh = Linearization::Fresh;
-    let (mut sub, readings) = linearise(problem, parameters, evaluation, &fresh, timings);
+    let (mut sub, samples) = linearise(problem, parameters, evaluation, &fresh, timings);
     // The proximal term of a fit that has ended is gone.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();
@@ -320,7 +320,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
     let probes: Vec<Vec<f64>> = (0..PROBES)
         .map(|_| {
             (0..rows)
-                .map(|i| if i < readings { sign() } else { 0.0 })
+                .map(|i| if i < samples { sign() } else { 0.0 })
                 .collect()
         })
         .collect();
@@ -334,7 +334,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         fitted
             .iter()
             .zip(probe)
-            .take(readings)
+            .take(samples)
             .map(|(a, b)| a * b)
             .sum::<f64>()
     });
@@ -379,7 +379,7 @@ fn remark(
 ) -> Option<String> {
     match (rule, index) {
         (WeightRule::Discrepancy, Some(0)) => Some(
-            "every weight on the path explains the readings, so the largest is taken: the data \
+            "every weight on the path explains the samples, so the largest is taken: the data \
              ask for no roughness at all"
                 .into(),
         ),
@@ -390,7 +390,7 @@ fn remark(
                 .fold(f64::INFINITY, f64::min);
             Some(format!(
                 "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
-                 sigma may be too small, or the model cannot explain the readings",
+                 sigma may be too small, or the model cannot explain the samples",
                 problem.largest_chi_square().unwrap_or(f64::NAN)
             ))
         }

@@ -12,7 +12,7 @@
 use super::functional::Linear;
 use super::parallel::map;
 use super::refit::settings;
-use super::simulate::{normal, sigmas, stream, with_readings};
+use super::simulate::{normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
@@ -115,7 +115,7 @@ pub fn bootstrap(
             }
             Noise::Residual => drawn(problem, &evaluation, &mut random),
         };
-        let simulated = with_readings(problem, &evaluation, &errors);
+        let simulated = with_samples(problem, &evaluation, &errors);
         match fit_from(&simulated, optimum, &settings()) {
             Err(breakdown) => Err(breakdown.to_string()),
             Ok(fit) => match fit.outcome.status {
@@ -134,10 +134,10 @@ pub fn bootstrap(
 /// Residuals of every channel, centred, widened and drawn again. Readings with sigmas of their own
 /// keep them: what is drawn is the residual in units of sigma.
 fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
-    let readings = problem.reading_count() as f64;
-    let freedom = (readings - problem.parameters() as f64).max(1.0);
-    let wider = (readings / freedom).sqrt();
-    let mut all = Vec::with_capacity(problem.reading_count());
+    let samples = problem.sample_count() as f64;
+    let freedom = (samples - problem.parameters() as f64).max(1.0);
+    let wider = (samples / freedom).sqrt();
+    let mut all = Vec::with_capacity(problem.sample_count());
     for (channel, predicted) in problem.predicted(evaluation) {
         let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
         let residuals = channel.residuals(predicted).enumerate();

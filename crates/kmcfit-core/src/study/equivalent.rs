@@ -32,7 +32,7 @@ const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
 
 /// A motion at the nodes of a grid, and the force that drives it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
+pub struct TargetResponse {
     /// The nodes.
     pub grid: Grid,
     /// `y`, m.
@@ -45,12 +45,12 @@ pub struct Motion {
     pub force: Vec<f64>,
 }
 
-impl Motion {
+impl TargetResponse {
     /// The motion of experiment `e` of a fit, its acceleration from the equation itself.
     pub fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Self {
         let experiment = &problem.experiments[e];
-        let device = evaluation.device_of(experiment.device);
-        let motion = &evaluation.trajectories[e];
+        let nodal = evaluation.nodal_of(experiment.coefficient_set);
+        let response = &evaluation.trajectories[e];
         let nodes = experiment.nodes;
         let excitation = experiment.excitation.as_ref();
         let force = excitation
@@ -58,17 +58,17 @@ impl Motion {
             .map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
-            let terms = problem.system.terms.iter().zip(&device.coefficients);
-            let (y, v) = (motion.displacement[i], motion.velocity[i]);
+            let terms = problem.system.terms.iter().zip(&nodal.coefficients);
+            let (y, v) = (response.displacement[i], response.velocity[i]);
             let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
-            (force[i] - resisting) / device.mass[i]
+            (force[i] - resisting) / nodal.mass[i]
         };
         let grid = problem.system.grid;
         let length = grid.step() * (nodes - 1) as f64;
         Self {
             grid: Grid::new(grid.start(), length, nodes).unwrap_or(grid),
-            displacement: motion.displacement.clone(),
-            velocity: motion.velocity.clone(),
+            displacement: response.displacement.clone(),
+            velocity: response.velocity.clone(),
             acceleration: (0..nodes).map(acceleration).collect(),
             force,
         }
@@ -108,20 +108,20 @@ impl Wish {
 /// If mass, motion and wish do not have one value per node.
 pub fn equivalent(
     mass: &[f64],
-    motion: &Motion,
+    response: &TargetResponse,
     wish: &Wish,
 ) -> Result<NodalCoefficients, ConicStatus> {
-    let n = motion.grid.nodes();
-    let lengths = [mass.len(), motion.displacement.len(), wish.damping.len()];
+    let n = response.grid.nodes();
+    let lengths = [mass.len(), response.displacement.len(), wish.damping.len()];
     assert_eq!(lengths, [n; 3], "one value per node");
-    let step = motion.grid.step();
-    let duration = motion.grid.duration();
+    let step = response.grid.step();
+    let duration = response.grid.duration();
     let needed: Vec<f64> = (0..n)
-        .map(|i| motion.force[i] - mass[i] * motion.acceleration[i])
+        .map(|i| response.force[i] - mass[i] * response.acceleration[i])
         .collect();
     let inertia = positive_rms(&needed);
     let over = |f: &[f64]| inertia / positive_rms(f);
-    let [large_c, large_k] = [over(&motion.velocity), over(&motion.displacement)];
+    let [large_c, large_k] = [over(&response.velocity), over(&response.displacement)];
 
     // Unknowns: c/C at the nodes, then k/K.
     let mut sub = Subproblem::new(2 * n);
@@ -142,8 +142,8 @@ pub fn equivalent(
     }
     for (i, needed) in needed.iter().enumerate() {
         let row = [
-            (i, large_c * motion.velocity[i] / inertia),
-            (n + i, large_k * motion.displacement[i] / inertia),
+            (i, large_c * response.velocity[i] / inertia),
+            (n + i, large_k * response.displacement[i] / inertia),
         ];
         sub.equalities.push(row, needed / inertia);
         sub.bound(
@@ -173,17 +173,17 @@ pub fn equivalent(
 
 /// What the crossings of zero anchor: time (s) and damping (N s/m) for the mass `mass`, between
 /// nodes by linear interpolation; as far from `c` as the square of the step.
-pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
-    let y = &motion.displacement;
+pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
+    let y = &response.displacement;
     let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
     let crossing = |i: usize| {
         (y[i] * y[i + 1] <= 0.0 && y[i] != y[i + 1] && y[i + 1] != 0.0).then(|| {
             let share = y[i] / (y[i] - y[i + 1]);
             let force = at(i, share, &|i| {
-                motion.force[i] - mass[i] * motion.acceleration[i]
+                response.force[i] - mass[i] * response.acceleration[i]
             });
-            let velocity = at(i, share, &|i| motion.velocity[i]);
-            let time = motion.grid.time(i) + share * motion.grid.step();
+            let velocity = at(i, share, &|i| response.velocity[i]);
+            let time = response.grid.time(i) + share * response.grid.step();
             (time, force / velocity)
         })
     };
@@ -191,12 +191,12 @@ pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
 }
 
 /// How far the equation is from holding along the motion for `device`, N at the nodes.
-pub fn imbalance(device: &NodalCoefficients, motion: &Motion) -> Vec<f64> {
+pub fn imbalance(nodal: &NodalCoefficients, response: &TargetResponse) -> Vec<f64> {
     let at = |i: usize| {
-        device.mass[i] * motion.acceleration[i]
-            + device.coefficients[0][i] * motion.velocity[i]
-            + device.coefficients[1][i] * motion.displacement[i]
-            - motion.force[i]
+        nodal.mass[i] * response.acceleration[i]
+            + nodal.coefficients[0][i] * response.velocity[i]
+            + nodal.coefficients[1][i] * response.displacement[i]
+            - response.force[i]
     };
-    (0..motion.grid.nodes()).map(at).collect()
+    (0..response.grid.nodes()).map(at).collect()
 }

@@ -31,11 +31,11 @@ pub struct Prediction {
 
 /// A prediction and the motions that it sums up.
 #[derive(Debug, Clone)]
-pub struct PredictedMotion {
+pub struct PredictedResponse {
     /// In numbers.
     pub summary: Prediction,
     /// The found device's motion.
-    pub motion: Trajectory,
+    pub response: Trajectory,
     /// The true device's motion, where the truth is known.
     pub truth: Option<Trajectory>,
 }
@@ -47,20 +47,20 @@ pub struct PredictedMotion {
 /// A [`SimulationError`] if a motion does not exist.
 pub fn predict(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     truth: Option<&NodalCoefficients>,
     states: &[State],
-) -> Result<Vec<PredictedMotion>, SimulationError> {
+) -> Result<Vec<PredictedResponse>, SimulationError> {
     states
         .iter()
         .map(|&state| {
-            let motion = system.forward(device, state, None)?;
+            let response = system.forward(nodal, state, None)?;
             let truth = truth
                 .map(|truth| system.forward(truth, state, None))
                 .transpose()?;
-            Ok(PredictedMotion {
-                summary: summarise(system, state, &motion, truth.as_ref()),
-                motion,
+            Ok(PredictedResponse {
+                summary: summarise(system, state, &response, truth.as_ref()),
+                response,
                 truth,
             })
         })
@@ -70,11 +70,11 @@ pub fn predict(
 fn summarise(
     system: &System,
     state: State,
-    motion: &Trajectory,
+    response: &Trajectory,
     truth: Option<&Trajectory>,
 ) -> Prediction {
     let integral = |f: &dyn Fn(usize) -> f64| {
-        let squares: Vec<f64> = (0..motion.displacement.len())
+        let squares: Vec<f64> = (0..response.displacement.len())
             .map(|i| f(i).powi(2))
             .collect();
         trapezoid(&squares, system.grid.step())
@@ -82,10 +82,10 @@ fn summarise(
     Prediction {
         displacement: state.displacement,
         velocity: state.velocity,
-        cost: truth.map(|t| integral(&|i| motion.displacement[i] - t.displacement[i])),
+        cost: truth.map(|t| integral(&|i| response.displacement[i] - t.displacement[i])),
         energy: truth.map(|t| integral(&|i| t.displacement[i])),
-        largest: Some((motion.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
-        last: motion.displacement.last().copied(),
+        largest: Some((response.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
+        last: response.displacement.last().copied(),
         failure: None,
     }
 }

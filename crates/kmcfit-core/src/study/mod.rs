@@ -27,6 +27,6 @@ mod simulate;
 pub mod variation;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
-pub use free_response::{PredictedMotion, Prediction, predict};
+pub use free_response::{PredictedResponse, Prediction, predict};
 pub use functional::{Linear, Target};
 pub use profile::{Profile, ProfileSettings, profile, profiles};

@@ -25,7 +25,7 @@ pub struct Run {
     /// What drives it, on the problem's grid; `None` for free motion.
     pub excitation: Option<Excitation>,
     /// Which device of the problem moves.
-    pub device: usize,
+    pub nodal: usize,
 }
 
 impl Run {
@@ -35,7 +35,7 @@ impl Run {
             name: name.into(),
             initial,
             excitation: None,
-            device: 0,
+            nodal: 0,
         }
     }
 }
@@ -48,7 +48,7 @@ pub struct Prediction {
     /// Times of the nodes, s.
     pub times: Vec<f64>,
     /// The optimum's motion.
-    pub motion: Trajectory,
+    pub response: Trajectory,
     /// 95 % band of the displacement at each node, m; `None` without a covariance.
     pub band: Option<Vec<[f64; 2]>>,
     /// Envelope of the displacements of the optimum and the extreme devices, m; `None` without
@@ -57,7 +57,7 @@ pub struct Prediction {
     /// The extreme device that is furthest from the optimum, and the largest distance, m.
     pub furthest: Option<(String, f64)>,
     /// Extreme devices without a motion in this run.
-    pub without_motion: Vec<String>,
+    pub no_response: Vec<String>,
 }
 
 /// Predicts `run` from the parameters `theta`, with the band of `covariance` and the worst case over
@@ -77,8 +77,8 @@ pub fn predict(
 ) -> Result<Prediction, SimulationError> {
     let seen = with_run(problem, run);
     let evaluation = seen.evaluate(theta)?;
-    let motion = evaluation.trajectories[0].clone();
-    let y = &motion.displacement;
+    let response = evaluation.trajectories[0].clone();
+    let y = &response.displacement;
     let band = covariance.map(|covariance| {
         assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
         let n = theta.len();
@@ -101,10 +101,10 @@ pub fn predict(
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;
-    let mut without_motion = Vec::new();
+    let mut no_response = Vec::new();
     for extreme in extremes {
         let Ok(other) = seen.evaluate(&extreme.parameters) else {
-            without_motion.push(extreme.name());
+            no_response.push(extreme.name());
             continue;
         };
         let mut distance = 0.0f64;
@@ -123,8 +123,8 @@ pub fn predict(
         band,
         worst: furthest.is_some().then_some(envelope),
         furthest,
-        without_motion,
-        motion,
+        no_response,
+        response,
     })
 }
 
@@ -137,7 +137,7 @@ fn with_run(problem: &Problem, run: &Run) -> Problem {
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
-    experiment.device = run.device;
+    experiment.coefficient_set = run.nodal;
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

@@ -38,7 +38,7 @@ pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
 }
 
 /// The problem with the readings `predictions + noise`, noise in the order of [`sigmas`].
-pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
+pub fn with_samples(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
     let mut simulated = problem.clone();
     let mut first = 0;
     let experiments = simulated.parts_mut().experiments.iter_mut();

@@ -58,7 +58,7 @@ impl NodalCoefficients {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemTangent {
     /// Change of every function at the nodes.
-    pub device: NodalCoefficients,
+    pub nodal: NodalCoefficients,
     /// Change of the initial state.
     pub initial: State,
 }
@@ -66,6 +66,6 @@ pub struct SystemTangent {
 impl SystemTangent {
     pub(crate) fn is_finite(&self) -> bool {
         let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-        self.device.functions().all(finite) && self.initial.is_finite()
+        self.nodal.functions().all(finite) && self.initial.is_finite()
     }
 }

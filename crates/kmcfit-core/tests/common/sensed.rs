@@ -68,7 +68,7 @@ impl<D: Real> Record<D> {
     }
 
     /// Displacement and velocity at all nodes.
-    pub fn motion(&self) -> Vec<(D, D)> {
+    pub fn response(&self) -> Vec<(D, D)> {
         let dt = self.dt;
         let mut states = vec![self.initial];
         for i in 0..self.mass.len() - 1 {

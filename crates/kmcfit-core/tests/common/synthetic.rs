@@ -17,7 +17,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// What moves, what drives it and where it starts.
 pub struct Truth<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub initial: State,
 }
@@ -27,9 +27,9 @@ impl Truth<'_> {
     /// over each step.
     pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[InputSample]) -> Vec<f64> {
         let record = self.record();
-        let states = record.motion();
+        let states = record.response();
         let grid = &self.system.grid;
-        let reading = |(n, t): (usize, &f64)| {
+        let sample = |(n, t): (usize, &f64)| {
             let x = (t - grid.start()) / grid.step();
             let nearest = x.round();
             let x = if (x - nearest).abs() < 1e-9 {
@@ -46,7 +46,7 @@ impl Truth<'_> {
             };
             record.seen(kind, &states, (step, share), driven)
         };
-        times.iter().enumerate().map(reading).collect()
+        times.iter().enumerate().map(sample).collect()
     }
 
     fn record(&self) -> Record<f64> {
@@ -61,10 +61,8 @@ impl Truth<'_> {
         Record {
             method: self.system.method,
             dt: self.system.grid.step(),
-            mass: self.device.mass.clone(),
-            terms: terms
-                .zip(self.device.coefficients.iter().cloned())
-                .collect(),
+            mass: self.nodal.mass.clone(),
+            terms: terms.zip(self.nodal.coefficients.iter().cloned()).collect(),
             force: part(&|e| e.force.clone()),
             base: part(&|e| e.base.clone()),
             initial: (self.initial.displacement, self.initial.velocity),

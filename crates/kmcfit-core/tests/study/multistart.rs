@@ -1,4 +1,4 @@
-use crate::problems::{REST, Record, bound, constants, device, problem, readings, system};
+use crate::problems::{REST, Record, bound, constants, nodal, problem, samples, system};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::study::multistart::{
@@ -10,7 +10,7 @@ use kmcfit_core::internals::study::multistart::{
 pub fn aliased(noise: f64) -> Problem {
     let system = system(6.0, 601);
     assert_eq!(REST.velocity, 0.0);
-    let values = readings(&system, &device(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
+    let values = samples(&system, &nodal(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
     let list = constants(601, [None, None, Some(2.0)], [1.0, 0.0, 0.0]);
     let record = Record {
         weighting: Weighting::Sigma(0.05),
@@ -56,7 +56,7 @@ fn the_aliases_of_a_period_are_found_and_counted() {
         &problem,
         Distance {
             ratios: 1e-3,
-            motions: 1e-2,
+            responses: 1e-2,
         },
     );
     let mut k: Vec<f64> = clusters
@@ -114,7 +114,7 @@ fn the_threads_change_no_bit() {
 #[test]
 fn starts_without_a_motion_are_kept_with_their_reason() {
     let system = system(6.0, 301);
-    let values = readings(&system, &device(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
+    let values = samples(&system, &nodal(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
     let list = constants(301, [Some(1.0), Some(0.1), None], [0.0, 0.0, 2.0]);
     let problem = problem(system, list, Vec::new(), Record::of(values, 5));
     let how = Multistart {
@@ -134,7 +134,7 @@ fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
     let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);
     let n = 200;
     let truth: Vec<f64> = {
-        let d = crate::common::paper_device(n);
+        let d = crate::common::paper_system(n);
         [&d.mass[..], &d.coefficients[0], &d.coefficients[1]].concat()
     };
     // Another common factor, s(t) = 1 + t/25, which the midpoint rule follows to its order.

@@ -58,24 +58,24 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     .unwrap();
     let band = found.band.as_ref().unwrap();
     let worst = found.worst.as_ref().unwrap();
-    assert!(found.without_motion.is_empty());
+    assert!(found.no_response.is_empty());
     assert_eq!(band[0], [-0.5, -0.5], "the state at the start is known");
 
     let refits = bootstrap(&problem, &best.parameters, Noise::Parametric, 1000, 3, 2).unwrap();
-    let motions: Vec<Vec<f64>> = refits
+    let responses: Vec<Vec<f64>> = refits
         .found()
         .map(|theta| {
             predict(&problem, theta, &run, None, &[])
                 .unwrap()
-                .motion
+                .response
                 .displacement
         })
         .collect();
     for i in (10..101).step_by(10) {
-        let y = found.motion.displacement[i];
-        let count = motions.len() as f64;
-        let mean = motions.iter().map(|m| m[i]).sum::<f64>() / count;
-        let spread = (motions.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let y = found.response.displacement[i];
+        let count = responses.len() as f64;
+        let mean = responses.iter().map(|m| m[i]).sum::<f64>() / count;
+        let spread = (responses.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
         let half = 0.5 * (band[i][1] - band[i][0]);
         let ratio = half / (1.96 * spread);
         println!(
@@ -107,9 +107,9 @@ fn devices_that_fit_alike_predict_apart() {
             crate::problems::bound(&mut problem, "positive", j, [0.05, f64::INFINITY]);
         }
     }
-    let device = common::paper_device(nodes);
-    let [c, k] = [0, 1].map(|j| &device.coefficients[j][..]);
-    let truth = [&device.mass[..], c, k].concat();
+    let nodal = common::paper_system(nodes);
+    let [c, k] = [0, 1].map(|j| &nodal.coefficients[j][..]);
+    let truth = [&nodal.mass[..], c, k].concat();
     let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
     let level = Level {
         budgets: (0..3).map(|f| (rows(f), 1e-3)).collect(),
@@ -144,10 +144,10 @@ fn devices_that_fit_alike_predict_apart() {
         );
         let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
         let worst = found.worst.unwrap();
-        let motion = &found.motion.displacement;
+        let response = &found.response.displacement;
         let inside = worst
             .iter()
-            .zip(motion)
+            .zip(response)
             .all(|(w, y)| w[0] <= *y && *y <= w[1]);
         assert!(inside && found.band.is_none());
         found.furthest.unwrap().1

@@ -1,6 +1,6 @@
 use crate::problems::knots;
 use crate::problems::{
-    Record, bound, constants, device, linear, problem, readings, regular, scalar, system,
+    Record, bound, constants, linear, nodal, problem, regular, samples, scalar, system,
 };
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
@@ -87,7 +87,7 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
     let truth = [1.0, 0.1, 2.0];
-    let values = readings(&system, &device(201, truth), Some(&excitation), 4, 0.05, 2);
+    let values = samples(&system, &nodal(201, truth), Some(&excitation), 4, 0.05, 2);
     let record = Record {
         sensor: Sensor {
             gain: Value::Sought(0),
@@ -123,7 +123,7 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
 #[test]
 fn the_mass_of_a_free_motion_is_flat() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let values = samples(&system, &nodal(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 3", 0, [0.5, 3.0]);
@@ -146,7 +146,7 @@ fn the_mass_of_a_free_motion_is_flat() {
 #[test]
 fn a_damping_near_its_bound_is_one_sided() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
+    let values = samples(&system, &nodal(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
     let list = constants(101, [None, Some(0.02), Some(2.0)], [1.0, 0.0, 0.0]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "damping >= 0", 0, [0.0, f64::INFINITY]);
@@ -163,7 +163,7 @@ fn a_damping_near_its_bound_is_one_sided() {
 #[test]
 fn a_rise_that_another_bound_makes_is_called_so() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let values = samples(&system, &nodal(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 5", 0, [0.5, 5.0]);
@@ -209,8 +209,8 @@ fn a_better_optimum_on_the_way_is_reported() {
 fn a_nodal_function_has_a_profile() {
     let sigma = 0.02;
     let system = crate::common::system(101, Method::Rk4);
-    let device = crate::common::paper_device(101);
-    let values = crate::common::noisy(&system, &device, sigma, 5);
+    let nodal = crate::common::paper_system(101);
+    let values = crate::common::noisy(&system, &nodal, sigma, 5);
     let mut list = constants(101, [None; 3], [1.0, 0.0, 1.0]);
     list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(system, list, values, Some(sigma));
@@ -223,7 +223,7 @@ fn a_nodal_function_has_a_profile() {
     let found = profile(&problem, &best.best.parameters, &q, &how).unwrap();
     println!("{} ({} fits)", found.sentence(), found.values.len());
     let [low, high] = found.interval.map(Option::unwrap);
-    let truth = device.mass[50];
+    let truth = nodal.mass[50];
     assert!(low < truth && truth < high, "{low} {truth} {high}");
     for end in [low, high] {
         let i = found.values.iter().position(|v| *v == end).unwrap();
@@ -252,7 +252,7 @@ fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
     let covariance = problem
         .covariance(&problem.evaluate(&best).unwrap())
         .unwrap();
-    let (n, p) = (problem.reading_count() as f64, 3.0);
+    let (n, p) = (problem.sample_count() as f64, 3.0);
     let q = Linear::scalar(&problem, 1);
     let half = ((QUANTILE_95 / n).exp_m1() * (n - p)).sqrt() * q.deviation(&covariance);
     let found = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
@@ -286,9 +286,9 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let misfit = problem.evaluate(&best).unwrap().misfit;
     let q = Linear::mean(&problem, 2);
     let at = Linear::value(&problem, 2, 4.0).unwrap();
-    let (device, theta) = (problem.functions.device(&best), &best);
+    let (nodal, theta) = (problem.functions.nodal(&best), &best);
     let node = (4.0 / problem.system.grid.step()).round() as usize;
-    assert!((at.of(theta) - device.coefficients[1][node]).abs() < 1e-12);
+    assert!((at.of(theta) - nodal.coefficients[1][node]).abs() < 1e-12);
     assert!(Linear::value(&problem, 2, 10.1).is_none());
     let list = [q, at];
     let how = ProfileSettings::default();

@@ -1,4 +1,4 @@
-use crate::common::{INITIAL, csv, paper_device, paper_problem, shared};
+use crate::common::{INITIAL, csv, paper_problem, paper_system, shared};
 use crate::problems::{linear, regular};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{Basis, Penalty};
@@ -130,11 +130,11 @@ fn positive() -> Problem {
 #[test]
 fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
-    let device = paper_device(NODES);
+    let nodal = paper_system(NODES);
     let truth = [
-        &device.mass[..],
-        &device.coefficients[0],
-        &device.coefficients[1],
+        &nodal.mass[..],
+        &nodal.coefficients[0],
+        &nodal.coefficients[1],
     ]
     .concat();
     let level = Level {
@@ -229,11 +229,11 @@ fn roughness_budgets_bound_the_tubes() {
     let mut problem = positive();
     let k0 = problem.functions.ranges()[2].start;
     crate::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);
-    let device = paper_device(NODES);
+    let nodal = paper_system(NODES);
     let truth = [
-        &device.mass[..],
-        &device.coefficients[0],
-        &device.coefficients[1],
+        &nodal.mass[..],
+        &nodal.coefficients[0],
+        &nodal.coefficients[1],
     ]
     .concat();
     let grid = problem.system.grid;
@@ -253,7 +253,7 @@ fn roughness_budgets_bound_the_tubes() {
             ends.map(|e| (e.value, e.ended, e.programs)),
             clock.elapsed().as_secs_f64()
         );
-        let exact = device.mass[(15.0 / grid.step()) as usize];
+        let exact = nodal.mass[(15.0 / grid.step()) as usize];
         assert!(band.low.value < exact && exact < band.high.value);
         for end in ends {
             assert!(end.misfit <= 0.0114);

@@ -41,7 +41,7 @@ fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
 
 /// The power of two nearest to `sqrt(k/m)`, by the largest values at the start.
 fn balance(all: &All<'_>, m: usize, k: usize) -> f64 {
-    let start = all.functions.device(&all.functions.start());
+    let start = all.functions.nodal(&all.functions.start());
     let sizes: Vec<f64> = (start.functions())
         .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
         .collect();

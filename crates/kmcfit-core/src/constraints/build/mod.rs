@@ -215,9 +215,9 @@ impl Statement {
         &self,
         grid: &Grid,
         functions: &Parameterization,
-        device: usize,
+        set: usize,
     ) -> Result<Constraints, Impossible> {
-        let all = All::new(grid, functions, device);
+        let all = All::new(grid, functions, set);
         let about = self.functions();
         let indices: Vec<usize> = (about.iter())
             .map(|q| all.index(*q))
@@ -272,12 +272,12 @@ struct All<'a> {
 }
 
 impl<'a> All<'a> {
-    fn new(grid: &'a Grid, functions: &'a Parameterization, device: usize) -> Self {
+    fn new(grid: &'a Grid, functions: &'a Parameterization, set: usize) -> Self {
         Self {
             grid,
             functions,
             list: functions.iter().collect(),
-            assembly: functions.assembly(device),
+            assembly: functions.coefficient_set(set),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::system::{Method, TimePoint};
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
     let nodes = problem.functions.nodes();
     let mut last = None;
-    for (kind, place) in readings(problem).map(|(_, kind, place)| (kind, place)) {
+    for (kind, place) in samples(problem).map(|(_, kind, place)| (kind, place)) {
         last = last.max(last_acting(problem, kind, place));
     }
     (0..nodes).map(|i| last.is_some_and(|l| i <= l)).collect()
@@ -26,7 +26,7 @@ pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint
     }
 }
 
-fn readings(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimePoint)> + '_ {
+fn samples(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimePoint)> + '_ {
     let experiments = problem.experiments.iter().enumerate();
     experiments.flat_map(|(e, experiment)| {
         let channels = experiment.channels.iter();

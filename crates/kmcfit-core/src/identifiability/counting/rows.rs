@@ -23,7 +23,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
         for channel in &experiment.channels {
             if !superposes(problem, experiment, channel) {
                 // A reading of a known initial state says nothing of the parameters.
-                let known = experiment.sought == [None; 2]
+                let known = experiment.initial_parameters == [None; 2]
                     && channel.sensor().indices() == [None; 3]
                     && channel.filter().is_empty();
                 let acts = |p: &&TimePoint| last_acting(problem, channel.kind(), **p).is_some();
@@ -39,7 +39,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
                     None => (place.step, place.fraction),
                 };
                 let key = (
-                    experiment.device,
+                    experiment.coefficient_set,
                     channel.kind(),
                     node,
                     f64::to_bits(fraction),
@@ -69,7 +69,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
         total += rank;
     }
     let combinations = dependent.then(|| Statement {
-        sentence: "some records are combinations of others where no force tells them apart: the motion is linear in \
+        sentence: "some records are combinations of others where no force tells them apart: the response is linear in \
                    its initial state and force, so only two free records count"
             .to_owned(),
         is_open: true,
@@ -84,7 +84,7 @@ fn superposes(
     channel: &crate::record::Channel,
 ) -> bool {
     problem.system.terms.iter().all(|t| t.is_linear())
-        && experiment.sought == [None; 2]
+        && experiment.initial_parameters == [None; 2]
         && channel.sensor().indices() == [None; 3]
         && channel.filter().is_empty()
 }
@@ -137,7 +137,7 @@ impl Inputs {
             base.is_none_or(|b| b.is_zero())
         };
         let nodal = records.iter().all(|r| {
-            let assembly = problem.functions.assembly(r.device).iter();
+            let assembly = problem.functions.coefficient_set(r.coefficient_set).iter();
             let mut functions = assembly.map(|f| problem.functions.get(*f));
             functions.all(|f| f.parameters() == 0 || f.basis == Some(Basis::Nodal))
         });

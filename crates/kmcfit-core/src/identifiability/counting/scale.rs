@@ -84,7 +84,7 @@ impl Scale {
         if by_records == Symmetry::None {
             let given: Vec<String> = component.given(problem).map(|f| f.name()).collect();
             let why = match (self.free_functions, given.as_slice()) {
-                (0, _) => "fixed: nothing of it is sought".to_owned(),
+                (0, _) => "fixed: nothing of it is estimated".to_owned(),
                 (_, []) => "fixed: a force acts".to_owned(),
                 (_, given) => format!("that of {}", given_words(given)),
             };
@@ -116,7 +116,7 @@ impl Scale {
         };
         let sentence = match left {
             Symmetry::None => format!(
-                "the readings leave the scale of {symbols} free {where_free}; {} it",
+                "the samples leave the scale of {symbols} free {where_free}; {} it",
                 match (reference, held, smooth.is_some()) {
                     (true, ..) => "a reference holds",
                     (_, true, true) => "a value or mean and smoothness hold",

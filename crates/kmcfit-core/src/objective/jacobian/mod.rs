@@ -19,7 +19,7 @@ impl Problem {
     /// The change of every prediction (rows: readings of all channels of all experiments, in order)
     /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
         self.each_piece(evaluation, &order, |piece| {
             for (place, j) in order.iter().enumerate().take(piece.begun()) {
@@ -39,7 +39,7 @@ impl Problem {
     /// One direction after the other: for numbers at the ends of their range, where the order of the
     /// operations decides what is still finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let mut unit = vec![0.0; self.parameters()];
         for (j, mut column) in jacobian.column_iter_mut().enumerate() {
             unit[j] = 1.0;
@@ -83,12 +83,12 @@ impl Problem {
     ) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
-            if experiment.reading_count() > 0 && !order.is_empty() {
+            if experiment.sample_count() > 0 && !order.is_empty() {
                 let view = self.view(evaluation, e);
                 let all = 0..experiment.nodes - 1;
                 sweep(self, experiment, view, order, row, all, &mut take);
             }
-            row += experiment.reading_count();
+            row += experiment.sample_count();
         }
     }
 
@@ -163,9 +163,9 @@ fn sweep(
     };
     let course = BaseTrajectory {
         system: view.system,
-        device: view.device,
+        nodal: view.nodal,
         excitation: view.excitation,
-        motion: view.motion,
+        response: view.response,
     };
     let mut from = steps.start;
     let mut last = 0;
@@ -250,20 +250,21 @@ mod tests {
             function(CoefficientKind::Stiffness, 20, 2.0),
             function(CoefficientKind::Stiffness, 20, 3.0),
         ];
-        let devices = vec![vec![0, 1, 2], vec![0, 1, 3]];
-        let functions = Parameterization::with_devices(list, devices, NODES, grid.step());
+        let coefficient_sets = vec![vec![0, 1, 2], vec![0, 1, 3]];
+        let functions =
+            Parameterization::with_coefficient_sets(list, coefficient_sets, NODES, grid.step());
         let force: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin()).collect();
-        let record = |device: usize, nodes: usize| {
+        let record = |coefficient_set: usize, nodes: usize| {
             let channel = |kind, at: Vec<usize>| {
                 let times: Vec<f64> = at.iter().map(|i| grid.time(*i)).collect();
                 let values = times.iter().map(|t| (2.0 * t).cos()).collect();
                 let weighting = Weighting::Sigma(0.1);
-                Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+                Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
             };
             let accelerations = (0..count.min(nodes)).collect();
             let thirds = (0..nodes).step_by(3).collect();
             Experiment {
-                device,
+                coefficient_set,
                 ..Experiment::free("driven", State::default(), nodes)
                     .with_excitation(Excitation::force_at_nodes(&force))
                     .with_channel(channel(ChannelKind::Acceleration, accelerations))

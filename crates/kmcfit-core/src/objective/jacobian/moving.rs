@@ -33,9 +33,9 @@ impl<'a> Moving<'a> {
             places[*j] = place;
         }
         let scalars = functions.scalar_range().start;
-        let sought = experiment.sought.into_iter().enumerate();
-        let seeds = sought.filter_map(|(state, index)| Some((state, places[scalars + index?])));
-        let assembly = functions.assembly(experiment.device);
+        let estimated = experiment.initial_parameters.into_iter().enumerate();
+        let seeds = estimated.filter_map(|(state, index)| Some((state, places[scalars + index?])));
+        let assembly = functions.coefficient_set(experiment.coefficient_set);
         let slot_of = |function: usize, j: usize| Slot {
             group: places[j] / LANES,
             function,

@@ -98,7 +98,7 @@ impl<'a> Reader<'a> {
         let most = most.min(LANES).min(self.channel.len() - self.next);
         if self.channel.is_on_every_node() && self.kind != Kind::Any {
             // The last node of the motion belongs to its last step.
-            let last = steps.end + 1 == self.view.motion.nodes();
+            let last = steps.end + 1 == self.view.response.nodes();
             let end = steps.end + usize::from(last);
             glance.count = most.min(end.saturating_sub(self.next));
             let from = self.next.saturating_sub(steps.start);

@@ -75,9 +75,9 @@ pub(crate) struct Tangents {
 #[derive(Clone, Copy)]
 pub(crate) struct BaseTrajectory<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
-    pub motion: &'a Trajectory,
+    pub response: &'a Trajectory,
 }
 
 impl Tangents {
@@ -160,14 +160,14 @@ impl Tangents {
     pub fn advance(&mut self, course: BaseTrajectory, steps: Range<usize>) {
         let BaseTrajectory {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
+            response,
         } = course;
         simd::run(Advance {
-            equation: EquationOfMotion::new(system, device, excitation, motion.nodes()),
+            equation: EquationOfMotion::new(system, nodal, excitation, response.nodes()),
             method: system.method,
-            motion,
+            response,
             steps,
             tangents: self,
         });
@@ -177,7 +177,7 @@ impl Tangents {
 struct Advance<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
-    motion: &'a Trajectory,
+    response: &'a Trajectory,
     steps: Range<usize>,
     tangents: &'a mut Tangents,
 }
@@ -208,7 +208,7 @@ impl Kernel for Advance<'_> {
                 arithmetic,
                 self.method,
                 &self.equation,
-                self.motion,
+                self.response,
                 first + from,
                 &wanted,
                 &mut tangents.maps,

@@ -16,10 +16,10 @@ pub(crate) fn gradient(
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
-    let gradient = CoefficientGradient::AtNodes(&mut device);
+    let mut nodal = NodalCoefficients::zeros(equation.nodal.mass.len(), equation.terms.len());
+    let gradient = CoefficientGradient::AtNodes(&mut nodal);
     let initial = back(equation, method, trajectory, source, gradient);
-    SystemTangent { device, initial }
+    SystemTangent { nodal, initial }
 }
 
 /// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
@@ -95,10 +95,10 @@ impl Kernel for Back<'_> {
             ];
             for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
                 match &mut gradient {
-                    CoefficientGradient::AtNodes(device) => {
+                    CoefficientGradient::AtNodes(nodal) => {
                         let left = share(arithmetic, &maps.left[f], ends);
                         let right = share(arithmetic, &maps.right[f], ends);
-                        let values = &mut device.function_mut(f)[from..];
+                        let values = &mut nodal.function_mut(f)[from..];
                         set(arithmetic, left, right, to - from, values);
                     }
                     CoefficientGradient::Summed(_) => {

@@ -72,7 +72,7 @@ pub(super) fn linearise<A: Arithmetic>(
     arithmetic: A,
     method: Method,
     equation: &EquationOfMotion,
-    motion: &Trajectory,
+    response: &Trajectory,
     i: usize,
     wanted: &Wanted,
     maps: &mut StepLinearisation,
@@ -81,13 +81,13 @@ pub(super) fn linearise<A: Arithmetic>(
     with_known!(terms, terms, TERMS => match method {
         Method::Midpoint => {
             let stages = StageDerivatives::<A, 2, TERMS>::new(
-                arithmetic, &MIDPOINT, terms, equation, motion, i,
+                arithmetic, &MIDPOINT, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &MIDPOINT, terms.len(), equation.dt, wanted, maps);
         }
         Method::Rk4 => {
             let stages = StageDerivatives::<A, 4, TERMS>::new(
-                arithmetic, &RK4, terms, equation, motion, i,
+                arithmetic, &RK4, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &RK4, terms.len(), equation.dt, wanted, maps);
         }
@@ -113,21 +113,21 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: &[Term],
         equation: &EquationOfMotion,
-        motion: &Trajectory,
+        response: &Trajectory,
         i: usize,
     ) -> Self {
         let zero = Eight::splat(arithmetic, 0.0);
-        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.device.mass, i));
+        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.nodal.mass, i));
         let input = equation.excitation;
         let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
         let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);
         let mut functions = [Places([zero; 3]); TERMS];
-        let coefficients = equation.device.coefficients.iter().take(terms.len());
+        let coefficients = equation.nodal.coefficients.iter().take(terms.len());
         for (places, values) in functions.iter_mut().zip(coefficients) {
             *places = Places::of(arithmetic, values, i);
         }
-        let y0 = padded_loads::eight(arithmetic, &motion.displacement, i);
-        let v0 = padded_loads::eight(arithmetic, &motion.velocity, i);
+        let y0 = padded_loads::eight(arithmetic, &response.displacement, i);
+        let v0 = padded_loads::eight(arithmetic, &response.velocity, i);
         let [mut v, mut a] = [[zero; S]; 2];
         let mut stages = Self {
             by_y: [zero; S],

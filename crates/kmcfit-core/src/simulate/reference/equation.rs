@@ -6,7 +6,7 @@ use crate::system::{Excitation, NodalCoefficients, Position, System, Tableau, Te
 #[derive(Clone, Copy)]
 pub(crate) struct EquationOfMotion<'a> {
     pub terms: &'a [Term],
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub dt: f64,
 }
@@ -30,18 +30,18 @@ impl<'a> EquationOfMotion<'a> {
     /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
     pub fn new(
         system: &'a System,
-        device: &'a NodalCoefficients,
+        nodal: &'a NodalCoefficients,
         excitation: Option<&'a Excitation>,
         nodes: usize,
     ) -> Self {
         let System { grid, terms, .. } = system;
         assert_eq!(
-            device.coefficients.len(),
+            nodal.coefficients.len(),
             terms.len(),
             "one function per term"
         );
         assert!(
-            device.functions().all(|f| f.len() == grid.nodes()),
+            nodal.functions().all(|f| f.len() == grid.nodes()),
             "functions on the nodes"
         );
         assert!(
@@ -54,7 +54,7 @@ impl<'a> EquationOfMotion<'a> {
         );
         Self {
             terms,
-            device,
+            nodal,
             excitation,
             dt: grid.step(),
         }
@@ -66,10 +66,10 @@ impl<'a> EquationOfMotion<'a> {
     /// these are the paper's operations in the paper's order, and its run depends on every bit.
     #[inline(always)]
     pub fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
-        let mass = position.of(&self.device.mass, i);
+        let mass = position.of(&self.nodal.mass, i);
         let force = self.excitation.and_then(|e| e.force.as_ref());
         let mut a = force.map_or(0.0, |f| f.at(i, position) / mass);
-        for (term, p) in self.terms.iter().zip(&self.device.coefficients).rev() {
+        for (term, p) in self.terms.iter().zip(&self.nodal.coefficients).rev() {
             a -= position.of(p, i) * term.phi(y, v) / mass;
         }
         match self.excitation.and_then(|e| e.base.as_ref()) {
@@ -90,9 +90,9 @@ impl<'a> EquationOfMotion<'a> {
     /// Mass and partial derivatives of [`EquationOfMotion::acceleration`].
     #[inline(always)]
     pub fn partials(&self, i: usize, position: Position, y: f64, v: f64) -> Partials {
-        let mass = position.of(&self.device.mass, i);
+        let mass = position.of(&self.nodal.mass, i);
         let (mut da_dy, mut da_dv) = (0.0, 0.0);
-        for (term, p) in self.terms.iter().zip(&self.device.coefficients) {
+        for (term, p) in self.terms.iter().zip(&self.nodal.coefficients) {
             let (phi_y, phi_v) = term.partials(y, v);
             let p = position.of(p, i);
             da_dy -= p * phi_y / mass;

@@ -63,7 +63,7 @@ impl Observation {
 pub fn observe(
     system: &System,
     kind: ChannelKind,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
     place: TimePoint,
@@ -71,7 +71,7 @@ pub fn observe(
 ) -> Observation {
     let equation = EquationOfMotion {
         terms: &system.terms,
-        device,
+        nodal,
         excitation,
         dt: system.grid.step(),
     };
@@ -160,14 +160,14 @@ fn acceleration(
         1.0 => f[i + 1],
         x => f[i] * (1.0 - x) + f[i + 1] * x,
     };
-    let mass = blend(&equation.device.mass);
+    let mass = blend(&equation.nodal.mass);
     let mut inertia = around.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
     for (j, (term, p)) in equation
         .terms
         .iter()
-        .zip(&equation.device.coefficients)
+        .zip(&equation.nodal.coefficients)
         .enumerate()
         .rev()
     {

@@ -34,11 +34,11 @@ enum Seed {
 /// All steps linearised about the node states `states`, which need not be a response.
 pub fn step_jacobians(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
 ) -> Vec<StepJacobian> {
-    let equation = EquationOfMotion::new(system, device, excitation, states.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, states.nodes());
     let steps = 0..states.nodes() - 1;
     match system.method {
         Method::Midpoint => steps

@@ -110,13 +110,13 @@ fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> 
 /// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
 /// variables are the change of the parameters; with many of them the changes of the states follow,
 /// tied to them by equalities.
-pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    readings(problem, evaluation, None, &mut Timings::default())
+pub(crate) fn linear_predictions(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    samples(problem, evaluation, None, &mut Timings::default())
 }
 
 /// [`linear_readings`], from the `known` ones if they are computed already, and the time that tangents and linear algebra
 /// took.
-fn readings(
+fn samples(
     problem: &Problem,
     evaluation: &Evaluation,
     known: Option<&Reduced>,
@@ -150,12 +150,12 @@ pub(super) fn linearise(
     linearization: &Linearization,
     timings: &mut Timings,
 ) -> (Subproblem, usize) {
-    let mut sub = readings(problem, evaluation, linearization.reduced(), timings);
-    let readings = sub.residuals.len();
+    let mut sub = samples(problem, evaluation, linearization.reduced(), timings);
+    let samples = sub.residuals.len();
     timed(&mut timings.linear_algebra, || {
         add_the_rest(problem, parameters, evaluation, &mut sub);
     });
-    (sub, readings)
+    (sub, samples)
 }
 
 /// The subproblem in parameters and states about any states, also of no response.

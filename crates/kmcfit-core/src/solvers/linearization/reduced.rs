@@ -27,7 +27,7 @@ impl Reduced {
     /// Whether a problem's Jacobian can be reduced piece by piece as it comes ([`Problem::each_piece`]), and
     /// is worth it.
     pub fn comes_in_pieces(problem: &Problem) -> bool {
-        problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
+        problem.comes_in_pieces() && problem.sample_count() > problem.parameters()
     }
 
     /// At an evaluated point, in one pass.

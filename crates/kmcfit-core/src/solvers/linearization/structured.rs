@@ -17,7 +17,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        step_jacobians(view.system, view.device, view.excitation, view.motion)
+        step_jacobians(view.system, view.nodal, view.excitation, view.response)
     });
     each.collect()
 }
@@ -50,9 +50,9 @@ pub fn subproblem(
             experiment,
             base,
         };
-        columns.add_steps(steps, view.motion, &mut sub.equalities);
+        columns.add_steps(steps, view.response, &mut sub.equalities);
         for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
-            columns.add_readings(channel, predicted, view, &mut sub);
+            columns.add_samples(channel, predicted, view, &mut sub);
         }
         base += 2 * (experiment.nodes - 1);
     }
@@ -71,7 +71,7 @@ impl Columns<'_> {
     /// first state that is known.
     fn state(&self, i: usize, q: usize) -> Option<usize> {
         match i {
-            0 => Some(self.scalar(self.experiment.sought[q]?)),
+            0 => Some(self.scalar(self.experiment.initial_parameters[q]?)),
             _ => Some(self.base + 2 * (i - 1) + q),
         }
     }
@@ -111,7 +111,7 @@ impl Columns<'_> {
     ) {
         let functions = &self.problem.functions;
         for (place, &f) in functions
-            .assembly(self.experiment.device)
+            .coefficient_set(self.experiment.coefficient_set)
             .iter()
             .enumerate()
         {
@@ -126,7 +126,7 @@ impl Columns<'_> {
         }
     }
 
-    fn add_readings(
+    fn add_samples(
         &self,
         channel: &Channel,
         predicted: &[f64],

@@ -57,13 +57,13 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let channel = |kind, times: Vec<f64>| {
         let values = times.iter().map(read).collect();
         let weighting = Weighting::Sigma(0.1);
-        Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+        Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
     };
     let sevenths = times.iter().step_by(7).copied().collect();
     let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
     let between = between.filter(|t| *t < grid.duration()).collect();
     let record = Experiment {
-        sought: [None, Some(0)],
+        initial_parameters: [None, Some(0)],
         ..Experiment::free("driven", State::default(), nodes)
             .with_excitation(Excitation::force_at_nodes(&force))
             .with_channel(channel(ChannelKind::Displacement, sevenths))
@@ -112,9 +112,9 @@ fn halves_of_a_long_record() {
 fn after_short_steps_the_jacobian_stays() {
     let mut problem = long_problem(None);
     let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
-    let motion = problem.evaluate(&truth).expect("a motion");
+    let response = problem.evaluate(&truth).expect("a motion");
     let channels = problem.parts_mut().experiments[0].channels.iter_mut();
-    for (channel, predicted) in channels.zip(&motion.predictions[0]) {
+    for (channel, predicted) in channels.zip(&response.predictions[0]) {
         let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
         *channel = channel.clone().with_simulated(predicted, &noise);
     }
@@ -198,10 +198,10 @@ fn a_long_record_on_two_threads() {
 fn a_long_record_by_the_continuous_gradient() {
     let mut problem = long_problem(None);
     let grid = problem.system.grid;
-    let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
+    let samples = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     problem.parts_mut().experiments[0].channels = vec![channel];
     assert!(problem.supports_continuous() && halfway(&problem).is_some());
     let mut settings = FitSettings {

@@ -13,7 +13,7 @@ use crate::qp::Subproblem;
 use crate::record::Channel;
 use crate::simulate::Trajectory;
 use crate::solvers::linearization::linearise_about;
-use crate::solvers::methods::equation_error::{from_motions, with_initial_states};
+use crate::solvers::methods::equation_error::{from_kinematics, with_initial_states};
 use crate::solvers::state_estimation::{Kinematics, by_spline};
 use crate::system::State;
 
@@ -39,11 +39,11 @@ pub(in crate::solvers) fn collocation_start(
     interrupted: &dyn Fn() -> bool,
 ) -> Option<Vec<f64>> {
     let scalars = problem.scalars(start);
-    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+    let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|e| by_spline(problem, e, scalars).map(|(near, _)| near))
         .collect();
-    let mut theta = from_motions(problem, start, &motions)
-        .unwrap_or_else(|_| with_initial_states(problem, start, &motions));
+    let mut theta = from_kinematics(problem, start, &kinematics)
+        .unwrap_or_else(|_| with_initial_states(problem, start, &kinematics));
     let first = first_states(problem, &theta)?;
     let mut states = first.clone();
     let mut evaluation = problem.workspace();
@@ -65,7 +65,7 @@ pub(in crate::solvers) fn collocation_start(
         theta = moved;
         anchored = anchored && round < ANCHORED && change > NEAR;
         match anchored {
-            true => states = motion_of_readings(problem, &theta, &first)?,
+            true => states = response_of_samples(problem, &theta, &first)?,
             false => correct(problem, &theta, &z, &mut states),
         }
         if let Ok(free) = problem.evaluate(&theta)
@@ -89,8 +89,8 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
         .iter()
         .enumerate()
         .map(|(e, experiment)| {
-            let mut motion = match by_spline(problem, experiment, scalars) {
-                Some((_, motion)) => motion,
+            let mut response = match by_spline(problem, experiment, scalars) {
+                Some((_, response)) => response,
                 None => {
                     if own.is_none() {
                         own = problem.evaluate(theta).ok();
@@ -98,14 +98,14 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
                     own.as_ref()?.trajectories[e].clone()
                 }
             };
-            begin(experiment.initial_state(scalars), &mut motion);
-            Some(motion)
+            begin(experiment.initial_state(scalars), &mut response);
+            Some(response)
         });
     each.collect()
 }
 
 /// [`first_states`] as sensors and initial states are now seen; `first` as they were seen at first.
-fn motion_of_readings(
+fn response_of_samples(
     problem: &Problem,
     theta: &[f64],
     first: &[Trajectory],
@@ -115,15 +115,15 @@ fn motion_of_readings(
         return first_states(problem, theta);
     }
     let mut states = first.to_vec();
-    for (experiment, motion) in problem.experiments.iter().zip(&mut states) {
-        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    for (experiment, response) in problem.experiments.iter().zip(&mut states) {
+        begin(experiment.initial_state(problem.scalars(theta)), response);
     }
     Some(states)
 }
 
-fn begin(initial: State, motion: &mut Trajectory) {
-    motion.displacement[0] = initial.displacement;
-    motion.velocity[0] = initial.velocity;
+fn begin(initial: State, response: &mut Trajectory) {
+    response.displacement[0] = initial.displacement;
+    response.velocity[0] = initial.velocity;
 }
 
 /// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
@@ -147,8 +147,8 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
 
 /// Whether every device has a mass that an equation of motion can be solved for.
 fn has_mass(evaluation: &Evaluation) -> bool {
-    let mut devices = std::iter::once(&evaluation.device).chain(&evaluation.own_devices);
-    devices.all(|device| device.mass.iter().all(|m| *m > 0.0))
+    let mut nodal_sets = std::iter::once(&evaluation.nodal).chain(&evaluation.own_nodal);
+    nodal_sets.all(|nodal| nodal.mass.iter().all(|m| *m > 0.0))
 }
 
 fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
@@ -172,12 +172,12 @@ fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
 /// Adds the changes of the states, which follow the parameters in `z`.
 fn correct(problem: &Problem, theta: &[f64], z: &[f64], states: &mut [Trajectory]) {
     let mut changes = z[theta.len()..].chunks_exact(2);
-    for (experiment, motion) in problem.experiments.iter().zip(states) {
+    for (experiment, response) in problem.experiments.iter().zip(states) {
         for i in 1..experiment.nodes {
             let Some(change) = changes.next() else { return };
-            motion.displacement[i] += change[0];
-            motion.velocity[i] += change[1];
+            response.displacement[i] += change[0];
+            response.velocity[i] += change[1];
         }
-        begin(experiment.initial_state(problem.scalars(theta)), motion);
+        begin(experiment.initial_state(problem.scalars(theta)), response);
     }
 }

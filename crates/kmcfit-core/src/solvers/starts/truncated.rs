@@ -42,11 +42,11 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
         && problem.comes_in_pieces()
         && problem.functions.iter().all(is_constant)
         && parameters > 0;
-    let has_readings = |steps: &usize| {
+    let has_samples = |steps: &usize| {
         let count: usize = problem.channels().map(|c| c.count_within(*steps)).sum();
         count >= READINGS * parameters
     };
-    (STEPS.into_iter().find(has_readings)).filter(|_| suits)
+    (STEPS.into_iter().find(has_samples)).filter(|_| suits)
 }
 
 /// The first steps of a problem's records, with the same parameters.
@@ -55,15 +55,20 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let grid = Grid::new(grid.start(), grid.step() * steps as f64, steps + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
-    let devices = functions.assemblies().to_vec();
+    let coefficient_sets = functions.coefficient_sets().to_vec();
     let system = System {
         grid,
         ..problem.system.clone()
     };
     let mut part = Problem::new(
         system,
-        Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
-            .with_scalars(functions.scalars().to_vec()),
+        Parameterization::with_coefficient_sets(
+            list?,
+            coefficient_sets,
+            grid.nodes(),
+            grid.step(),
+        )?
+        .with_scalars(functions.scalars().to_vec()),
         problem
             .experiments
             .iter()
@@ -107,11 +112,11 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     Experiment {
         name: experiment.name.clone(),
         initial: experiment.initial,
-        sought: experiment.sought,
+        initial_parameters: experiment.initial_parameters,
         excitation,
         drive: Input::default(),
         nodes: experiment.nodes.min(steps + 1),
-        device: experiment.device,
+        coefficient_set: experiment.coefficient_set,
         channels: channels.filter_map(|c| c.within(steps)).collect(),
     }
 }

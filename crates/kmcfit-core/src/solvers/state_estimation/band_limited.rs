@@ -60,8 +60,8 @@ impl Band {
         let mut frequency = PI * crossings as f64 / (n as f64 * spacing);
         for _ in 0..ROUNDS {
             let band = Self { frequency, spacing }.oscillating()?;
-            let motion = band.motions(&[accelerations])?.pop()?;
-            frequency = rms(&motion.v) / rms(&motion.y);
+            let response = band.responses(&[accelerations])?.pop()?;
+            frequency = rms(&response.v) / rms(&response.y);
         }
         Self { frequency, spacing }.oscillating()
     }
@@ -77,7 +77,7 @@ impl Band {
 
     /// Each series, without its mean, through the filter, and its integrals; `None` if they cannot
     /// be computed.
-    pub fn motions(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
+    pub fn responses(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
         let n = series.first()?.len();
         let h = self.spacing;
         let mut sub = Subproblem::new(n);
@@ -154,17 +154,17 @@ mod tests {
             "{}",
             band.frequency
         );
-        let motion = band.motions(&[&acceleration]).unwrap().pop().unwrap();
+        let response = band.responses(&[&acceleration]).unwrap().pop().unwrap();
         // Of the filter with differences for derivatives, which all three have passed.
         let square = (2.0 / h * (0.5 * w * h).sin()).powi(2);
-        let response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
+        let filter_response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
         for i in 1900..2100 {
             let t = h * (i + 1) as f64;
             let (sine, cosine) = (w * t).sin_cos();
             for (found, expected) in [
-                (motion.a[i], response * sine),
-                (motion.v[i] * w, -response * cosine),
-                (motion.y[i] * w * w, -response * sine),
+                (response.a[i], filter_response * sine),
+                (response.v[i] * w, -filter_response * cosine),
+                (response.y[i] * w * w, -filter_response * sine),
             ] {
                 // (w h)^4/240 = 5e-6.
                 assert!((found - expected).abs() < 2e-5, "{i}: {found} {expected}");

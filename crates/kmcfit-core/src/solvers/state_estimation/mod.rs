@@ -33,7 +33,7 @@ pub(super) struct Kinematics {
 
 /// The states at the beginning of each experiment as its readings suggest them; `None` where they are
 /// too few or begin later.
-pub fn states_from_readings(problem: &Problem) -> Vec<Option<State>> {
+pub fn estimate_states(problem: &Problem) -> Vec<Option<State>> {
     let start = problem.start();
     let scalars = problem.scalars(&start);
     (problem.experiments.iter())
@@ -72,10 +72,10 @@ pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
     let [gain, offset, drift] = channel.sensor().values(scalars);
     let gain = if gain == 0.0 { 1.0 } else { gain };
     let filtered = !channel.filter().is_empty();
-    let plain = |(i, reading): (usize, &f64)| match filtered {
+    let plain = |(i, sample): (usize, &f64)| match filtered {
         // The filter has taken the offset.
-        true => reading / gain,
-        false => (reading - offset - drift * channel.age(i)) / gain - channel.base_at(i),
+        true => sample / gain,
+        false => (sample - offset - drift * channel.age(i)) / gain - channel.base_at(i),
     };
     let values = channel.observed().iter().enumerate().map(plain);
     (values.collect(), gain)

@@ -52,7 +52,7 @@ pub fn kinematics(
 ) -> Option<(Kinematics, Trajectory)> {
     let grid = &problem.system.grid;
     let nodes = experiment.nodes;
-    if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
+    if nodes < 2 * POINTS || experiment.sample_count() < 2 * POINTS {
         return None;
     }
     let channels: Vec<Plain> = (experiment.channels.iter())
@@ -75,7 +75,7 @@ pub fn kinematics(
         })
     };
     let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
-    let near = near_readings(&channels, nodes, grid.start(), step, settling);
+    let near = near_samples(&channels, nodes, grid.start(), step, settling);
     let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
     let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
     let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
@@ -97,11 +97,11 @@ pub fn kinematics(
         weight: weight_of(main.channel),
         nodes: chosen.clone(),
     })?;
-    let motion = Trajectory {
+    let response = Trajectory {
         displacement: y.clone(),
         velocity: v.clone(),
     };
-    Some((near, motion))
+    Some((near, response))
 }
 
 /// A typical weight of a channel's readings.
@@ -142,8 +142,8 @@ impl<'a> Plain<'a> {
         let times = self.channel.times();
         let (first, last) = (times.first()?, times.last()?);
         let spacing = (last - first) / times.len().checked_sub(1)? as f64;
-        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
-        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        let samples = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| samples.value(first + i as f64 * spacing));
         Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
     }
 
@@ -208,7 +208,7 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
             count += 1.0;
         }
     }
-    let readings = sub.residuals.len();
+    let samples = sub.residuals.len();
     if let Some(ridge) = ridge {
         // As many readings as there are nodes would weigh as the readings do.
         let share = (count / nodes as f64).sqrt();
@@ -218,7 +218,7 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
     }
     let misfit = |candidate: &[f64]| -> f64 {
         let fitted = sub.residuals.multiply(candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(samples);
         pairs.map(|(a, b)| (a - b) * (a - b)).sum()
     };
     let [mut low, mut high] = EXPONENTS;
@@ -272,7 +272,7 @@ fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
 }
 
 /// Which nodes have readings near by, of the channel with the most readings.
-fn near_readings(
+fn near_samples(
     channels: &[Plain],
     nodes: usize,
     start: f64,

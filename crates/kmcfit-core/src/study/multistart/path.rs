@@ -55,13 +55,13 @@ fn along_gauge(
     straight: Vec<f64>,
 ) -> Option<Vec<f64>> {
     let mut theta = straight;
-    let (one, two) = (problem.functions.device(a), problem.functions.device(b));
+    let (one, two) = (problem.functions.nodal(a), problem.functions.nodal(b));
     if one.mass.iter().chain(&two.mass).any(|m| *m <= 0.0) {
         return None;
     }
     let between = mixed(&one, &two, s);
     let grid = &problem.system.grid;
-    let assembly = problem.functions.assembly(0);
+    let assembly = problem.functions.coefficient_set(0);
     for (&f, values) in assembly.iter().zip(between.functions()) {
         let basis = problem.functions.get(f).basis.as_ref()?;
         let range = problem.functions.ranges()[f].clone();

@@ -21,7 +21,7 @@ use super::functional::Linear;
 use super::parallel::map;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
-use walk::Walk;
+use walk::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
 pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
@@ -131,13 +131,13 @@ impl Profile {
             ),
             [Some(low), None] => format!("{name} is only known to be at least {}", number(low)),
             [None, Some(high)] => format!("{name} is only known to be at most {}", number(high)),
-            [None, None] => format!("{name} is not seen by the readings"),
+            [None, None] => format!("{name} is not seen by the samples"),
         };
         for (side, end) in ["below", "above"].iter().zip(&self.ends) {
             let why = match end {
                 End::Rise => continue,
                 End::RiseBy(names) => format!(
-                    "the rise {side} is the work of {}, not of the readings alone",
+                    "the rise {side} is the work of {}, not of the samples alone",
                     names.join(" and ")
                 ),
                 End::Bound => format!("{side} it runs into its bound or limit"),
@@ -170,7 +170,7 @@ pub fn profile(
     of: &Linear,
     how: &ProfileSettings,
 ) -> Result<Profile, SimulationError> {
-    Walk::new(problem, optimum, of, how).map(Walk::run)
+    ProfileSearch::new(problem, optimum, of, how).map(ProfileSearch::run)
 }
 
 /// The profiles of several numbers, on up to `threads` threads; the same bits for any number of them.

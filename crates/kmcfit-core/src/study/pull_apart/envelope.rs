@@ -36,7 +36,7 @@ impl Level {
         let mut level = Self::of(asked.unwrap_or_else(|| match has_sigma {
             true => evaluation.misfit + quantile,
             // n ln J rises by the quantile.
-            false => evaluation.misfit * (quantile / problem.reading_count() as f64).exp(),
+            false => evaluation.misfit * (quantile / problem.sample_count() as f64).exp(),
         }));
         level.budgets = (problem.penalties.iter())
             .map(|penalty| {
@@ -68,7 +68,7 @@ pub fn envelopes(
     times: &[f64],
     threads: usize,
 ) -> Vec<Envelope> {
-    let main = problem.functions.assembly(0);
+    let main = problem.functions.coefficient_set(0);
     let mut jobs = Vec::new();
     for &f in main {
         let function = problem.functions.get(f);

@@ -7,7 +7,7 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, Subproblem};
 use crate::record::{Channel, Loss};
-use crate::solvers::{add_priors, linear_readings};
+use crate::solvers::{add_priors, linear_predictions};
 use crate::study::functional::Target;
 use crate::study::refit::{positive_rms, sizes};
 
@@ -132,13 +132,13 @@ impl Search<'_> {
     /// The linearised problem about `theta`: the level as a cone, constraints and budgets, in
     /// variables measured by `units`.
     fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
-        let mut sub = linear_readings(self.problem, evaluation);
+        let mut sub = linear_predictions(self.problem, evaluation);
         let surplus = self.surplus(&sub, evaluation);
         add_priors(self.problem, theta, &mut sub);
-        let readings = std::mem::take(&mut sub.residuals);
+        let samples = std::mem::take(&mut sub.residuals);
         sub.residuals = Rows::new();
         let left = (self.level.misfit - surplus).max(f64::MIN_POSITIVE.sqrt());
-        sub.cones.push(ball(&readings, AIM * left.sqrt()));
+        sub.cones.push(ball(&samples, AIM * left.sqrt()));
         let ranges = self.problem.functions.ranges();
         for (penalty, budget) in &self.level.budgets {
             let range = ranges[penalty.function].clone();
@@ -156,12 +156,12 @@ impl Search<'_> {
 
     /// The misfit less the weighted squares that stand for it, none for least squares. The squares of
     /// a robust loss lie above it and touch it here, so a step that they allow is within the level.
-    fn surplus(&self, readings: &Subproblem, evaluation: &Evaluation) -> f64 {
+    fn surplus(&self, samples: &Subproblem, evaluation: &Evaluation) -> f64 {
         let plain = |c: &Channel| c.loss() == Loss::Squares;
         if self.problem.channels().all(plain) {
             return 0.0;
         }
-        let squares: f64 = readings.residuals.right().iter().map(|r| r * r).sum();
+        let squares: f64 = samples.residuals.right().iter().map(|r| r * r).sum();
         evaluation.misfit - squares
     }
 
@@ -169,9 +169,9 @@ impl Search<'_> {
     fn units(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Vec<f64> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {
-            for motion in &evaluation.trajectories {
-                let pair = [&motion.displacement, &motion.velocity].map(|x| positive_rms(x));
-                units.extend((1..motion.nodes()).flat_map(|_| pair));
+            for response in &evaluation.trajectories {
+                let pair = [&response.displacement, &response.velocity].map(|x| positive_rms(x));
+                units.extend((1..response.nodes()).flat_map(|_| pair));
             }
         }
         units.resize(sub.variables, 1.0);

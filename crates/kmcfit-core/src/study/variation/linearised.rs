@@ -27,10 +27,10 @@ impl Linearised {
         add_penalties(problem, theta, &mut rest);
         add_priors(problem, theta, &mut rest);
         let rest = rest.residuals;
-        let readings = jacobian.nrows();
-        let mut varying = jacobian.resize_vertically(readings + rest.len(), 0.0);
+        let samples = jacobian.nrows();
+        let mut varying = jacobian.resize_vertically(samples + rest.len(), 0.0);
         for i in 0..rest.len() {
-            (rest.row(i)).for_each(|(j, a)| varying[(readings + i, j)] += a);
+            (rest.row(i)).for_each(|(j, a)| varying[(samples + i, j)] += a);
         }
         let mut embedding = DMatrix::zeros(n, reduced.problem.parameters());
         for j in 0..n {

@@ -147,11 +147,11 @@ pub fn of_function(
         .best
         .evaluation
         .cost;
-    let readings = problem.reading_count() as f64;
+    let samples = problem.sample_count() as f64;
     let sigma = problem.channels().all(|c| c.weighting().is_sigma());
     let ratio = |constant: f64, varying: f64| match sigma {
         true => constant - varying,
-        false => readings * (constant / varying.max(f64::MIN_POSITIVE)).ln(),
+        false => samples * (constant / varying.max(f64::MIN_POSITIVE)).ln(),
     };
     let statistic = ratio(constant.evaluation.cost, there.min(here));
     let evaluation = problem.evaluate(&embedded)?;
@@ -169,7 +169,7 @@ pub fn of_function(
         statistic,
         p_value: (1 + above) as f64 / (1 + how.simulations) as f64,
         simulations: how.simulations,
-        bic: statistic - extra * readings.ln(),
+        bic: statistic - extra * samples.ln(),
         constant: constant.parameters[reduced.place],
         unit: list.quantity.unit().to_owned(),
         level: how.level,

@@ -31,10 +31,11 @@ impl Reduced {
             ..CoefficientFunction::constant(whole.quantity, 0.0, nodes)
         };
         list[function] = constant;
-        let devices = problem.functions.assemblies().to_vec();
-        let functions = Parameterization::with_devices(list, devices, nodes, grid.step())
-            .expect("a constant instead of a function stays independent")
-            .with_scalars(problem.functions.scalars().to_vec());
+        let coefficient_sets = problem.functions.coefficient_sets().to_vec();
+        let functions =
+            Parameterization::with_coefficient_sets(list, coefficient_sets, nodes, grid.step())
+                .expect("a constant instead of a function stays independent")
+                .with_scalars(problem.functions.scalars().to_vec());
         let mut own = problem.clone();
         own.parts_mut().functions = functions;
         let mut reduced = Self {
@@ -163,8 +164,8 @@ mod tests {
 
     fn whole() -> Problem {
         let times: Vec<f64> = (0..=80).map(|i| 0.1 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
-        let record = Record::new("decay").displacement(&times, &readings);
+        let samples: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
         let parts = [
             CoefficientSpec::piecewise_linear(5, 1.0)
                 .tikhonov(1, 0.3)

@@ -43,24 +43,24 @@ pub(crate) struct LinearDevice<'a> {
 impl<'a> LinearDevice<'a> {
     /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
     /// the terms damping and stiffness.
-    pub fn of(system: &System, device: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
-        let [damping, stiffness] = device.coefficients.as_slice() else {
+    pub fn of(system: &System, nodal: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
+        let [damping, stiffness] = nodal.coefficients.as_slice() else {
             return None;
         };
-        let functions = [device.mass.as_slice(), damping, stiffness];
+        let functions = [nodal.mass.as_slice(), damping, stiffness];
         Self::new(functions, system.grid.step(), nodes)
     }
 
     /// The same from mass, damping and stiffness, and the step `h` (s).
     pub fn new([mass, damping, stiffness]: [&'a [f64]; 3], h: f64, nodes: usize) -> Option<Self> {
-        let device = Self {
+        let nodal = Self {
             mass: &mass[..nodes],
             damping,
             stiffness,
             h,
         };
         // Also behind the end of a record that is shorter than the grid.
-        simd::run(Within(mass)).then_some(device)
+        simd::run(Within(mass)).then_some(nodal)
     }
 
     /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner
@@ -69,14 +69,14 @@ impl<'a> LinearDevice<'a> {
     pub fn least_squares(
         self,
         initial: State,
-        readings: &[f64],
+        samples: &[f64],
         weights: [f64; 2],
         gradient: [&mut [f64]; 3],
     ) -> (f64, State) {
         least_squares::LeastSquares {
-            device: self,
+            nodal: self,
             initial,
-            readings,
+            samples,
             weights,
         }
         .solve(gradient)
@@ -111,13 +111,13 @@ impl<'a> LinearDevice<'a> {
     fn step_back(
         &self,
         i: usize,
-        motion: [f64; 2],
+        response: [f64; 2],
         source: [f64; 2],
         x: &mut [f64; 2],
         gradient: &mut [&mut [f64]; 3],
     ) {
         let (rates, of) = (self.rates(i), self.constants());
-        let (node, middle) = rates.shares(motion, *x, of);
+        let (node, middle) = rates.shares(response, *x, of);
         let scale = [of.per_h, 1.0, of.h];
         for (f, g) in gradient.iter_mut().enumerate() {
             g[i] = (node[f] + middle[f]) * scale[f];
@@ -132,7 +132,7 @@ impl<'a> LinearDevice<'a> {
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {
             simd::run(forward::Forward {
-                device: self,
+                nodal: self,
                 initial,
                 displacement: &mut trajectory.displacement,
                 velocity: &mut trajectory.velocity,
@@ -156,7 +156,7 @@ impl<'a> LinearDevice<'a> {
         let parts = [&mut gradient.mass, damping, stiffness].map(|g| &mut g[..nodes]);
         let initial = with_workspace(|workspace| {
             simd::run(adjoint::Adjoint {
-                device: self,
+                nodal: self,
                 displacement: &trajectory.displacement,
                 velocity: &trajectory.velocity,
                 source,
@@ -165,7 +165,7 @@ impl<'a> LinearDevice<'a> {
             })
         });
         SystemTangent {
-            device: gradient,
+            nodal: gradient,
             initial,
         }
     }

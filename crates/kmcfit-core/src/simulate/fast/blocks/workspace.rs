@@ -48,7 +48,7 @@ pub(super) struct Workspace {
     /// The six numbers of every step's [`Rates`].
     rates: [Rows; 6],
     /// Displacement and velocity.
-    pub motion: [Rows; 2],
+    pub response: [Rows; 2],
     /// Derivative of the cost with respect to displacement and velocity.
     pub source: [Rows; 2],
     /// Gradient with respect to the functions.
@@ -65,7 +65,7 @@ impl Default for Workspace {
         Self {
             functions: [empty; 3],
             rates: [empty; 6],
-            motion: [empty; 2],
+            response: [empty; 2],
             source: [empty; 2],
             gradient: [empty; 3],
         }
@@ -188,14 +188,14 @@ impl Workspace {
         for i in 0..half {
             for block in 0..2 {
                 let j = block * half + i;
-                let reading = Eight::load(arithmetic, &self.source[0][j]);
+                let sample = Eight::load(arithmetic, &self.source[0][j]);
                 let [from_y, from_w] = &mut map[block];
                 let [yy, ww, yw] = &mut curvature[block];
                 *yy += from_y[0] * from_y[0];
                 *ww += from_w[0] * from_w[0];
                 *yw += from_y[0] * from_w[0];
-                slope[block][0] += from_y[0] * reading;
-                slope[block][1] += from_w[0] * reading;
+                slope[block][0] += from_y[0] * sample;
+                slope[block][1] += from_w[0] * sample;
                 let right = self.coefficients(arithmetic, j + 1, of);
                 let rates = Rates::new(left[block], right, of);
                 if KEEP {
@@ -247,8 +247,8 @@ impl Workspace {
         for i in 0..length / 2 {
             for (half, x) in x.iter_mut().enumerate() {
                 let j = half * (length / 2) + i;
-                self.motion[0][j] = x[0].row();
-                self.motion[1][j] = (x[1] * of.per_h).row();
+                self.response[0][j] = x[0].row();
+                self.response[1][j] = (x[1] * of.per_h).row();
                 *x = self.rates(arithmetic, j).forward(*x, of);
             }
         }
@@ -263,7 +263,7 @@ impl Workspace {
         for i in 0..length / 2 {
             for (odd, sum) in sums.iter_mut().enumerate() {
                 let j = 2 * i + odd;
-                let y = Eight::load(arithmetic, &self.motion[0][j]);
+                let y = Eight::load(arithmetic, &self.response[0][j]);
                 let r = y - Eight::load(arithmetic, &self.source[0][j]);
                 *sum += r * r;
                 self.source[0][j] = (factor * r).row();
@@ -316,11 +316,11 @@ impl Workspace {
             for half in 0..2 {
                 let j = half * (length / 2) + i;
                 let rates = self.rates(arithmetic, j);
-                let motion = [
-                    Eight::load(arithmetic, &self.motion[0][j]),
-                    of.h * Eight::load(arithmetic, &self.motion[1][j]),
+                let response = [
+                    Eight::load(arithmetic, &self.response[0][j]),
+                    of.h * Eight::load(arithmetic, &self.response[1][j]),
                 ];
-                let (node, middle) = rates.shares(motion, x[half], of);
+                let (node, middle) = rates.shares(response, x[half], of);
                 for f in 0..3 {
                     let right = after[half][f] + middle[f];
                     if i + 1 == length / 2 {

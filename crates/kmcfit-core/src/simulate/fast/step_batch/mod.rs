@@ -26,7 +26,7 @@ pub(crate) struct SearchRay<'a> {
     /// State at the first node.
     pub initial: State,
     /// Displacements read at the nodes, m.
-    pub readings: &'a [f64],
+    pub samples: &'a [f64],
     /// Step, s.
     pub step: f64,
 }
@@ -63,7 +63,7 @@ impl LaneLayout {
         let row = |part: &[f64]| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0]));
         let first = (!first.is_empty()).then(|| row(first));
         Self {
-            nodes: ray.readings.len(),
+            nodes: ray.samples.len(),
             without_mass,
             in_first,
             rows: first

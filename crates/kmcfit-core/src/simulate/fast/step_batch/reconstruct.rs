@@ -12,7 +12,7 @@ use crate::system::{NodalCoefficients, State};
 /// each ends where the next begins.
 /// Otherwise what is in `trajectory` is of no use.
 pub(crate) fn reconstruct(
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     initial: State,
     states: [Row; 2],
     step: f64,
@@ -23,14 +23,10 @@ pub(crate) fn reconstruct(
     }
     let nodes = trajectory.nodes();
     let ends = simd::run(Replay {
-        functions: [
-            &device.mass,
-            &device.coefficients[0],
-            &device.coefficients[1],
-        ],
+        functions: [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]],
         states,
         step,
-        motion: [&mut trajectory.displacement, &mut trajectory.velocity],
+        response: [&mut trajectory.displacement, &mut trajectory.velocity],
     });
     let parts = nodes.div_ceil(part(nodes));
     let joins = |ends: &Row, begins: &Row| ends[..parts - 1] == begins[1..parts];
@@ -44,7 +40,7 @@ struct Replay<'a> {
     /// Displacements and velocities where the parts begin.
     states: [Row; 2],
     step: f64,
-    motion: [&'a mut [f64]; 2],
+    response: [&'a mut [f64]; 2],
 }
 
 impl Kernel for Replay<'_> {
@@ -56,7 +52,7 @@ impl Kernel for Replay<'_> {
             functions,
             states,
             step,
-            motion,
+            response,
         } = self;
         let nodes = functions[0].len();
         let part = part(nodes);
@@ -103,9 +99,9 @@ impl Kernel for Replay<'_> {
                     let from = lane * part + first;
                     let count = LANES.min(part - first).min(nodes.saturating_sub(from));
                     if count == LANES {
-                        motion[which][from..from + LANES].copy_from_slice(column);
+                        response[which][from..from + LANES].copy_from_slice(column);
                     } else if count > 0 {
-                        motion[which][from..from + count].copy_from_slice(&column[..count]);
+                        response[which][from..from + count].copy_from_slice(&column[..count]);
                     }
                 }
             }

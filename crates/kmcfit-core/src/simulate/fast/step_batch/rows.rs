@@ -94,7 +94,7 @@ impl<A: Arithmetic> Devices<A> {
     fn begin(ray: &SearchRay, arithmetic: A, length: &Row) -> Self {
         let splat = |x| Eight::splat(arithmetic, x);
         let state = [splat(ray.initial.displacement), splat(ray.initial.velocity)];
-        let residual = state[0] - splat(ray.readings[0]);
+        let residual = state[0] - splat(ray.samples[0]);
         Self {
             arithmetic,
             length: *length,
@@ -107,7 +107,7 @@ impl<A: Arithmetic> Devices<A> {
 
     #[inline(always)]
     fn step(&mut self, ray: &SearchRay, steps: Steps<A>, i: usize) {
-        let residual = self.state[0] - Eight::splat(self.arithmetic, ray.readings[i]);
+        let residual = self.state[0] - Eight::splat(self.arithmetic, ray.samples[i]);
         self.sum += residual * residual;
         let length = Eight::load(self.arithmetic, &self.length);
         let right = Values::at(ray, self.arithmetic, length, i + 1);
@@ -121,10 +121,10 @@ impl<A: Arithmetic> Devices<A> {
     }
 
     #[inline(always)]
-    fn cost(&self, last_reading: f64) -> Row {
+    fn cost(&self, last_sample: f64) -> Row {
         let splat = |x| Eight::splat(self.arithmetic, x);
         let [y, v] = self.state;
-        let residual = y - splat(last_reading);
+        let residual = y - splat(last_sample);
         // Zero, and not a number where the motion is not finite.
         let nothing = splat(0.0) * y + splat(0.0) * v;
         (self.sum + splat(0.5) * (residual * residual) + nothing).row()
@@ -143,7 +143,7 @@ impl<const R: usize> Kernel for Rows<'_, R> {
             costs,
         } = self;
         let steps = Steps::of(arithmetic, ray.step);
-        let nodes = ray.readings.len();
+        let nodes = ray.samples.len();
         let last = nodes - 1;
         let part = part(nodes);
 
@@ -166,7 +166,7 @@ impl<const R: usize> Kernel for Rows<'_, R> {
             }
         }
         for r in 0..R {
-            costs[r] = rows[r].cost(ray.readings[last]);
+            costs[r] = rows[r].cost(ray.samples[last]);
         }
     }
 }

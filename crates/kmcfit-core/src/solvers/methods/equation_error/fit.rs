@@ -1,7 +1,7 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
 use super::measured::{Measured, Measurements};
-use super::{Accuracy, Minimum, add_rows, device, minimise};
+use super::{Accuracy, Minimum, add_rows, minimise, nodal};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
@@ -55,8 +55,8 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         Ok((minimum, programs)) => {
             counts.qp = programs;
             let point = cost.point(minimum.parameters.clone());
-            let device = &point.evaluation.device;
-            let has_mass = device.mass.iter().all(|m| *m > 0.0);
+            let nodal = &point.evaluation.nodal;
+            let has_mass = nodal.mass.iter().all(|m| *m > 0.0);
             let reason = reason(problem, &minimum, has_mass);
             let status = match minimum.program {
                 Some(ConicStatus::Almost) => Status::Stalled,
@@ -129,9 +129,9 @@ fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
 /// The end of a fit whose readings tell no motion: the start, without a cost.
 fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
-    evaluation.device = problem.functions.device(start);
-    for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
-        for (predicted, channel) in readings.iter_mut().zip(&experiment.channels) {
+    evaluation.nodal = problem.functions.nodal(start);
+    for (samples, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
+        for (predicted, channel) in samples.iter_mut().zip(&experiment.channels) {
             *predicted = vec![f64::NAN; channel.len()];
         }
     }
@@ -292,19 +292,19 @@ impl<'a> Cost<'a> {
         evaluation.misfit = self
             .experiments()
             .map(|(experiment, measured)| {
-                let device = device(problem, experiment, &theta);
-                measured.misfit(&measured.errors(problem, &device))
+                let nodal = nodal(problem, experiment, &theta);
+                measured.misfit(&measured.errors(problem, &nodal))
             })
             .sum();
         evaluation.regularisation = problem.regularisation(&theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
-        self.say_motions(&mut evaluation);
+        self.report_responses(&mut evaluation);
         let gradient = self.gradient(&theta);
         Iterate::new(theta, evaluation, gradient)
     }
 
     /// The measured motions, and what the model says of the readings there.
-    fn say_motions(&self, evaluation: &mut Evaluation) {
+    fn report_responses(&self, evaluation: &mut Evaluation) {
         let problem = self.problem;
         for (e, measured) in self.measurements.experiments.iter().enumerate() {
             let Some(measured) = measured else { continue };
@@ -322,9 +322,9 @@ impl<'a> Cost<'a> {
         let problem = self.problem;
         let mut euclidean = problem.penalty_gradient(theta);
         for (experiment, measured) in self.experiments() {
-            let device = device(problem, experiment, theta);
-            let errors = measured.errors(problem, &device);
-            let mut nodal: NodalCoefficients = problem.functions.empty_device();
+            let nodal = nodal(problem, experiment, theta);
+            let errors = measured.errors(problem, &nodal);
+            let mut nodal: NodalCoefficients = problem.functions.empty_nodal();
             for (f, values) in nodal.functions_mut().enumerate() {
                 for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
                     let push = 2.0 * measured.weight * error * measured.response(problem, f, i);
@@ -333,7 +333,7 @@ impl<'a> Cost<'a> {
                 }
             }
             let functions = &problem.functions;
-            functions.add_transpose(&nodal, experiment.device, &mut euclidean);
+            functions.add_transpose(&nodal, experiment.coefficient_set, &mut euclidean);
         }
         let l2 = problem.functions.gram_solve(&euclidean);
         Gradient {

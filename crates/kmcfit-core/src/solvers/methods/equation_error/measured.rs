@@ -58,8 +58,8 @@ impl Measured {
         {
             return Err(MissingMeasurement::QuadraticLoss);
         }
-        let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
-        if experiment.channels.iter().any(sought) {
+        let estimated = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
+        if experiment.channels.iter().any(estimated) {
             return Err(MissingMeasurement::KnownSensors);
         }
         if let [channel] = experiment.channels.as_slice()
@@ -73,9 +73,9 @@ impl Measured {
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
             return Err(MissingMeasurement::FilteredDrive);
         }
-        let motion = Kinematics::of(problem, experiment, scalars);
-        let motion = motion.ok_or(MissingMeasurement::Readings)?;
-        let measured = Self::at_nodes(problem, experiment, &motion);
+        let kinematics = Kinematics::of(problem, experiment, scalars);
+        let kinematics = kinematics.ok_or(MissingMeasurement::Readings)?;
+        let measured = Self::at_nodes(problem, experiment, &kinematics);
         let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
@@ -90,32 +90,32 @@ impl Measured {
         let (values, _) = unsensed(channel, scalars);
         let band = Band::of(&values, spacing)?;
         let excitation = experiment.excitation.as_ref();
-        let around = (0..channel.len()).map(|i| channel.around_reading(excitation, i));
+        let around = (0..channel.len()).map(|i| channel.around_sample(excitation, i));
         let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();
         let sensed = |part: Vec<f64>| match channel.filter() {
             [] => part,
             filter => zero_phase(filter, &part),
         };
         let (force, base) = (sensed(force), sensed(base));
-        let [motion, force, base] = band
-            .motions(&[&values, &force, &base])?
+        let [response, force, base] = band
+            .responses(&[&values, &force, &base])?
             .try_into()
             .expect("one for each");
         let skipped = match experiment.is_free() {
             true => 1,
             false => {
                 let periods = SETTLING * std::f64::consts::TAU / band.frequency;
-                let readings = (periods / spacing).ceil() as usize;
-                readings.clamp(1, channel.len() / MOST_LEFT_OUT)
+                let samples = (periods / spacing).ceil() as usize;
+                samples.clamp(1, channel.len() / MOST_LEFT_OUT)
             }
         };
         let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
             places: channel.places()[skipped..channel.len() - skipped].to_vec(),
             first: skipped,
-            y: kept(motion.y),
-            v: kept(motion.v),
-            a: kept(motion.a),
+            y: kept(response.y),
+            v: kept(response.v),
+            a: kept(response.a),
             force: kept(force.a),
             base: kept(base.a),
             weight: spacing,
@@ -125,7 +125,7 @@ impl Measured {
     }
 
     /// At the nodes at which a motion is known.
-    pub fn at_nodes(problem: &Problem, experiment: &Experiment, motion: &Kinematics) -> Self {
+    pub fn at_nodes(problem: &Problem, experiment: &Experiment, kinematics: &Kinematics) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
             excitation.and_then(|e| e.force.as_ref()),
@@ -134,20 +134,20 @@ impl Measured {
         let [force, base] = parts.map(|part| {
             let nodes = part.map(StageSamples::at_nodes);
             let at = |node: &usize| nodes.as_ref().map_or(0.0, |f| f[*node]);
-            motion.nodes.iter().map(at).collect::<Vec<f64>>()
+            kinematics.nodes.iter().map(at).collect::<Vec<f64>>()
         });
-        let stride = motion.nodes.windows(2).map(|w| w[1] - w[0]).min();
+        let stride = kinematics.nodes.windows(2).map(|w| w[1] - w[0]).min();
         let place = |node: &usize| TimePoint::node(*node, experiment.nodes);
         Self {
-            places: motion.nodes.iter().map(place).collect(),
+            places: kinematics.nodes.iter().map(place).collect(),
             first: 0,
-            y: motion.y.clone(),
-            v: motion.v.clone(),
-            a: motion.a.clone(),
+            y: kinematics.y.clone(),
+            v: kinematics.v.clone(),
+            a: kinematics.a.clone(),
             force,
             base,
             weight: stride.unwrap_or(1) as f64 * problem.system.grid.step(),
-            frequency: rms(&motion.v) / rms(&motion.y),
+            frequency: rms(&kinematics.v) / rms(&kinematics.y),
             corner: None,
         }
     }
@@ -161,9 +161,9 @@ impl Measured {
     }
 
     /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
-    pub fn errors(&self, problem: &Problem, device: &NodalCoefficients) -> Vec<f64> {
+    pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
         let error = |(i, place): (usize, &TimePoint)| {
-            let forces = device.functions().enumerate();
+            let forces = nodal.functions().enumerate();
             let force =
                 |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
             forces
@@ -181,7 +181,7 @@ impl Measured {
     /// The motion on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
     /// where nothing was measured.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
-        let mut motion = Trajectory::zeros(nodes);
+        let mut response = Trajectory::zeros(nodes);
         let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
         let last = self.places.len() - 1;
         let mut i = 0;
@@ -195,10 +195,10 @@ impl Measured {
                 true => self.between(i, since, (at(i + 1) - at(i)) * grid.step()),
                 false => self.swung_on(i, since),
             };
-            motion.displacement[node] = y;
-            motion.velocity[node] = v;
+            response.displacement[node] = y;
+            response.velocity[node] = v;
         }
-        motion
+        response
     }
 
     fn swung_on(&self, i: usize, since: f64) -> (f64, f64) {
@@ -231,8 +231,8 @@ impl Measured {
         }
         let [gain, ..] = channel.sensor().values(view.scalars);
         let mut predicted = channel.observed().to_vec();
-        for (i, error) in self.errors(problem, view.device).iter().enumerate() {
-            predicted[self.first + i] -= gain * error / blend(&view.device.mass, self.places[i]);
+        for (i, error) in self.errors(problem, view.nodal).iter().enumerate() {
+            predicted[self.first + i] -= gain * error / blend(&view.nodal.mass, self.places[i]);
         }
         predicted
     }
@@ -311,7 +311,7 @@ impl Measurements {
             let corner = measured.as_ref()?.corner? / std::f64::consts::TAU;
             Some(format!(
                 "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that are \
-                 not proportional to the motion are seen with an error, and a constant offset is not \
+                 not proportional to the response are seen with an error, and a constant offset is not \
                  seen",
                 experiment.name
             ))
@@ -374,7 +374,9 @@ impl Measurements {
     ) -> impl Iterator<Item = (usize, &'a Measured)> {
         let all = problem.experiments.iter().zip(&self.experiments);
         all.filter_map(move |(experiment, measured)| {
-            let assembly = problem.functions.assembly(experiment.device);
+            let assembly = problem
+                .functions
+                .coefficient_set(experiment.coefficient_set);
             let f = assembly.iter().position(|f| *f == index)?;
             Some((f, measured.as_ref()?))
         })
@@ -383,9 +385,9 @@ impl Measurements {
 
 /// The mass of the first device that has function `index` of the list.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
-    let mut devices = functions.assemblies().iter();
-    let device = devices.find(|assembly| assembly.contains(&index))?;
-    device.first().copied()
+    let mut nodal_sets = functions.coefficient_sets().iter();
+    let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
+    nodal.first().copied()
 }
 
 impl Measured {
@@ -435,13 +437,13 @@ mod tests {
 
     /// The largest distance of a motion from what `state` tells of displacement and velocity.
     fn distance(
-        motion: &Trajectory,
+        response: &Trajectory,
         nodes: impl Iterator<Item = usize>,
         state: impl Fn(f64) -> [f64; 3],
     ) -> f64 {
         let one = |i: usize| {
             let [y, v, _] = state(i as f64 * STEP);
-            let [of_y, of_v] = [motion.displacement[i] - y, motion.velocity[i] - v];
+            let [of_y, of_v] = [response.displacement[i] - y, response.velocity[i] - v];
             of_y.abs() + of_v.abs()
         };
         // What is no number is the largest.
@@ -458,8 +460,8 @@ mod tests {
                 4.2 * t - 4.0,
             ]
         };
-        let motion = measured(1.0, cubic).trajectory(&grid(), NODES);
-        let off = distance(&motion, 3..=18, cubic);
+        let response = measured(1.0, cubic).trajectory(&grid(), NODES);
+        let off = distance(&response, 3..=18, cubic);
         assert!(off < 1e-12, "{off}");
     }
 
@@ -470,8 +472,8 @@ mod tests {
             let (sine, cosine) = (w * t + 0.4).sin_cos();
             [2.0 * cosine, -2.0 * w * sine, -2.0 * w * w * cosine]
         };
-        let motion = measured(w, harmonic).trajectory(&grid(), NODES);
-        let off = distance(&motion, (0..=3).chain(18..NODES), harmonic);
+        let response = measured(w, harmonic).trajectory(&grid(), NODES);
+        let off = distance(&response, (0..=3).chain(18..NODES), harmonic);
         assert!(off < 1e-12, "{off}");
     }
 

@@ -36,8 +36,8 @@ impl BatchedTrials {
                 let parameters = trial(point, length);
                 let mut evaluation = take(spare, problem);
                 let states = self.states(layout.place(which));
-                let has_motion = move_to(problem, &parameters, states, &mut evaluation);
-                evaluation.misfit = match has_motion {
+                let has_response = move_to(problem, &parameters, states, &mut evaluation);
+                evaluation.misfit = match has_response {
                     true => channel.cost(&evaluation.predictions[0][0]),
                     false => f64::INFINITY,
                 };
@@ -78,15 +78,15 @@ fn move_to(
     states: [Row; 2],
     evaluation: &mut Evaluation,
 ) -> bool {
-    (problem.functions).device_into(parameters, 0, &mut evaluation.device);
-    let (system, device) = (&problem.system, &evaluation.device);
-    let motion = &mut evaluation.trajectories[0];
+    (problem.functions).nodal_into(parameters, 0, &mut evaluation.nodal);
+    let (system, nodal) = (&problem.system, &evaluation.nodal);
+    let response = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
-    let is_whole = reconstruct(device, initial, states, system.grid.step(), motion);
-    if !is_whole && reference::forward_into(system, device, initial, None, motion).is_err() {
+    let is_whole = reconstruct(nodal, initial, states, system.grid.step(), response);
+    if !is_whole && reference::forward_into(system, nodal, initial, None, response).is_err() {
         return false;
     }
-    evaluation.predictions[0][0].clone_from(&motion.displacement);
+    evaluation.predictions[0][0].clone_from(&response.displacement);
     true
 }
 
@@ -112,7 +112,7 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<Search
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,
-        readings: channel.observed(),
+        samples: channel.observed(),
         step: system.grid.step(),
     })
 }

@@ -43,7 +43,7 @@ impl Slot<'_> {
 }
 
 /// The sets of functions that make up a system, and the set of each record.
-pub(super) struct Assemblies {
+pub(super) struct CoefficientSets {
     /// Indices into the list of [`Builder::slots`], mass first; the shared set comes first.
     pub sets: Vec<Vec<usize>>,
     pub of_record: Vec<usize>,
@@ -70,10 +70,10 @@ impl Builder {
     }
 
     /// Which functions apply to which record.
-    pub(super) fn assemblies(&self) -> Result<Assemblies, BuildError> {
+    pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
         let slots = self.slots();
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
-        let mut found = Assemblies {
+        let mut found = CoefficientSets {
             sets: vec![shared.clone()],
             of_record: Vec::new(),
         };
@@ -106,7 +106,7 @@ impl Builder {
         let Some(place) = kinds.position(|kind| kind == slot.kind) else {
             let name = slot.kind.name();
             return Err(
-                BuildError::new(&slot.key, "the device has no such function")
+                BuildError::new(&slot.key, "the system has no such function")
                     .found(format!("`{name}` in one experiment only"))
                     .expected(format!(
                         "`functions.{name}` as well, which the other experiments share; `fixed: 0` where they have none"
@@ -124,7 +124,7 @@ impl Builder {
 }
 
 /// Refuses records that share no estimated function, and functions that apply to no record.
-fn check_shared(slots: &[Slot], found: &Assemblies) -> Result<(), BuildError> {
+fn check_shared(slots: &[Slot], found: &CoefficientSets) -> Result<(), BuildError> {
     let users = |f: usize| {
         let uses = |set: &&usize| found.sets[**set].contains(&f);
         found.of_record.iter().filter(uses).count()
@@ -135,9 +135,7 @@ fn check_shared(slots: &[Slot], found: &Assemblies) -> Result<(), BuildError> {
         let problem = "the experiments share no function that is fitted";
         return Err(BuildError::new("experiments", problem)
             .found("functions of its own in every experiment")
-            .expected(
-                "a function of the device that several experiments show, or a model for each",
-            ));
+            .expected("a function that several experiments share, or a model for each"));
     }
     match (slots.iter().enumerate()).find(|(f, _)| users(*f) == 0 && !found.of_record.is_empty()) {
         Some((_, slot)) => Err(
