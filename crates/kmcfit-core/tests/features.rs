@@ -535,7 +535,7 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
     case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
     case.check("three experiments");
     case.own = vec![(2, constant(CoefficientKind::Stiffness, 5.2, 4.0))];
-    case.records[0].nodal = 1;
+    case.records[0].coefficient_set = 1;
     case.check("a stiffness of its own");
 }
 
