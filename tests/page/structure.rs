@@ -111,7 +111,7 @@ fn a_report_is_complete() {
             .collect()
     };
     for pointer in [
-        "/identifiability/settled",
+        "/identifiability/findings",
         "/identifiability/open",
         "/constraints/active",
     ] {

@@ -210,7 +210,7 @@ impl Builder {
                 .expected("readings from which displacement, velocity and acceleration follow")
         })?;
         let remarks = measurements.remarks(problem).into_iter();
-        notices.extend(remarks.map(BuildNotice::Measurement));
+        notices.extend(remarks.map(|remark| BuildNotice::Measurement { remark }));
         Ok(Some(measurements))
     }
 
