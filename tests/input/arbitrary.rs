@@ -7,6 +7,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::model::FULL;
+use crate::properties::properties;
 
 const CSV: &str = "# made by hand\nt,\"y\",note\r\n0,1,a\n\n0.1, 2 ,\"b, c\"\n0.2,3,\n";
 
@@ -150,7 +151,7 @@ fn read_table_with(bytes: &[u8], format: &TableFormat) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #![proptest_config(properties(1000, 1))]
 
     #[test]
     fn models_with_mistakes(changes in changes()) {

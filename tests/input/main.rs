@@ -8,6 +8,8 @@ mod instruments_errors;
 mod keys;
 mod model;
 mod model_errors;
+#[path = "../../crates/kmcfit-core/tests/common/properties.rs"]
+mod properties;
 mod table;
 mod table_errors;
 mod units;

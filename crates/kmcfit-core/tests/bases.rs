@@ -12,6 +12,10 @@ use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
+#[path = "common/properties.rs"]
+mod properties;
+use properties::properties;
+
 /// A record that does not begin at zero, with a step that no knot is a multiple of.
 fn grid(nodes: usize) -> Grid {
     Grid::new(-1.5, 4.0, nodes).unwrap()
@@ -556,7 +560,7 @@ fn random_knots() -> impl Strategy<Value = Vec<f64>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #![proptest_config(properties(200, 1))]
 
     #[test]
     fn random_knots_keep_the_promises(knots in random_knots(), times in proptest::collection::vec(-1.5..2.5_f64, 1..40)) {

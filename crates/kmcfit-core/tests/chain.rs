@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::properties::properties;
 use common::{add_physics, errors, paper_device, paper_problem};
 use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::objective::GradientKind;
@@ -31,7 +32,7 @@ fn chain(length: usize, width: usize, a: &[f64], exponents: &[i32]) -> Subproble
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
+    #![proptest_config(properties(200, 2))]
 
     #[test]
     fn the_order_of_elimination_does_not_matter(
@@ -58,7 +59,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+    #![proptest_config(properties(200, 3))]
 
     /// Variables of one station, some of them given, and rows a million times as large as others: more than
     /// a piece of them, and fewer.

@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::properties::properties;
 use common::sensed::{Record, Response, cost};
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
@@ -283,7 +284,7 @@ fn cases() -> impl Strategy<Value = Case> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #![proptest_config(properties(60, 1))]
 
     #[test]
     fn the_gradient_is_the_derivative_by_dual_numbers(case in cases()) {
@@ -325,7 +326,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
+    #![proptest_config(properties(60, 2))]
 
     /// Several directions at once against one at a time; records longer than a tile among them.
     #[test]
@@ -392,7 +393,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+    #![proptest_config(properties(60, 3))]
 
     /// Constants are carried along by a way of their own: against values at the nodes, to which a design takes
     /// their gradient, and against one direction at a time.

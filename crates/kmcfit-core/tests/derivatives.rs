@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::properties::properties;
 use common::reference::{Inputs, motion};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::simulate::{
@@ -136,7 +137,7 @@ fn case() -> impl Strategy<Value = Case> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #![proptest_config(properties(200, 1))]
 
     #[test]
     fn the_discrete_gradient_is_the_derivative_by_dual_numbers(case in case()) {

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::properties::properties;
 use common::synthetic::{run, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
@@ -198,7 +199,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::with_cases(12) })]
+    #![proptest_config(properties(12, 1))]
 
     /// Devices that vary, by each stepper, under up to four records: the rank never exceeds the count,
     /// and by the midpoint rule it is the count.

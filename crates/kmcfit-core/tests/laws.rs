@@ -9,7 +9,10 @@ use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
 };
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use proptest::test_runner::TestRunner;
+
+#[path = "common/properties.rs"]
+mod properties;
 
 const DURATION: f64 = 12.0;
 
@@ -38,8 +41,7 @@ fn any_case() -> impl Strategy<Value = Case> {
 
 /// Runs `law` on the same 40 cases in every run.
 fn for_cases(law: impl Fn(Case)) {
-    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]);
-    let mut runner = TestRunner::new_with_rng(Config::with_cases(40), rng);
+    let mut runner = TestRunner::new(properties::properties(40, 7));
     let result = runner.run(&any_case(), |case| {
         law(case);
         Ok(())

@@ -5,6 +5,10 @@ use kmcfit_core::internals::qp::{ConicStatus, Subproblem, project};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
+#[path = "common/properties.rs"]
+mod properties;
+use properties::properties;
+
 /// `|z - target|^2` without constraints.
 fn nearest(target: &[f64]) -> Subproblem {
     let mut sub = Subproblem::new(target.len());
@@ -196,7 +200,7 @@ fn by_enumeration(target: &[f64], rows: &[Vec<f64>], right: &[f64]) -> Option<Ve
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #![proptest_config(properties(300, 1))]
 
     #[test]
     fn random_programs_agree_with_enumeration_whatever_the_scale_of_their_rows(

@@ -13,7 +13,11 @@ use crate::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, SystemTangent, Term,
     TimePoint,
 };
+use properties::properties;
 use proptest::prelude::*;
+
+#[path = "../../../tests/common/properties.rs"]
+mod properties;
 
 /// Largest difference of two responses or gradients, in machine precisions of the largest value, for each step: each
 /// step rounds some ten operations, and what they lose is carried along.
@@ -281,12 +285,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 150,
-        failure_persistence: None,
-        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(properties(150, 1))]
 
     #[test]
     fn prefactored_responses(case in any_case()) {
