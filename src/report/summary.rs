@@ -157,10 +157,15 @@ fn symbol(name: &str) -> &str {
     kind.map_or(name, |kind| kind.symbol())
 }
 
-/// A value with the digits that an interval of this half-width resolves: two digits of the half-width.
+/// A value with the decimals that an interval of this half-width resolves: two digits of the half-width.
 fn resolved(x: f64, half: f64) -> String {
     let order = |x: f64| x.abs().log10().floor();
-    let digits = order(x) - order(half) + 2.0;
+    let decimals = 1.0 - order(half);
+    if (1e-3..1e7).contains(&x.abs()) && (..=12.0).contains(&decimals) {
+        let decimals = decimals.max(0.0) as usize;
+        return format!("{x:.decimals$}");
+    }
+    let digits = order(x) + decimals + 1.0;
     match digits.is_finite() {
         true => significant(x, digits.clamp(2.0, 15.0) as usize),
         false => short(x),
