@@ -279,7 +279,7 @@ fn the_grid_follows_the_frequency() {
     }
     let experiment = "    initial: {displacement: 0.02, velocity: 0.0}";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    assert_eq!(model.remarks.len(), 1, "{:?}", model.remarks);
+    assert_eq!(model.automatic.len(), 1, "{:?}", model.automatic);
     assert!(error(&run) < 1e-5, "{}", error(&run));
     let half = model
         .problem

@@ -137,7 +137,7 @@ pub fn main() -> ExitCode {
 
 /// Prints the notes and warnings of a model.
 fn announce(model: &Model) {
-    model.remarks.iter().for_each(|remark| say("note", remark));
+    (model.automatic.iter()).for_each(|note| say("note", note));
     (model.warnings.iter()).for_each(|warning| say("warning", warning));
 }
 

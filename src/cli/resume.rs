@@ -33,10 +33,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     results::complete(folder)?;
     if folder.join(STUDY_JOURNAL).exists() {
-        return study::go_on(folder, arguments.json, arguments.threads);
+        return study::resume(folder, arguments.json, arguments.threads);
     }
     if folder.join(COMPARE_JOURNAL).exists() {
-        return compare::go_on(folder, arguments.json);
+        return compare::resume(folder, arguments.json);
     }
     let printed = Printed {
         json: arguments.json,

@@ -16,7 +16,7 @@ pub struct Known {
     /// `None` for the equation error, which simulates no response.
     pub(super) assessment: Option<FitAssessment>,
     /// The records that took no part.
-    pub(super) held_out: Vec<HeldOut>,
+    pub(super) validation: Vec<ValidationRecord>,
 }
 
 impl Known {
@@ -26,7 +26,9 @@ impl Known {
         let held_out = model.held_out.iter();
         Self {
             assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
-            held_out: held_out.map(|out| HeldOut::of(model, fit, out)).collect(),
+            validation: held_out
+                .map(|out| ValidationRecord::of(model, fit, out))
+                .collect(),
         }
     }
 
@@ -48,14 +50,14 @@ impl Known {
 
 /// A record that took no part in the fit, and what the found device says of it.
 #[derive(Debug, Clone)]
-pub(super) struct HeldOut {
+pub(super) struct ValidationRecord {
     /// The record.
     pub out: HoldOut,
     /// The problem of that record alone and its point; what the record leaves open is found from its own readings.
     pub found: Result<(Problem, Evaluation), SimulationError>,
 }
 
-impl HeldOut {
+impl ValidationRecord {
     fn of(model: &Model, fit: &Fit, out: &HoldOut) -> Self {
         Self {
             out: out.clone(),

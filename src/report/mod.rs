@@ -15,7 +15,8 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
-pub mod advice;
+mod assessment;
+mod assumptions;
 pub mod chart;
 mod columns;
 pub mod compare;
@@ -26,14 +27,13 @@ mod drawn;
 pub mod figures;
 pub(crate) mod findings;
 mod finished;
-mod knowledge;
 mod known;
 mod measured;
 mod page;
 mod run;
-mod run_findings;
 mod seen;
 pub mod study;
+mod suggestions;
 mod summary;
 mod tables;
 mod terminal;

@@ -2,15 +2,16 @@
 
 use super::cost::{CostKind, cost_definition};
 use super::document::{
-    ActiveSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
+    ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
-    Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
+    Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::known::Known;
 use super::measured;
 use super::page::fit_page;
 use super::render;
 use super::seen::SeenChannel;
+use super::suggestions::suggestions;
 use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
@@ -76,7 +77,7 @@ impl FittedModel<'_> {
     /// The result document.
     pub fn document(&self) -> ResultDocument {
         let (model, fit) = (self.model, self.fit);
-        ResultDocument {
+        let mut document = ResultDocument {
             format: FORMAT,
             title: model.title.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -110,10 +111,15 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
             weights: self.weight_summary(),
-            rungs: self.fit.attempts.iter().map(rung_summary).collect(),
+            attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
             experiments: self.experiment_summaries(),
-            held_out: self.known.held_out.iter().map(measured::held_out).collect(),
-            scalars: match self.is_simulated() {
+            validation: self
+                .known
+                .validation
+                .iter()
+                .map(measured::validation)
+                .collect(),
+            nuisance_parameters: match self.is_simulated() {
                 true => {
                     let covariance = self.known.covariance();
                     measured::scalars(&model.problem, &fit.best.evaluation, covariance)
@@ -123,11 +129,14 @@ impl FittedModel<'_> {
             statistics: (self.known.assessment.as_ref())
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
-            half_step: self.known.step_check().cloned(),
-            remarks: model.remarks.clone(),
+            step_check: self.known.step_check().cloned(),
+            automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
-        }
+            suggestions: Vec::new(),
+        };
+        document.suggestions = suggestions(&document);
+        document
     }
 
     /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
@@ -191,7 +200,7 @@ impl FittedModel<'_> {
                 name: group.name.clone(),
                 rows: rows.len(),
                 largest,
-                price: group.price(theta),
+                penalty: group.price(theta),
             })
         });
         broken.collect()
@@ -296,7 +305,7 @@ fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {
 
 fn active_summary(group: ActiveGroup) -> ActiveSummary {
     ActiveSummary {
-        sentence: group.sentence(),
+        text: group.sentence(),
         name: group.name,
         rows: group.rows,
         spans: group.spans,
@@ -304,14 +313,14 @@ fn active_summary(group: ActiveGroup) -> ActiveSummary {
     }
 }
 
-fn rung_summary(rung: &Attempt) -> RungSummary {
+fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
     let known = |x: f64| x.is_finite().then_some(x);
-    RungSummary {
-        start: rung.start.name().into(),
-        initial_cost: known(rung.initial_cost),
-        cost: known(rung.cost),
-        iterations: rung.iterations,
-        status: rung.outcome.status,
+    AttemptSummary {
+        start: attempt.start.name().into(),
+        initial_cost: known(attempt.initial_cost),
+        cost: known(attempt.cost),
+        iterations: attempt.iterations,
+        status: attempt.outcome.status,
     }
 }
 
@@ -337,7 +346,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "trajectory.csv",
             "report.html",
         ])
-        .family("readings", "csv", readings.chain(["held-out".to_owned()]))
+        .family("readings", "csv", readings.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }

@@ -384,9 +384,9 @@ fn mistakes_in_what_is_set() {
 fn the_demo_needs_nothing() {
     let bench = Workbench::empty();
     let stdout = bench.run_to(0, &["demo"]);
-    assert!(stdout.contains("but is another device"), "{stdout}");
+    assert!(stdout.contains("but not by the true system"), "{stdout}");
     assert!(
-        stdout.contains("the true device: k/m and c/m to"),
+        stdout.contains("true system recovered: relative error of k/m"),
         "{stdout}"
     );
     assert!(bench.path("runs/demo/results/compare.html").exists());

@@ -431,23 +431,23 @@ pub fn study_journal(bytes: &[u8]) -> Verdict {
     };
     let mut document = StudyDocument {
         fit: kept::<Result<_, String>>(&mut journal, "fit").and_then(Result::ok),
-        spectrum: kept(&mut journal, "spectrum"),
+        sensitivity: kept(&mut journal, "sensitivity"),
         bands: kept(&mut journal, "bands"),
         candidates: kept(&mut journal, "candidates").unwrap_or_default(),
-        equivalents: kept(&mut journal, "equivalents").unwrap_or_default(),
+        equivalent_systems: kept(&mut journal, "equivalent systems").unwrap_or_default(),
         multistart: kept(&mut journal, "starts"),
         ..StudyDocument::default()
     };
     let profile = kept::<Result<_, String>>(&mut journal, "profile 0");
     document.profiles.extend(profile.and_then(Result::ok));
-    if let Some(Ok(varies)) = kept::<Result<_, String>>(&mut journal, "varies") {
-        document.varies = varies;
+    if let Some(Ok(constancy_test)) = kept::<Result<_, String>>(&mut journal, "constancy test") {
+        document.constancy_test = constancy_test;
     }
-    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "refits") {
+    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "bootstrap") {
         document.bootstrap = refits;
     }
-    if let Some((tubes, predictions)) = kept(&mut journal, "tubes") {
-        document.tubes = tubes;
+    if let Some((extremes, predictions)) = kept(&mut journal, "extremes") {
+        document.extremes = extremes;
         document.predictions = predictions;
     }
     document.text();
@@ -468,9 +468,9 @@ const PIECES: [&str; 10] = [
     "equivalents",
     "starts",
     "profile 0",
-    "varies",
-    "refits",
-    "tubes",
+    "constancy test",
+    "bootstrap",
+    "extremes",
 ];
 
 fn kept<T: Serialize + DeserializeOwned>(journal: &mut AnalysisJournal, name: &str) -> Option<T> {

@@ -23,7 +23,7 @@ pub mod constraints {
 }
 pub mod diagnostics {
     pub use crate::diagnostics::{
-        ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
+        NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
         offset_and_drift, rms, spread, without_line,
     };
 }
@@ -38,9 +38,10 @@ pub mod host {
 }
 pub mod identifiability {
     pub use crate::identifiability::{
-        Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
-        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, VerdictKind, anchors, count,
-        is_rounding, is_unhindered, rank_experiments, residual_spread, verdicts,
+        Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement,
+        RankFinding, RankFindingKind, Ranked, Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict,
+        VerdictKind, anchors, count, is_rounding, is_unhindered, rank_experiments, residual_spread,
+        verdicts,
     };
 }
 pub mod objective {

@@ -821,7 +821,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
     let words = verdicts(&problem, &here, &bands);
     words.iter().for_each(|j| println!("{}", j.sentence));
-    let Verdict::OnlyOn(spans) = &words[0].verdict else {
+    let Verdict::PartlyIdentified(spans) = &words[0].verdict else {
         panic!("{}", words[0].sentence);
     };
     assert_eq!(spans.len(), 1);

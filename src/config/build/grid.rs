@@ -8,6 +8,7 @@ use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
 use crate::error::{InputError, Place};
+use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
 
@@ -18,7 +19,7 @@ pub(super) fn build(
     file: &ModelFile,
     purpose: Purpose,
     records: &[Option<Record>],
-    remarks: &mut Vec<String>,
+    notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
     let asked = match (purpose.nodes(), asked) {
@@ -34,10 +35,10 @@ pub(super) fn build(
                 .error_at("grid", "the number of nodes is missing")
                 .expected("`nodes`, since there are no readings to take it from"));
         }
-        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
+        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         None => match node_per_reading(records) {
             Some(nodes) => nodes,
-            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
+            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         },
     };
     if nodes < Grid::FEWEST_NODES {

@@ -15,6 +15,7 @@ pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 use super::locate::{key_path, locate};
 use super::{ModelFile, Source};
 use crate::error::{InputError, Place};
+use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
 use kmcfit_core::internals::problem::Problem;
@@ -50,10 +51,10 @@ pub struct Model {
     pub study: StudyPlan,
     /// Memory that a fit of it may need, bytes: an upper estimate.
     pub memory: u64,
-    /// What the user should know although it is no error.
-    pub warnings: Vec<String>,
-    /// What was chosen for the user, and why.
-    pub remarks: Vec<String>,
+    /// Warnings about data and specification.
+    pub warnings: Vec<Finding>,
+    /// Automatic choices, such as the number of nodes.
+    pub automatic: Vec<Finding>,
     /// What it was made from.
     pub source: Source,
     /// What it took to build it.
@@ -197,11 +198,11 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
     let mut warnings = Vec::new();
-    let mut remarks = Vec::new();
+    let mut automatic = Vec::new();
     let records = timed(&mut reading, || {
         experiments::read(file, purpose, &mut warnings)
     })?;
-    let grid = grid::build(file, purpose, &records, &mut remarks)?;
+    let grid = grid::build(file, purpose, &records, &mut automatic)?;
     let solver = fit::solver(file)?;
     let (builder, notes) = builder(file, purpose, &grid, solver, records)?;
     let about = |error| input_error(file, error);
@@ -213,7 +214,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     if !matches!(purpose, Purpose::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
-    warnings.extend(built.notices.iter().map(ToString::to_string));
+    warnings.extend(built.notices.iter().map(Finding::stated));
     let held_out = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
     let (own, notes): (Vec<_>, Vec<_>) = notes
         .into_iter()
@@ -247,7 +248,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
             .collect(),
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
-        remarks,
+        automatic,
         source,
         preparation: Preparation {
             reading,

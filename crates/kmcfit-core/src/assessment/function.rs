@@ -25,16 +25,16 @@ pub struct FunctionSummary {
     /// in the unit of the function per s^i.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub powers: Option<Vec<f64>>,
-    /// Whether it is zero but for rounding, beside the size at which it would matter.
+    /// Whether it is zero to machine precision, relative to its natural scale.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub is_rounding: bool,
-    /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
+    pub negligible: bool,
+    /// What is known of it: `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`; for models of few free values
     /// whose errors can be believed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<VerdictKind>,
     /// Its smallest and largest value at the nodes where it is known, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known_range: Option<[f64; 2]>,
+    pub identified_range: Option<[f64; 2]>,
     /// For a constant its standard error from the linearised fit, without constraints, penalties and
     /// priors, where the readings determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -82,9 +82,9 @@ pub fn function_summaries(
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
             max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            is_rounding: largest > 0.0 && is_rounding(largest, sizes[i]),
+            negligible: largest > 0.0 && is_rounding(largest, sizes[i]),
             verdict: judged.map(|j| j.verdict.kind()),
-            known_range: judged.and_then(|j| j.known_range),
+            identified_range: judged.and_then(|j| j.identified_range),
             powers: match &function.basis {
                 Some(Basis::Polynomial { .. }) => {
                     Some(physical_powers(&problem.system.grid, &theta[range.clone()]))

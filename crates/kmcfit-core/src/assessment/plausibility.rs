@@ -10,6 +10,7 @@ use crate::problem::Problem;
 use crate::record::{Channel, Loss};
 use crate::simulate::SimulationError;
 use crate::system::{Excitation, Term};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
@@ -38,12 +39,17 @@ const PERIODS_PER_READING: f64 = 0.4;
 const EVEN: f64 = 0.01;
 
 /// Why an optimum identifies no system.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Unidentified {
     /// The fit failed.
     Failed,
     /// There is no response with half the step.
-    NoResponseOnHalfStep(SimulationError),
+    NoResponseOnHalfStep {
+        /// The failure of the simulation.
+        #[serde(skip)]
+        error: SimulationError,
+    },
     /// Half the step changes the response by more than a tenth of the largest reading.
     StepDependent,
     /// All channels are missed by more than twice what their readings vary.
@@ -53,7 +59,8 @@ pub enum Unidentified {
 }
 
 /// A warning about a fit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum FitWarning {
     /// The residuals are so many times sigma: standard errors are not known.
     BeyondSigma {
@@ -165,7 +172,7 @@ fn meaningless(
     step_check: &StepCheckOutcome,
 ) -> Option<Unidentified> {
     match step_check {
-        Err(breakdown) => return Some(Unidentified::NoResponseOnHalfStep(*breakdown)),
+        Err(error) => return Some(Unidentified::NoResponseOnHalfStep { error: *error }),
         Ok(Some(half)) if half.change_per_sample > STEPPER => {
             return Some(Unidentified::StepDependent);
         }

@@ -212,7 +212,7 @@ impl Builder {
                 .expected("samples from which displacement, velocity and acceleration follow")
         })?;
         let remarks = measurements.remarks(problem).into_iter();
-        notices.extend(remarks.map(BuildNotice::Measurement));
+        notices.extend(remarks.map(|remark| BuildNotice::Measurement { remark }));
         Ok(Some(measurements))
     }
 

@@ -1,9 +1,11 @@
 //! Remarks on a specification that are no errors.
 
+use serde::Serialize;
 use std::fmt;
 
 /// A remark on a specification that is no error.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum BuildNotice {
     /// Every coefficient function is fixed.
     NothingToFit,
@@ -27,7 +29,10 @@ pub enum BuildNotice {
         basis: &'static str,
     },
     /// A remark on the states that the equation error takes from the samples.
-    Measurement(String),
+    Measurement {
+        /// The remark.
+        remark: String,
+    },
     /// The start of the search was moved into the constraints.
     StartMoved {
         /// The constraint that was violated most.
@@ -53,7 +58,7 @@ impl fmt::Display for BuildNotice {
                 f,
                 "{key} says nothing: this derivative of a {basis} function is zero"
             ),
-            Self::Measurement(remark) => f.write_str(remark),
+            Self::Measurement { remark } => f.write_str(remark),
             Self::StartMoved { constraint } => {
                 write!(
                     f,

@@ -106,9 +106,8 @@ impl Component {
 
 /// Functions in words: `the mass and the stiffness, which are given`.
 pub(super) fn given_words(names: &[String]) -> String {
-    let names: Vec<String> = names.iter().map(|name| format!("the {name}")).collect();
-    let is = if names.len() == 1 { "is" } else { "are" };
-    format!("{}, which {is} given", names.join(" and "))
+    let names: Vec<String> = (names.iter().map(|name| format!("the fixed {name}"))).collect();
+    names.join(" and ")
 }
 
 /// The force of an experiment, where there is one.

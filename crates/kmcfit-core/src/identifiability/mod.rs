@@ -36,7 +36,7 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
 pub use anchors::anchors;
 pub use band::{Band, Side};
 pub use bands::{BandSettings, Bands};
-pub use counting::{Symmetry, count};
+pub use counting::{RankFinding, RankFindingKind, Symmetry, count};
 pub use experiments::{
     Candidate, CandidateChannel, Gain, Ranked, rank_experiments, residual_spread,
 };

@@ -27,13 +27,13 @@ pub enum Verdict {
         /// Largest half-width of the 95 % band there, relative to that size.
         relative: f64,
     },
-    /// Not known itself, but this ratio with it is.
+    /// Not identified itself; its ratio to the mass is.
     OnlyRatio(String),
-    /// Known on these spans of time, s.
-    OnlyOn(Vec<[f64; 2]>),
-    /// Not known.
-    NotSeen,
-    /// Not sought.
+    /// Identified on these spans of time, s.
+    PartlyIdentified(Vec<[f64; 2]>),
+    /// Not identified at (nearly) any time.
+    NotIdentified,
+    /// Fixed by the model.
     Fixed,
 }
 
@@ -43,8 +43,8 @@ impl Verdict {
         match self {
             Self::Identified { .. } => VerdictKind::Identified,
             Self::OnlyRatio(_) => VerdictKind::OnlyRatio,
-            Self::OnlyOn(_) => VerdictKind::OnlyOn,
-            Self::NotSeen => VerdictKind::NotSeen,
+            Self::PartlyIdentified(_) => VerdictKind::PartlyIdentified,
+            Self::NotIdentified => VerdictKind::NotIdentified,
             Self::Fixed => VerdictKind::Fixed,
         }
     }
@@ -54,8 +54,8 @@ impl Verdict {
         match self {
             Self::Identified { .. } => "identified",
             Self::OnlyRatio(_) => "only-ratio",
-            Self::OnlyOn(_) => "only-on",
-            Self::NotSeen => "not-seen",
+            Self::PartlyIdentified(_) => "partly-identified",
+            Self::NotIdentified => "not-identified",
             Self::Fixed => "fixed",
         }
     }
@@ -68,8 +68,8 @@ impl Verdict {
 pub enum VerdictKind {
     Identified,
     OnlyRatio,
-    OnlyOn,
-    NotSeen,
+    PartlyIdentified,
+    NotIdentified,
     Fixed,
 }
 
@@ -83,7 +83,7 @@ pub struct Judgement {
     /// The same as a sentence.
     pub sentence: String,
     /// Smallest and largest value at the nodes where it is known; `None` where there is no such node.
-    pub known_range: Option<[f64; 2]>,
+    pub identified_range: Option<[f64; 2]>,
 }
 
 impl Judgement {
@@ -91,7 +91,7 @@ impl Judgement {
     pub fn is_open(&self) -> bool {
         match self.verdict {
             Verdict::Identified { .. } | Verdict::Fixed => false,
-            Verdict::OnlyRatio(_) | Verdict::OnlyOn(_) | Verdict::NotSeen => true,
+            Verdict::OnlyRatio(_) | Verdict::PartlyIdentified(_) | Verdict::NotIdentified => true,
         }
     }
 }
@@ -113,24 +113,26 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
     let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
     let unit = &band.unit;
     if is_rounding(half.max(own), size) {
-        return format!("{name} is identified: zero, but for rounding");
+        return format!("{name} is zero to machine precision");
     }
     if half >= own {
-        return format!("{name} is identified: zero, to within {half:.1e} {unit} (95 %)");
+        return format!("{name} does not differ from zero: 95 % CI half-width {half:.1e} {unit}");
     }
     let share = half / own;
     if share > IDENTIFIED {
         return format!(
-            "{name} is small, and known to within {half:.1e} {unit}: {:.0} % of its largest value (95 %)",
+            "{name} is small: 95 % CI half-width {half:.1e} {unit}, {:.0} % of its largest value",
             100.0 * share
         );
     }
     let share = match () {
-        () if is_rounding(share, 1.0) => return format!("{name} is identified, but for rounding"),
-        () if share < 1e-4 => format!("{share:.0e}"),
+        () if is_rounding(share, 1.0) => {
+            return format!("{name} is identified to machine precision");
+        }
+        () if share < 1e-4 => format!("{:.0e} %", 100.0 * share),
         () => format!("{:.2} %", 100.0 * share),
     };
-    format!("{name} is identified, to {share} of its largest value (95 %)")
+    format!("{name} is identified: 95 % CI half-width at most {share} of its largest value")
 }
 
 /// Whether a function of this size is known at a node.
@@ -192,8 +194,8 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
         };
     }
     match share < LEAST {
-        true => Verdict::NotSeen,
-        false => Verdict::OnlyOn(spans(times, known)),
+        true => Verdict::NotIdentified,
+        false => Verdict::PartlyIdentified(spans(times, known)),
     }
 }
 
@@ -201,18 +203,20 @@ fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement 
     let sentence = match &verdict {
         Verdict::Identified { .. } => identified(name, band, size),
         Verdict::OnlyRatio(ratio) => {
-            format!("{name} is not identified by itself, only the ratio {ratio} is")
+            format!("{name} itself is not identifiable; the ratio {ratio} is identified")
         }
-        Verdict::OnlyOn(spans) => format!("{name} is identified only on {}", span_words(spans)),
-        Verdict::NotSeen => format!("{name} is not seen by the samples"),
-        Verdict::Fixed => format!("{name} is given"),
+        Verdict::PartlyIdentified(spans) => {
+            format!("{name} is identified only on {}", span_words(spans))
+        }
+        Verdict::NotIdentified => format!("{name} is not identifiable from these records"),
+        Verdict::Fixed => format!("{name} is fixed by the model"),
     };
     let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));
-    let known_range = known.map(|i| [band.values[i]; 2]);
+    let identified_range = known.map(|i| [band.values[i]; 2]);
     Judgement {
         name: name.to_owned(),
         verdict,
         sentence,
-        known_range: known_range.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
+        identified_range: identified_range.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
     }
 }

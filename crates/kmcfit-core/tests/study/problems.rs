@@ -35,7 +35,7 @@ pub fn nodal(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
 /// Constants: sought from the value where it is `Some`, else known to be the number beside it.
 pub fn constants(
     nodes: usize,
-    initial_parameters: [Option<f64>; 3],
+    starts: [Option<f64>; 3],
     known: [f64; 3],
 ) -> Vec<CoefficientFunction> {
     let quantities = [
@@ -43,7 +43,7 @@ pub fn constants(
         CoefficientKind::Damping,
         CoefficientKind::Stiffness,
     ];
-    let each = quantities.into_iter().zip(estimated).zip(known);
+    let each = quantities.into_iter().zip(starts).zip(known);
     each.map(|((quantity, estimated), known)| match estimated {
         Some(start) => CoefficientFunction::constant(quantity, start, nodes),
         None => CoefficientFunction::fixed(quantity, vec![known; nodes]),

@@ -5,6 +5,7 @@ use crate::config::ModelFile;
 use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::units::Kind;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
@@ -52,7 +53,7 @@ pub fn read(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<RawExcitation, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -92,7 +93,7 @@ fn base(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Option<BaseMotion>, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -159,7 +160,7 @@ fn signal(
     spec: &ExperimentSpec,
     wanted: &Wanted,
     interpolation: Interpolation,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Signal, InputError> {
     // What drives the motion is needed a little beyond the window of the readings.
     let unbounded = ExperimentSpec {

@@ -1,16 +1,18 @@
 //! Experiments: readings, forces and initial states from files, put on the grid.
 
 mod channel;
-mod doubts;
+mod data_checks;
 mod excitation;
 mod source;
 mod unit;
+mod warning;
 
 use super::{Purpose, functions};
 use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::observations::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
@@ -92,7 +94,7 @@ pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
 pub(super) fn read(
     file: &ModelFile,
     purpose: Purpose,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Vec<Option<Record>>, InputError> {
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
@@ -127,14 +129,14 @@ fn read_one(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Record, InputError> {
     let channels = channel::read(file, i, spec, warnings)?;
     let record = Record {
         channels,
         excitation: excitation::read(file, i, spec, warnings)?,
     };
-    warnings.extend(doubts::of(file, i, spec, &record));
+    warnings.extend(data_checks::of(file, i, spec, &record));
     Ok(record)
 }
 

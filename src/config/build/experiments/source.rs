@@ -1,11 +1,12 @@
 //! Columns of files as times and values.
 
-use super::unit::Column;
+use super::unit::QuantityColumn;
 use crate::config::ModelFile;
 use crate::config::build::asked_for;
 use crate::config::scalar::{ColumnId, ScalarOr, Text};
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::observations::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
 use crate::units::{Kind, Unit};
 
@@ -58,7 +59,7 @@ pub fn read(
     file: &ModelFile,
     spec: &ExperimentSpec,
     wanted: &Wanted,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Source, InputError> {
     let experiment = format!("experiments[{}]", wanted.experiment);
     let column_key = format!("{experiment}.columns.{}", wanted.name);
@@ -72,7 +73,7 @@ pub fn read(
         None => column_key,
     };
     let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
-    let column = |index| Column {
+    let column = |index| QuantityColumn {
         file,
         experiment: &experiment,
         name: wanted.name,
@@ -212,7 +213,7 @@ fn times(
     experiment: &str,
     own: Option<&SourceSpec>,
     table: &Table,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Times, InputError> {
     let own_rate = own.and_then(|s| s.sample_rate);
     let own_column = own.and_then(|s| s.time.as_ref());
@@ -250,7 +251,7 @@ fn times(
             Some(_) => error,
         }
     })?;
-    let column = Column {
+    let column = QuantityColumn {
         file,
         experiment,
         name: "time",

@@ -28,6 +28,7 @@ use crate::problem::Problem;
 use columns::{parameter_is_visible, visible_nodes};
 use rows::equations;
 use scale::Scale;
+use serde::{Deserialize, Serialize};
 
 /// Which factor of all functions nothing in the problem fixes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,38 +56,66 @@ pub struct Count {
     pub symmetry: Symmetry,
     /// The spans of time on which the scale is free, s.
     pub free_on: Vec<[f64; 2]>,
-    /// What that settles and what it leaves open, in words.
-    pub statements: Vec<Statement>,
+    /// Findings on the rank and on the scale of the functions.
+    pub findings: Vec<RankFinding>,
 }
 
 impl Count {
-    /// How many directions can be seen, and all statements.
+    /// The headline and the sentences of all findings.
     pub fn sentences(&self) -> Vec<String> {
-        let all = self.statements.iter().map(|s| s.sentence.clone());
+        let all = self.findings.iter().map(|s| s.sentence.clone());
         std::iter::once(self.headline()).chain(all).collect()
     }
 
-    /// How many directions can be seen.
+    /// The rank bound as a sentence.
     pub fn headline(&self) -> String {
         let Self {
             seen_at_most, of, ..
         } = self;
-        format!("at most {seen_at_most} of {of} directions can be seen")
+        format!("at most {seen_at_most} of {of} parameter combinations are identifiable")
     }
 }
 
-/// A sentence on what the records can show.
+/// Kind of a [`RankFinding`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RankFindingKind {
+    /// Some records are linear combinations of others.
+    DependentRecords,
+    /// A force or a fixed function determines the scale of the functions.
+    ScaleIdentified,
+    /// A constraint or a penalty determines the scale, which the records do not.
+    ScaleConstrained,
+    /// One factor, constant in time, is not identifiable.
+    ConstantScaleFree,
+    /// A slowly varying factor is hardly identifiable.
+    ScaleNearlyFree,
+    /// Any common factor `s(t)` is possible.
+    ScaleFree,
+}
+
+/// A finding on the structural rank, with its sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Statement {
+pub struct RankFinding {
+    /// Its kind.
+    pub kind: RankFindingKind,
     /// The sentence.
     pub sentence: String,
-    /// Whether it says what stays open, and not what is settled.
-    pub is_open: bool,
+}
+
+impl RankFinding {
+    /// Whether the finding limits what is identifiable.
+    pub fn is_warning(&self) -> bool {
+        !matches!(
+            self.kind,
+            RankFindingKind::ScaleIdentified | RankFindingKind::ScaleConstrained
+        )
+    }
 }
 
 /// Counts what the records of `problem` can show.
 pub fn count(problem: &Problem) -> Count {
-    let (equations, mut statements) = equations(problem);
+    let (equations, mut findings) = equations(problem);
     let visible = visible_nodes(problem);
     let mut seen = (0..problem.parameters())
         .filter(|j| parameter_is_visible(problem, *j, &visible))
@@ -96,15 +125,12 @@ pub fn count(problem: &Problem) -> Count {
     for component in components(problem) {
         let scale = Scale::of(problem, &component);
         seen -= scale.directions(&visible).min(seen);
-        let (left, sentence) = scale.left(problem, &component);
+        let (left, finding) = scale.left(problem, &component);
         if left > worst {
             worst = left;
             free_on = scale.free_on(problem);
         }
-        statements.push(Statement {
-            sentence,
-            is_open: left != Symmetry::None,
-        });
+        findings.push(finding);
     }
     Count {
         seen_at_most: seen.min(equations),
@@ -112,6 +138,6 @@ pub fn count(problem: &Problem) -> Count {
         equations,
         symmetry: worst,
         free_on,
-        statements,
+        findings,
     }
 }

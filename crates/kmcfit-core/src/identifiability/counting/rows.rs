@@ -1,8 +1,8 @@
 //! Rows: the independent equations of the readings.
 
 use super::super::components::force_of;
-use super::Statement;
 use super::columns::last_acting;
+use super::{RankFinding, RankFindingKind};
 use crate::functions::Basis;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment};
@@ -16,7 +16,7 @@ const INDEPENDENT: f64 = 1e-9;
 type Key = (usize, ChannelKind, usize, u64);
 
 /// The number of independent equations, and what is to be said of them.
-pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
+pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     let mut groups: BTreeMap<Key, (TimePoint, Vec<usize>)> = BTreeMap::new();
     let mut others = 0;
     for (e, experiment) in problem.experiments.iter().enumerate() {
@@ -68,11 +68,11 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<Statement>) {
         dependent |= rank < members.len();
         total += rank;
     }
-    let combinations = dependent.then(|| Statement {
-        sentence: "some records are combinations of others where no force tells them apart: the response is linear in \
-                   its initial state and force, so only two free records count"
+    let combinations = dependent.then(|| RankFinding {
+        kind: RankFindingKind::DependentRecords,
+        sentence: "some records are linear combinations of others: the response is linear in initial state and force, so \
+                   more than two free records, or records before their force acts, add no information on the parameters"
             .to_owned(),
-        is_open: true,
     });
     (total, combinations.into_iter().collect())
 }

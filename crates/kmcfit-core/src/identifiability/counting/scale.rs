@@ -2,7 +2,7 @@
 
 use super::super::components::{Component, given_words};
 use super::super::spans::{span_words, spans};
-use super::Symmetry;
+use super::{RankFinding, RankFindingKind, Symmetry};
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;
 
@@ -71,8 +71,8 @@ impl Scale {
         }
     }
 
-    /// What is left of the scale beside penalties and equalities, and a sentence about it.
-    pub fn left(&self, problem: &Problem, component: &Component) -> (Symmetry, String) {
+    /// The scaling ambiguity that records, penalties and equality constraints leave, and the finding about it.
+    pub fn left(&self, problem: &Problem, component: &Component) -> (Symmetry, RankFinding) {
         let symbols = component.symbols(problem);
         let by_records = match &self.space {
             Space::Constant { .. } if !self.all_free() => Symmetry::None,
@@ -83,21 +83,19 @@ impl Scale {
         };
         if by_records == Symmetry::None {
             let given: Vec<String> = component.given(problem).map(|f| f.name()).collect();
-            let why = match (self.free_functions, given.as_slice()) {
-                (0, _) => "fixed: nothing of it is estimated".to_owned(),
-                (_, []) => "fixed: a force acts".to_owned(),
-                (_, given) => format!("that of {}", given_words(given)),
+            let sentence = match (self.free_functions, given.as_slice()) {
+                (0, _) => format!("the scale of {symbols} is fixed: none of them is estimated"),
+                (_, []) => format!("a measured force determines the scale of {symbols}"),
+                (_, given) => format!("the scale of {symbols} is that of {}", given_words(given)),
             };
-            return (Symmetry::None, format!("the scale of {symbols} is {why}"));
+            let kind = RankFindingKind::ScaleIdentified;
+            return (Symmetry::None, RankFinding { kind, sentence });
         }
         let held = self.held(problem, component);
         let smooth = smoothness(problem, component);
         let where_free = match self.all_free() {
-            true => "because no force acts".to_owned(),
-            false => format!(
-                "on {}, where no force acts",
-                span_words(&self.free_on(problem))
-            ),
+            true => "no force is measured".to_owned(),
+            false => format!("no force acts on {}", span_words(&self.free_on(problem))),
         };
         let partly = !self.all_free();
         let reference = smooth.is_some_and(|order| order == 0);
@@ -116,40 +114,47 @@ impl Scale {
         };
         let sentence = match left {
             Symmetry::None => format!(
-                "the samples leave the scale of {symbols} free {where_free}; {} it",
+                "{where_free}: the records do not determine the scale of {symbols}; {} it",
                 match (reference, held, smooth.is_some()) {
-                    (true, ..) => "a reference holds",
-                    (_, true, true) => "a value or mean and smoothness hold",
-                    (_, true, false) => "a value or mean holds",
-                    _ => "smoothness and the force elsewhere hold",
+                    (true, ..) => "a reference determines",
+                    (_, true, true) => "a constraint on a value or mean and a penalty determine",
+                    (_, true, false) => "a constraint on a value or mean determines",
+                    _ => "a penalty and the force at other times determine",
                 }
             ),
             Symmetry::ConstantFactor => format!(
-                "the constant factor of {symbols} is free {where_free}: hold a value or a mean, fix a \
-                 function, or add a record with a force"
+                "{where_free}: {symbols} are determined only up to a common constant factor; fix a function, constrain a \
+                 value or mean, or add a record with a measured force"
             ),
             Symmetry::NearlyFunction => format!(
-                "{} scale s(t) of {symbols} is hardly seen {where_free}, for the bases have many knots: \
-                 fix a function, add smoothness, or add a record with a force",
+                "{where_free}: {symbols} are determined only up to a common factor{}, and with bases of many knots a slowly \
+                 varying factor s(t) is hardly identifiable; fix a function, add a penalty, or add a record with a \
+                 measured force",
                 match held {
-                    true => "a value or mean holds the constant factor, but a slowly varying",
-                    false => "the constant factor is free, and a slowly varying",
+                    true => " whose mean a constraint determines",
+                    false => "",
                 }
             ),
             Symmetry::Function => format!(
-                "the scale s(t) of {symbols} is free {where_free}{}: fix a function, add smoothness, or \
-                 add a record with a force {}",
+                "{where_free}: {symbols} are determined only up to a common factor s(t){}; fix a function, add a penalty, or \
+                 add a record with a measured force {}",
                 match held {
-                    true => " (a value or mean holds only its constant factor)",
+                    true => " (a constraint on a value or mean determines only a constant factor)",
                     false => "",
                 },
                 match partly {
-                    true => "there",
+                    true => "at these times",
                     false => "at all times",
                 }
             ),
         };
-        (left, sentence)
+        let kind = match left {
+            Symmetry::None => RankFindingKind::ScaleConstrained,
+            Symmetry::ConstantFactor => RankFindingKind::ConstantScaleFree,
+            Symmetry::NearlyFunction => RankFindingKind::ScaleNearlyFree,
+            Symmetry::Function => RankFindingKind::ScaleFree,
+        };
+        (left, RankFinding { kind, sentence })
     }
 
     /// Whether an equality with a right-hand side holds the constant factor.

@@ -5,7 +5,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Experiment};
 
 /// What is known: records, fixed functions, bases with few numbers, constraints, smoothness.
-pub fn knowledge(problem: &Problem) -> Vec<String> {
+pub fn assumptions(problem: &Problem) -> Vec<String> {
     let mut known = vec![records(problem)];
     for function in problem.functions.iter() {
         let name = function.name();

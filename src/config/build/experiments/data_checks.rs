@@ -1,62 +1,64 @@
 //! Data checks of a record.
 
+use super::warning::DataWarning;
 use super::{RawChannel, Record, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::digits::significant;
+use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
 use kmcfit_core::internals::system::round_time;
 use std::f64::consts::TAU;
 
-/// Factors between channels, or between a reading and a known state, that look like a wrong unit.
+/// Ratios between channels, or between a sample and the given state, that suggest a wrong unit.
 const SUSPICIOUS: [(f64, &str); 8] = [
-    (1e3, "a factor of 1000, as between m and mm"),
-    (1e-3, "a factor of 1/1000, as between mm and m"),
-    (1e6, "a factor of 10^6, as between m and um"),
-    (1e-6, "a factor of 10^-6, as between um and m"),
-    (1e2, "a factor of 100, as between m and cm"),
-    (1e-2, "a factor of 1/100, as between cm and m"),
-    (9.80665, "a factor of 9.81, as between g and m/s^2"),
-    (1.0 / 9.80665, "a factor of 1/9.81, as between m/s^2 and g"),
+    (1e3, "the factor 1000 between m and mm"),
+    (1e-3, "the factor 1/1000 between mm and m"),
+    (1e6, "the factor 10^6 between m and um"),
+    (1e-6, "the factor 10^-6 between um and m"),
+    (1e2, "the factor 100 between m and cm"),
+    (1e-2, "the factor 1/100 between cm and m"),
+    (9.80665, "the factor 9.81 between g and m/s^2"),
+    (1.0 / 9.80665, "the factor 1/9.81 between m/s^2 and g"),
 ];
-/// How near a ratio must be to such a factor, as a ratio of the two: channels of one motion agree
-/// within some ten per cent, for its frequency is not single.
+/// Largest quotient of a ratio and such a factor: channels of one response agree within some ten per cent only, because
+/// the response has more than one frequency.
 const NEAR: f64 = 1.5;
-/// Channels whose correlation is below minus this go against each other: noise brings it nearer to zero, no swing
-/// turns it.
+/// Two channels have opposite signs if their correlation is below minus this.
 const AGAINST: f64 = 0.7;
-/// Fewest periods of a swing, and fewest readings in one of them: what only falls has an acceleration of the sign of the
-/// displacement, and slopes between readings that are too far apart have any.
+/// Fewest periods of the response, and fewest samples per period, for a comparison of signs: a monotone decay has an
+/// acceleration of the sign of its displacement, and differences of coarse samples have any sign.
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Everything that looks wrong in the record of experiment `i`.
-pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) -> Vec<String> {
-    let mut doubts = sizes(spec, record);
-    doubts.extend(signs(spec, record));
-    doubts.extend(record.channels.iter().filter_map(range));
-    doubts.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
-    // The equation error asks for no motion from a start.
+/// Warnings about the record of experiment `i`.
+pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) -> Vec<Finding> {
+    let mut warnings = sizes(spec, record);
+    warnings.extend(signs(spec, record));
+    warnings.extend(record.channels.iter().filter_map(range));
+    warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
+    // The equation error simulates no response from an initial state.
     if !is_equation_error(file) {
-        doubts.extend(stillness(spec, record));
+        warnings.extend(stillness(spec, record));
     }
     let name = file.experiment_name(i);
-    let placed = |doubt| format!("experiments[{i}] ({name}): {doubt}");
-    doubts.into_iter().map(placed).collect()
+    let place = format!("experiments[{i}] ({name})");
+    warnings.iter().map(|warning| warning.at(&place)).collect()
 }
 
-/// Channels of one motion, or a reading and the known state, that disagree by a factor that looks like a wrong unit.
-fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
+/// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
+fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
     let mut found = Vec::new();
-    let mut say = |ratio: f64, what: String| {
+    let mut add = |ratio: f64, quantity: String| {
         let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
         if let Some((_, factor)) = SUSPICIOUS.iter().find(|(f, _)| near(*f)) {
-            found.push(format!(
-                "{what} {ratio:.3e} times what it should be: {factor}? `units` converts"
-            ));
+            found.push(DataWarning::SuspiciousFactor {
+                quantity,
+                ratio,
+                factor,
+            });
         }
     };
     let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
@@ -65,10 +67,8 @@ fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
         && let ScalarOr::Scalar(NumberOrEstimate::Number(start)) = &state.displacement
         && start.0 != 0.0
     {
-        say(
-            (channel.values[0] / start.0).abs(),
-            "the first displacement is".to_owned(),
-        );
+        let ratio = (channel.values[0] / start.0).abs();
+        add(ratio, "the first displacement".to_owned());
     }
     for pair in [
         [ChannelKind::Displacement, ChannelKind::Velocity],
@@ -86,14 +86,14 @@ fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
         let ratio = spread(&high.values) / (omega.powi(orders) * spread(&low.values));
         if ratio.is_finite() && ratio > 0.0 {
             let [low, high] = pair.map(ChannelKind::name);
-            say(ratio, format!("the {high} beside the {low} is"));
+            add(ratio, format!("the {high} relative to the {low}"));
         }
     }
     found
 }
 
-/// Channels of one motion that swing against each other, as where one of them has the wrong sign.
-fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
+/// Pairs of channels of one response with opposite signs.
+fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
         .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
@@ -103,17 +103,14 @@ fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<String> {
             one * other * together(low, high).unwrap_or_default() < -AGAINST
         })
     });
-    let said = against.map(|(low, high)| {
-        let [low, high] = [low, high].map(|c| c.kind.name());
-        format!(
-            "the {high} goes against what the {low} says of it, as if one of them had the wrong sign: \
-             `sensors: {{{high}: {{gain: -1}}}}` turns the {high}"
-        )
+    let warnings = against.map(|(low, high)| DataWarning::OppositeSign {
+        high: high.kind.name(),
+        low: low.kind.name(),
     });
-    said.collect()
+    warnings.collect()
 }
 
-/// The sign of a sensor's gain; `None` where that is sought.
+/// Sign of a sensor's gain; `None` if the gain is estimated.
 fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
     let sensors = spec.sensors.as_ref();
     let sensor = sensors.and_then(|sensors| match kind {
@@ -128,8 +125,8 @@ fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
     }
 }
 
-/// The correlation of the readings of a channel with what a lower derivative of the motion says of them: its own slope, or
-/// for the acceleration beside the displacement the displacement turned, as both are those of a swing.
+/// Correlation of the samples of `high` with their estimate from `low`: its slope, or for an acceleration and a
+/// displacement the negative displacement, as for a harmonic response. `None` for too few periods or samples.
 fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
     let frequency = Spectrum::of(&high.values, high.median_spacing)?.dominant();
     let duration = high.times[high.times.len() - 1] - high.times[0];
@@ -162,30 +159,28 @@ fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
     correlation.is_finite().then_some(correlation)
 }
 
-/// A record without a drive that stands still before its motion begins: a free motion begins where nothing holds the device
-/// any more, or when it has been struck.
-fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<String> {
+/// A free record that begins at rest, before the release or the impact.
+fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<DataWarning> {
     if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
         return None;
     }
     let mut channels = record.channels.iter();
     let (channel, first) = channels.find_map(|c| Some((c, onset(&c.values, c.median_spacing)?)))?;
     let from = in_file(spec, channel, first);
-    Some(format!(
-        "the {} stands still before {from} s: a free motion begins where nothing holds or strikes the device any more: \
-         `window: {{min: {from}}}`",
-        channel.kind.name(),
-    ))
+    Some(DataWarning::AtRest {
+        channel: channel.kind.name(),
+        start: from,
+    })
 }
 
-/// The time of a reading, s, as its file counts.
+/// Time of a sample on the time axis of its file, s.
 fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
     let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
     round_time(channel.times[reading] + zero, channel.median_spacing)
 }
 
-/// Single readings that lie far off the others, where their squares count in full.
-fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<String> {
+/// Outliers of a channel with a quadratic loss.
+fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> {
     if !channel.is_squared() {
         return None;
     }
@@ -195,31 +190,23 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<String> {
     let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
     let far = far_off(&away);
     let first = *far.first()?;
-    let kind = channel.kind.name();
-    let lie = match far.len() {
-        1 => format!("one reading of the {kind} lies far off,"),
-        many => format!("{many} readings of the {kind} lie far off, the first"),
-    };
-    let sigma = match channel.weighting {
-        Some(_) => "",
-        None => ", with `sigma`",
-    };
-    Some(format!(
-        "{lie} {} {} at {} s: better left out (empty fields), or counted little (`loss: {{{kind}: huber}}`{sigma})",
-        significant(channel.values[first] / channel.unit.factor(), 4),
-        channel.unit.symbol(),
-        in_file(spec, channel, first),
-    ))
+    Some(DataWarning::Outliers {
+        channel: channel.kind.name(),
+        samples: far.len(),
+        first_value: channel.values[first] / channel.unit.factor(),
+        first_time: in_file(spec, channel, first),
+        unit: channel.unit.symbol().into(),
+        has_sigma: channel.weighting.is_some(),
+    })
 }
 
-/// Readings that pile up at one value, as where a motion goes beyond the range of its sensor.
-fn range(channel: &RawChannel) -> Option<String> {
-    let (readings, level) = clipped(&channel.values)?;
-    Some(format!(
-        "{readings} readings of the {} lie at {} {}, the end of its range: if the sensor reads no further, the motion was \
-         cut off there, and these readings are better left out (empty fields)",
-        channel.kind.name(),
-        level / channel.unit.factor(),
-        channel.unit.symbol(),
-    ))
+/// Many samples at one extreme value: saturation of the sensor.
+fn range(channel: &RawChannel) -> Option<DataWarning> {
+    let (samples, level) = clipped(&channel.values)?;
+    Some(DataWarning::Saturation {
+        channel: channel.kind.name(),
+        samples,
+        level: level / channel.unit.factor(),
+        unit: channel.unit.symbol().into(),
+    })
 }
