@@ -4,7 +4,7 @@ use kmcfit::observations::Table;
 use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
 use kmcfit_core::{Builder, CoefficientSpec, Record};
-use kmcfit_core::{Shape, Statement};
+use kmcfit_core::{Constraint, Shape};
 use std::error::Error;
 
 /// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.
@@ -23,7 +23,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let problem = Builder::new(nodal)
         .record(record)
         .method(Method::Midpoint)
-        .constrain(Statement::Shape {
+        .constrain(Constraint::Shape {
             of: CoefficientKind::Mass,
             shape: Shape::NonIncreasing,
         })

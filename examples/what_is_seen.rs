@@ -1,6 +1,6 @@
 // Before measuring: what can a record show? One free decay, and the same with a shaker run.
 
-use kmcfit_core::internals::identifiability::{Symmetry, count};
+use kmcfit_core::internals::identifiability::{Symmetry, structural_rank};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 use std::error::Error;
@@ -41,7 +41,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let alone = Builder::new(parts()).record(free.clone()).build()?;
     let pair = Builder::new(parts()).record(free).record(forced).build()?;
     Ok([alone, pair].map(|problem| {
-        let seen = count(&problem);
+        let seen = structural_rank(&problem);
         (seen.seen_at_most, seen.symmetry != Symmetry::None)
     }))
 }

@@ -1,7 +1,7 @@
 //! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
-use crate::functions::{CoefficientKind, Parameterization, Penalty, Variation};
+use crate::functions::{CoefficientKind, Parameterization, Penalty, TotalVariation};
 use crate::record::{Channel, Experiment, Weighting};
 use crate::rows::Rows;
 use crate::system::System;
@@ -23,7 +23,7 @@ pub struct ProblemParts {
     /// Penalties on roughness.
     pub penalties: Vec<Penalty>,
     /// Penalties on total variation.
-    pub variations: Vec<Variation>,
+    pub variations: Vec<TotalVariation>,
     /// Constraints on the functions.
     pub constraints: Constraints,
     /// Constraints that may be violated at a penalty.
@@ -215,7 +215,7 @@ impl Problem {
     ///
     /// # Errors
     /// As [`Problem::penalize`].
-    pub fn penalize_variation(&mut self, variation: Variation) -> Result<(), ProblemError> {
+    pub fn penalize_variation(&mut self, variation: TotalVariation) -> Result<(), ProblemError> {
         self.check_penalty(variation.function, &variation.rows)?;
         self.0.variations.push(variation);
         Ok(())

@@ -2,7 +2,7 @@
 
 mod common;
 
-use kmcfit_core::internals::constraints::{RowGroup, Statement};
+use kmcfit_core::internals::constraints::{Constraint, RowGroup};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -27,7 +27,7 @@ fn capped(cap: f64) -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(system, list, observed.displacement, None);
-    let statement = Statement::DampingRatio { max: cap };
+    let statement = Constraint::DampingRatio { max: cap };
     let rows = statement.build(&problem.system.grid, &problem.functions);
     problem.constrain(rows.unwrap()).unwrap();
     problem
@@ -295,7 +295,7 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![unit; NODES]),
     ];
     problem = common::problem_of(problem.system.clone(), list, observed, None);
-    let statement = Statement::DampingRatio { max: cap };
+    let statement = Constraint::DampingRatio { max: cap };
     let built = statement.build(&problem.system.grid, &problem.functions);
     problem = problem
         .with(|parts| {
@@ -357,7 +357,7 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     let mut seen = [0; 2];
     for exponent in 6..18 {
         let max = ratio * (1.0 - 0.5f64.powi(exponent));
-        let statement = Statement::DampingRatio { max };
+        let statement = Constraint::DampingRatio { max };
         problem = problem
             .with(|parts| {
                 parts.constraints = statement.build(&grid, &parts.functions).unwrap();

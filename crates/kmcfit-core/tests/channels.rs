@@ -6,7 +6,8 @@ mod common;
 use common::properties::properties;
 use common::sensed::{Record, Response, cost};
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
+    ScalarValue,
 };
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
@@ -222,9 +223,9 @@ impl Case {
                 .with_base(samples.fixed_in_space.clone())
                 .with_loss(samples.loss)
                 .with_sensor(Sensor {
-                    gain: Value::Sought(first),
-                    offset: Value::Sought(first + 1),
-                    drift: Value::Sought(first + 2),
+                    gain: ScalarValue::Estimated(first),
+                    offset: ScalarValue::Estimated(first + 1),
+                    drift: ScalarValue::Estimated(first + 2),
                 });
             experiment = experiment.with_channel(channel);
         }

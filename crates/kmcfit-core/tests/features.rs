@@ -7,7 +7,7 @@ use common::synthetic::{Truth, rms, run, settings};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
-    Value,
+    ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
@@ -172,7 +172,8 @@ impl Reading {
         let mut channel =
             Channel::new(self.kind, self.times.clone(), values, sigma, &grid(), nodes).unwrap();
         let value = |i: usize| {
-            self.initial_parameters[i].map_or(Value::Known(self.sensor[i]), Value::Sought)
+            self.initial_parameters[i]
+                .map_or(ScalarValue::Known(self.sensor[i]), ScalarValue::Estimated)
         };
         channel = channel.with_loss(self.loss).with_sensor(Sensor {
             gain: value(0),

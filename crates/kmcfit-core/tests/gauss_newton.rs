@@ -5,7 +5,7 @@ mod common;
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, Value,
+    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Sensor, Weighting};
@@ -78,9 +78,9 @@ fn problem(units: Units) -> Problem {
     let channel = problem.experiments[0].channels[0].clone();
     assert_eq!(*channel.weighting(), Weighting::Sigma(sigma));
     let sensor = Sensor {
-        gain: Value::Known(units.length),
-        offset: Value::Sought(0),
-        drift: Value::Sought(1),
+        gain: ScalarValue::Known(units.length),
+        offset: ScalarValue::Estimated(0),
+        drift: ScalarValue::Estimated(1),
     };
     let channel = channel.with_sensor(sensor);
     problem = problem

@@ -10,8 +10,9 @@ use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
 };
 use kmcfit_core::internals::identifiability::{
-    Band, BandSettings, Bands, Candidate, CandidateChannel, Gauge, Sensitivity, Side, Spectrum,
-    Symmetry, Verdict, count, rank_experiments, verdicts,
+    Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification, Gauge,
+    Sensitivity, Side, SingularSpectrum, Symmetry, classify_functions, rank_experiments,
+    structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -81,7 +82,7 @@ fn nodal_problem(system: &System, nodal: &NodalCoefficients, records: &[Record])
     with_records(system, list.collect(), nodal, records)
 }
 
-fn spectrum(problem: &Problem) -> Spectrum {
+fn spectrum(problem: &Problem) -> SingularSpectrum {
     let here = problem.evaluate(&problem.start()).unwrap();
     Sensitivity::of(problem, &here).spectrum()
 }
@@ -149,7 +150,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
     ];
     for (words, records, expected, symmetry) in table {
         let problem = nodal_problem(&system, &nodal, &records);
-        let counted = count(&problem);
+        let counted = structural_rank(&problem);
         let seen = spectrum(&problem);
         println!(
             "{words}: {} of {}; {}",
@@ -177,7 +178,7 @@ fn a_force_that_pauses_sees_less_while_it_does() {
     force[30..50].fill(0.0);
     let problem = nodal_problem(&system, &nodal, &[free(0), free(1), (state, Some(force))]);
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
-    assert_eq!(count(&problem).seen_at_most, 3 * 79 - 19);
+    assert_eq!(structural_rank(&problem).seen_at_most, 3 * 79 - 19);
     assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
 }
 
@@ -190,7 +191,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
         (force, 4, Symmetry::None),
     ] {
         let problem = linear_mass(&system, record);
-        let counted = count(&problem);
+        let counted = structural_rank(&problem);
         println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
         assert_eq!(spectrum(&problem).rank(), expected);
@@ -228,7 +229,7 @@ proptest! {
             (state(y, v), drive.then_some(force))
         }).collect();
         let problem = nodal_problem(&system, &nodal, &records);
-        let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank());
+        let (counted, seen) = (structural_rank(&problem).seen_at_most, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
             prop_assert_eq!(seen, counted);
@@ -341,7 +342,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         })
         .unwrap();
     assert!(gauge(&fixed).is_empty());
-    assert_eq!(count(&fixed).symmetry, Symmetry::None);
+    assert_eq!(structural_rank(&fixed).symmetry, Symmetry::None);
 
     let first = open.functions.ranges()[2].start;
     let mut value = RowGroup::new("k(0) = 1");
@@ -363,7 +364,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
         let found = gauge(&held);
         assert_eq!(found.constant().count(), 0);
         assert_eq!(found.over_time().count(), nodes - 1);
-        let counted = count(&held);
+        let counted = structural_rank(&held);
         println!("{}", counted.sentences().join("; "));
         assert_eq!(counted.symmetry, Symmetry::Function);
         let mut smooth = held.clone();
@@ -373,7 +374,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
                 parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
             })
             .unwrap();
-        assert_eq!(count(&smooth).symmetry, Symmetry::None);
+        assert_eq!(structural_rank(&smooth).symmetry, Symmetry::None);
     }
 }
 
@@ -567,12 +568,15 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         );
         assert!(band.simultaneous.unwrap() > 1.96, "{}", band.name);
     }
-    let words = verdicts(&problem, &here, &bands);
+    let words = classify_functions(&problem, &here, &bands);
     words.iter().for_each(|j| println!("{}", j.sentence));
-    assert_eq!(words[0].verdict, Verdict::OnlyRatio("k/m".into()));
-    assert_eq!(words[1].verdict, Verdict::OnlyRatio("c/m".into()));
-    assert_eq!(words[2].verdict, Verdict::OnlyRatio("k/m".into()));
-    assert!(matches!(words[3].verdict, Verdict::Identified { .. }));
+    assert_eq!(words[0].verdict, Classification::OnlyRatio("k/m".into()));
+    assert_eq!(words[1].verdict, Classification::OnlyRatio("c/m".into()));
+    assert_eq!(words[2].verdict, Classification::OnlyRatio("k/m".into()));
+    assert!(matches!(
+        words[3].verdict,
+        Classification::Identified { .. }
+    ));
 
     // A value of the stiffness brings all of them back.
     let mut held = problem.clone();
@@ -595,9 +599,9 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         bands.functions[2].sides.iter().all(|s| *s == Side::Neither)
             || bands.functions[2].standard_error.iter().all(|s| *s < 1e-12)
     );
-    let words = verdicts(&held, &here, &bands);
+    let words = classify_functions(&held, &here, &bands);
     assert!(
-        matches!(words[0].verdict, Verdict::Identified { .. }),
+        matches!(words[0].verdict, Classification::Identified { .. }),
         "{}",
         words[0].sentence
     );
@@ -638,7 +642,10 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     let (held, free) = (&bands.functions[2], &open.functions[2]);
     assert!(held.standard_error[5] <= free.standard_error[5] * (1.0 + 1e-9));
     assert_eq!(bands.functions[0].pointwise(0), [nodal.mass[0]; 2]);
-    assert_eq!(verdicts(&problem, &here, &bands)[0].verdict, Verdict::Fixed);
+    assert_eq!(
+        classify_functions(&problem, &here, &bands)[0].verdict,
+        Classification::Fixed
+    );
 }
 
 #[test]
@@ -685,8 +692,8 @@ fn without_sigma_the_residuals_say_it() {
     }
 }
 
-fn candidate(name: &str, (initial, force): Record) -> Candidate {
-    Candidate {
+fn candidate(name: &str, (initial, force): Record) -> CandidateExperiment {
+    CandidateExperiment {
         name: name.into(),
         initial,
         excitation: force.map(|f| Excitation::force_at_nodes(&f)),
@@ -703,7 +710,7 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
     let drive = forced(2, &system.grid, 0);
-    let ranked = |records: &[Record], candidates: &[Candidate]| {
+    let ranked = |records: &[Record], candidates: &[CandidateExperiment]| {
         let problem = nodal_problem(&system, &nodal, records);
         let theta = problem.start();
         let here = problem.evaluate(&theta).unwrap();
@@ -716,11 +723,11 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
         base: None,
     };
     let broken = [
-        Candidate {
+        CandidateExperiment {
             channels: Vec::new(),
             ..candidate("blind", free(1))
         },
-        Candidate {
+        CandidateExperiment {
             excitation: Some(short),
             ..candidate("short", free(1))
         },
@@ -814,22 +821,25 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         })
         .unwrap();
     // Half of the knots are beyond the last reading.
-    assert_eq!(count(&problem).seen_at_most, 7);
+    assert_eq!(structural_rank(&problem).seen_at_most, 7);
     assert_eq!(spectrum(&problem).rank(), 7);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
-    let words = verdicts(&problem, &here, &bands);
+    let words = classify_functions(&problem, &here, &bands);
     words.iter().for_each(|j| println!("{}", j.sentence));
-    let Verdict::PartlyIdentified(spans) = &words[0].verdict else {
+    let Classification::PartlyIdentified(spans) = &words[0].verdict else {
         panic!("{}", words[0].sentence);
     };
     assert_eq!(spans.len(), 1);
     // Up to the last reading at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
     assert_eq!(spans[0][0], 0.0);
     assert!((12.4..=12.5).contains(&spans[0][1]), "{spans:?}");
-    assert!(matches!(words[1].verdict, Verdict::Identified { .. }));
-    assert_eq!(words[2].verdict, Verdict::Fixed);
+    assert!(matches!(
+        words[1].verdict,
+        Classification::Identified { .. }
+    ));
+    assert_eq!(words[2].verdict, Classification::Fixed);
 }
 
 /// Smoothness so heavy that the estimate scatters much less than Cramer and Rao would have it: the
@@ -953,7 +963,7 @@ fn the_scale_by_bases_and_drives() {
     for (bases, expected, symmetry) in table {
         let name = format!("{bases:?}");
         let problem = with(bases, &[free(0), free(1)]);
-        let counted = count(&problem);
+        let counted = structural_rank(&problem);
         println!(
             "{}: {}",
             problem.functions.get(0).basis.as_ref().unwrap().name(),
@@ -983,7 +993,7 @@ fn the_scale_by_bases_and_drives() {
             });
         })
         .unwrap();
-    assert_eq!(count(&problem).symmetry, Symmetry::Function);
+    assert_eq!(structural_rank(&problem).symmetry, Symmetry::Function);
     assert_eq!(
         Gauge::at(&problem, &problem.start()).over_time().count(),
         nodes
@@ -993,7 +1003,7 @@ fn the_scale_by_bases_and_drives() {
     let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];
-    let linear = count(&nodal_problem(&system, &nodal, &records)).equations;
-    let bent = count(&nodal_problem(&cubic, &nodal, &records)).equations;
+    let linear = structural_rank(&nodal_problem(&system, &nodal, &records)).equations;
+    let bent = structural_rank(&nodal_problem(&cubic, &nodal, &records)).equations;
     assert_eq!((linear, bent), (2 * (nodes - 1), 3 * (nodes - 1)));
 }

@@ -4,7 +4,7 @@ mod common;
 
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, ScalarParameter, Value,
+    CoefficientFunction, CoefficientKind, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Sensor;
@@ -47,7 +47,7 @@ fn problem(sigma: f64) -> Problem {
         .unwrap();
     let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
-        offset: Value::Sought(0),
+        offset: ScalarValue::Estimated(0),
         ..Sensor::default()
     };
     problem

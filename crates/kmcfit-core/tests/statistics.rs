@@ -6,7 +6,7 @@ mod common;
 use common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::identifiability::{BandSettings, Bands};
 use kmcfit_core::internals::problem::Problem;
@@ -146,8 +146,8 @@ impl Setup {
         }
         if self.sensor.is_some() {
             channel = channel.with_sensor(Sensor {
-                gain: Value::Sought(scalars.len()),
-                offset: Value::Sought(scalars.len() + 1),
+                gain: ScalarValue::Estimated(scalars.len()),
+                offset: ScalarValue::Estimated(scalars.len() + 1),
                 ..Sensor::default()
             });
             scalars.extend([scalar(1.0), scalar(0.0)]);
@@ -401,7 +401,7 @@ fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
         .unwrap();
     let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
-        offset: Value::Sought(0),
+        offset: ScalarValue::Estimated(0),
         ..Sensor::default()
     };
     let weighting = Weighting::Estimated { sigma: 1.0 };

@@ -3,7 +3,7 @@
 use super::{FitAssessment, constant_probability, standard_error};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{VerdictKind, is_rounding, is_unhindered};
+use crate::identifiability::{ClassificationKind, is_rounding, is_unhindered};
 use crate::problem::Problem;
 use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
@@ -31,7 +31,7 @@ pub struct FunctionSummary {
     /// What is known of it: `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`; for models of few free values
     /// whose errors can be believed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<VerdictKind>,
+    pub verdict: Option<ClassificationKind>,
     /// Its smallest and largest value at the nodes where it is known, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_range: Option<[f64; 2]>,

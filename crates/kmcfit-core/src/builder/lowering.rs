@@ -56,9 +56,9 @@ impl Builder {
         let measured = self.measurements(&problem, &mut notices)?;
         let weight_search = self.add_penalties(&mut problem, measured.as_ref(), &mut notices)?;
         let mut rows = Vec::new();
-        for slot in self.slots() {
-            let coefficient_set = slot.owner.map_or(0, |i| coefficient_sets.of_record[i]);
-            for constraint in of_bounds(&slot, coefficient_set) {
+        for entry in self.entries() {
+            let coefficient_set = entry.owner.map_or(0, |i| coefficient_sets.of_record[i]);
+            for constraint in of_bounds(&entry, coefficient_set) {
                 self.add(&constraint, &mut problem, &mut rows, &mut notices)?;
             }
         }
@@ -158,8 +158,8 @@ impl Builder {
     /// The force terms of the system.
     fn terms(&self) -> Result<Vec<Term>, BuildError> {
         let mut terms = Vec::new();
-        for slot in self.slots().iter().filter(|slot| slot.owner.is_none()) {
-            terms.extend(slot.kind.term(slot.width()?));
+        for entry in self.entries().iter().filter(|entry| entry.owner.is_none()) {
+            terms.extend(entry.kind.term(entry.width()?));
         }
         Ok(terms)
     }
@@ -172,9 +172,9 @@ impl Builder {
         notices: &mut Vec<BuildNotice>,
     ) -> Result<Parameterization, BuildError> {
         let mut list = Vec::new();
-        for slot in self.slots() {
-            let mut function = slot.spec.on(slot.kind, &slot.key, grid)?;
-            function.owner = slot.owner.map(|i| self.records[i].name.clone());
+        for entry in self.entries() {
+            let mut function = entry.spec.on(entry.kind, &entry.key, grid)?;
+            function.owner = entry.owner.map(|i| self.records[i].name.clone());
             list.push(function);
         }
         if list.iter().all(|f| f.parameters() == 0) {

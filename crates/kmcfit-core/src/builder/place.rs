@@ -2,7 +2,7 @@
 
 use super::BuildError;
 use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
-use crate::functions::{ScalarParameter, Value};
+use crate::functions::{ScalarParameter, ScalarValue};
 use crate::objective::state_scales;
 use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over};
 use crate::signal::{even_spacing, median_spacing};
@@ -23,7 +23,7 @@ pub(super) struct Placement<'a> {
 }
 
 /// A scalar in the making.
-struct Scalar<'a> {
+struct PendingScalar<'a> {
     key: String,
     name: String,
     unit: &'a str,
@@ -31,15 +31,15 @@ struct Scalar<'a> {
     size: f64,
 }
 
-impl Scalar<'_> {
+impl PendingScalar<'_> {
     /// Its value: known, or one more of `scalars`.
     fn value(
         self,
         spec: ScalarSpec,
         scalars: &mut Vec<ScalarParameter>,
-    ) -> Result<Value, BuildError> {
+    ) -> Result<ScalarValue, BuildError> {
         let (start, prior) = match spec {
-            ScalarSpec::Known(number) => return Ok(Value::Known(number)),
+            ScalarSpec::Known(number) => return Ok(ScalarValue::Known(number)),
             ScalarSpec::Estimated { start, prior } => (start, prior),
         };
         if let Some(prior) = prior.filter(|prior| prior.sigma <= 0.0 || !prior.sigma.is_finite()) {
@@ -57,7 +57,7 @@ impl Scalar<'_> {
             size: if self.size > 0.0 { self.size } else { 1.0 },
             prior,
         });
-        Ok(Value::Sought(scalars.len() - 1))
+        Ok(ScalarValue::Estimated(scalars.len() - 1))
     }
 }
 
@@ -105,7 +105,7 @@ impl Placement<'_> {
         let mut state = [0.0; 2];
         let mut estimated = [None; 2];
         for (q, kind) in kinds.into_iter().enumerate() {
-            let scalar = Scalar {
+            let scalar = PendingScalar {
                 key: format!("{}.initial.{}", self.key, kind.name()),
                 name: format!("initial {} of {}", kind.name(), self.record.name),
                 unit: kind.unit_of(angular),
@@ -113,8 +113,8 @@ impl Placement<'_> {
                 size: sizes[q],
             };
             match scalar.value(self.record.initial[q], scalars)? {
-                Value::Known(number) => state[q] = number,
-                Value::Sought(index) => {
+                ScalarValue::Known(number) => state[q] = number,
+                ScalarValue::Estimated(index) => {
                     estimated[q] = Some(index);
                     state[q] = scalars[index].start;
                 }
@@ -222,7 +222,7 @@ impl Placement<'_> {
         let key = format!("{}.sensors.{kind}", self.key);
         let mut value =
             |part: &str, spec: Option<ScalarSpec>, unit, [usual, start, size]: [f64; 3]| {
-                let scalar = Scalar {
+                let scalar = PendingScalar {
                     key: format!("{key}.{part}"),
                     name: format!("{part} of the {kind} of {}", self.record.name),
                     unit,
@@ -236,7 +236,7 @@ impl Placement<'_> {
             offset: value("offset", offset, unit, [0.0, mean, size])?,
             drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
         };
-        if sensor.gain == Value::Known(0.0) {
+        if sensor.gain == ScalarValue::Known(0.0) {
             let problem = "a sensor with gain 0 sees nothing";
             return Err(BuildError::new(format!("{key}.gain"), problem)
                 .found("0")

@@ -121,7 +121,7 @@ fn median_spacing(times: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostics::Verdict;
+    use crate::diagnostics::WhitenessResult;
     use crate::diagnostics::noise::white;
 
     fn diagnostics(times: &[f64], noise: &[f64]) -> ResidualDiagnostics {
@@ -153,7 +153,7 @@ mod tests {
         assert!((found.step - 0.02).abs() < 1e-12);
         assert_eq!(found.autocorrelation.len(), 51);
         assert!((found.band - 0.062).abs() < 1e-4);
-        assert_eq!(found.whiteness.verdict, Verdict::White);
+        assert_eq!(found.whiteness.verdict, WhitenessResult::White);
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod parameterization;
 mod penalty;
 mod ratios;
 mod scalar;
-mod variation;
+mod total_variation;
 
 pub use basis::Basis;
 pub use coefficient_kind::CoefficientKind;
@@ -21,8 +21,8 @@ pub use gram::Gram;
 pub use parameterization::Parameterization;
 pub use penalty::Penalty;
 pub use ratios::Ratios;
-pub use scalar::{Prior, ScalarParameter, Value};
-pub use variation::Variation;
+pub use scalar::{Prior, ScalarParameter, ScalarValue};
+pub use total_variation::TotalVariation;
 
 use crate::system::Grid;
 

@@ -33,7 +33,7 @@ pub struct CandidateChannel {
 
 /// A record that could be made, of the main device over the whole grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct CandidateExperiment {
     /// Its name.
     pub name: String,
     /// Displacement and velocity at the first node.
@@ -110,7 +110,7 @@ pub fn rank_experiments(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    candidates: &[Candidate],
+    candidates: &[CandidateExperiment],
     penalties: bool,
 ) -> Vec<Ranked> {
     let sensitivity = Sensitivity::of(problem, evaluation);
@@ -127,7 +127,7 @@ pub fn rank_experiments(
         false => seen,
     };
     let gauge = Gauge::at(problem, theta);
-    let gain = |candidate: &Candidate| -> Result<Gain, String> {
+    let gain = |candidate: &CandidateExperiment| -> Result<Gain, String> {
         let experiment = simulated(problem, candidate)?;
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = Factorisation::of(&stacked(now, &added)).rank;
@@ -175,7 +175,7 @@ fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gau
 }
 
 /// The candidate as an experiment; why it is none otherwise.
-fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, String> {
+fn simulated(problem: &Problem, candidate: &CandidateExperiment) -> Result<Experiment, String> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
     if candidate.channels.is_empty() {

@@ -8,7 +8,7 @@
 use super::components::{Component, components};
 use super::directions::Directions;
 use super::factorisation::{column_space, null_space};
-use super::sensitivity::Spectrum;
+use super::sensitivity::SingularSpectrum;
 use crate::functions::Design;
 use crate::problem::Problem;
 use crate::system::quadrature::trapezoid_weights;
@@ -120,9 +120,9 @@ impl Gauge {
     }
 
     /// The directions that the readings do not see and that are mostly gauge: constant factors
-    /// first, then those over time, orthogonal to them. The rest of [`Spectrum::unseen`] has other
+    /// first, then those over time, orthogonal to them. The rest of [`SingularSpectrum::unseen`] has other
     /// reasons.
-    pub fn unseen(&self, spectrum: &Spectrum) -> Vec<Named> {
+    pub fn unseen(&self, spectrum: &SingularSpectrum) -> Vec<Named> {
         let directions = spectrum.directions();
         let mut named = Vec::new();
         let constant = basis_of(self.constant(), directions);
@@ -161,7 +161,7 @@ fn basis_of<'a>(
 
 /// The directions of the space `basis` (orthonormal columns) that are not seen: principal directions
 /// between it and the null space.
-fn unseen_in(spectrum: &Spectrum, basis: &DMatrix<f64>, name: Option<&str>) -> Vec<Named> {
+fn unseen_in(spectrum: &SingularSpectrum, basis: &DMatrix<f64>, name: Option<&str>) -> Vec<Named> {
     let Some(name) = name else {
         return Vec::new();
     };

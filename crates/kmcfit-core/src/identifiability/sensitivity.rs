@@ -84,13 +84,13 @@ impl Sensitivity {
     }
 
     /// Singular values and directions.
-    pub fn spectrum(&self) -> Spectrum {
+    pub fn spectrum(&self) -> SingularSpectrum {
         let mut factorisation = Factorisation::of(&self.jacobian);
         if self.directions.is_coarse() {
             // Along smooth directions the scale over time shows through the error of the stepper.
             factorisation = factorisation.above(COARSE_RANK);
         }
-        Spectrum {
+        SingularSpectrum {
             factorisation,
             directions: self.directions.clone(),
             names: self.names.clone(),
@@ -116,7 +116,7 @@ fn by_tangents(
 
 /// What the readings see: `J = U S V^T`.
 #[derive(Debug, Clone)]
-pub struct Spectrum {
+pub struct SingularSpectrum {
     factorisation: Factorisation,
     directions: Directions,
     names: Vec<String>,
@@ -133,7 +133,7 @@ pub struct Seen {
     pub functions: Vec<(String, Vec<f64>)>,
 }
 
-impl Spectrum {
+impl SingularSpectrum {
     /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
     /// readings together per change by 100 % of the natural sizes ([`Directions`]).
     pub fn singular_values(&self) -> &[f64] {

@@ -6,16 +6,16 @@ mod gradient_check;
 mod jacobian;
 mod node_aligned;
 mod prediction;
-mod refine;
 mod scales;
 mod simulated_record;
+mod step_halving;
 mod verify;
 
 pub use gradient::{Gradient, GradientKind};
 pub use gradient_check::GradientCheck;
-pub use refine::Refined;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
+pub use step_halving::Refined;
 pub use verify::GradientError;
 
 use crate::problem::Problem;
@@ -79,7 +79,7 @@ impl Problem {
     ///
     /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
-    /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
+    /// of `weight sum |D theta|` ([`crate::functions::TotalVariation`]) plus the price of the soft
     /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
     /// ([`crate::functions::ScalarParameter::price`]).
     ///

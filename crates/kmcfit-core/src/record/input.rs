@@ -1,7 +1,7 @@
 //! Inputs over time, from which the excitation on any grid is made.
 
 use super::ChannelKind;
-use crate::signal::{Shape, Signal};
+use crate::signal::{ExcitationShape, Signal};
 use crate::system::{Excitation, Grid, StageSamples};
 
 /// A force over time.
@@ -10,7 +10,7 @@ pub enum Waveform {
     /// Measured, N.
     Samples(Signal),
     /// A formula, N.
-    Shape(Shape),
+    Shape(ExcitationShape),
 }
 
 /// A measured motion of the base.

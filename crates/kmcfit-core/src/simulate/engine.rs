@@ -1,7 +1,7 @@
 //! The choice among the reference functions and their specialisations.
 
 use super::error::{SimulationError, require_finite, require_positive_mass};
-use super::fast::blocks::LinearDevice;
+use super::fast::blocks::LinearSystem;
 use super::fast::{continuous_adjoint, prefactored, simd_adjoint};
 use super::reference::equation::EquationOfMotion;
 use super::reference::{self, AdjointEquation};
@@ -75,7 +75,7 @@ impl Engine {
         match self {
             Self::Reference => {}
             Self::ParallelInTime => {
-                if let Some(linear) = LinearDevice::of(system, nodal, trajectory.nodes()) {
+                if let Some(linear) = LinearSystem::of(system, nodal, trajectory.nodes()) {
                     linear.forward(initial, trajectory);
                     if trajectory.is_finite() {
                         return Ok(());
@@ -109,7 +109,7 @@ impl Engine {
         let gradient = match self {
             Self::Reference => None,
             // What is not finite anywhere is not finite at the beginning.
-            Self::ParallelInTime => LinearDevice::of(system, nodal, nodes)
+            Self::ParallelInTime => LinearSystem::of(system, nodal, nodes)
                 .map(|linear| linear.gradient(trajectory, source))
                 .filter(|gradient| gradient.initial.is_finite()),
             Self::Prefactored => {
@@ -182,6 +182,6 @@ pub(crate) fn least_squares(
     assert_eq!(observed.len(), nodes, "a measurement per node");
     let engine = Engine::choose(system, None, nodes, Purpose::Estimation);
     (engine == Engine::ParallelInTime).then_some(())?;
-    let nodal = LinearDevice::new(functions, system.grid.step(), nodes)?;
+    let nodal = LinearSystem::new(functions, system.grid.step(), nodes)?;
     Some(nodal.least_squares(initial, observed, weights, gradient))
 }

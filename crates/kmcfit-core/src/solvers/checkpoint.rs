@@ -7,9 +7,9 @@
 //! from these again, and what does not come out with the bits that were noted is not used: its unit is
 //! computed from its beginning. So what is kept decides how long a fit takes and never how it ends.
 
-use super::counts::Counts;
 use super::history::IterationRecord;
 use super::settings::StartStrategy;
+use super::solve_counts::SolveCounts;
 use super::termination::Outcome;
 use super::timings::Timings;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
@@ -40,7 +40,7 @@ pub struct SolverState {
     /// The points whose motions are kept for figures, by iteration.
     pub snapshots: Vec<(u64, ExactF64s)>,
     /// Work done.
-    pub counts: Counts,
+    pub counts: SolveCounts,
     /// What that work took.
     pub timings: Timings,
     /// Wall-clock time so far.

@@ -29,7 +29,7 @@ pub struct IterationRecord {
 
 /// A motion on the way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
+pub struct ResponseSnapshot {
     /// After which iteration; 0 is the start.
     pub iteration: u64,
     /// The motion in each experiment.
@@ -50,7 +50,7 @@ pub(super) struct Reference {
 #[derive(Debug)]
 pub(super) struct Recorder {
     pub rows: Vec<IterationRecord>,
-    pub snapshots: Vec<Snapshot>,
+    pub snapshots: Vec<ResponseSnapshot>,
     pub initial_cost: f64,
     pub started_from: f64,
     pub initial_norm_squared: f64,
@@ -95,7 +95,7 @@ impl Recorder {
             return None;
         }
         let restored = snapshots.iter().map(|(iteration, parameters)| {
-            Some(Snapshot {
+            Some(ResponseSnapshot {
                 iteration: *iteration,
                 trajectories: at(parameters)?,
             })
@@ -144,7 +144,7 @@ impl Recorder {
 
     fn keep_snapshot(&mut self, iteration: u64, point: &Iterate) {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
-            self.snapshots.push(Snapshot {
+            self.snapshots.push(ResponseSnapshot {
                 iteration,
                 trajectories: point.evaluation.trajectories.clone(),
             });

@@ -5,7 +5,6 @@
 
 mod active_set;
 mod checkpoint;
-mod counts;
 mod evaluator;
 mod executor;
 mod fit;
@@ -19,6 +18,7 @@ mod noise_estimation;
 mod optimality;
 mod reason;
 mod settings;
+mod solve_counts;
 mod start_projection;
 mod start_strategy;
 mod starts;
@@ -32,7 +32,6 @@ pub use active_set::{ActiveGroup, active_constraints};
 pub use checkpoint::{
     CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, Observer, SolverState,
 };
-pub use counts::Counts;
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use history::{IterationRecord, number_or_nan};
@@ -44,6 +43,7 @@ pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
 pub use reason::Reason;
 pub use settings::{FitSettings, Initial, Solver, StartStrategy};
+pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
 pub use start_strategy::fit;
 pub use state_estimation::estimate_states;

@@ -125,7 +125,7 @@ impl Optimality {
         for (d, s) in sub.proximal.iter_mut().zip(&scales) {
             *d = cost * s;
         }
-        let found = Minimum::of(&sub)?;
+        let found = LinearisedMinimum::of(&sub)?;
         let parameters: Vec<f64> = point
             .parameters
             .iter()
@@ -153,7 +153,7 @@ pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
 }
 
 /// The minimum of a linearised problem.
-struct Minimum {
+struct LinearisedMinimum {
     z: Vec<f64>,
     /// `sum |multiplier| distance` at zero, of the whole cost.
     complementarity: f64,
@@ -161,7 +161,7 @@ struct Minimum {
     accuracy: f64,
 }
 
-impl Minimum {
+impl LinearisedMinimum {
     fn of(sub: &Subproblem) -> Option<Self> {
         if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, 0.1 * TOLERANCE)) {
             return Some(Self {

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// A value and the limit that it is within.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Within {
+pub struct BoundedValue {
     /// The value.
     pub value: f64,
     /// The limit.
@@ -22,9 +22,9 @@ pub enum Reason {
     #[error("{}", ratios(cost.as_ref(), gradient.as_ref()))]
     Ratios {
         /// `J / J0`, if there is a limit.
-        cost: Option<Within>,
+        cost: Option<BoundedValue>,
         /// `G^2 / G0^2`, if there is a limit.
-        gradient: Option<Within>,
+        gradient: Option<BoundedValue>,
     },
     /// The last iteration changed every function by at most this share of its size.
     #[error("the last iteration changed no function by more than {0:.1e} of its size")]
@@ -180,10 +180,10 @@ pub enum MissingMeasurement {
     Motion,
 }
 
-fn ratios(cost: Option<&Within>, gradient: Option<&Within>) -> String {
+fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> String {
     let named = [("J/J0", cost), ("G^2/G0^2", gradient)];
     let given = named.into_iter().filter_map(|(name, test)| {
-        let Within { value, limit } = test?;
+        let BoundedValue { value, limit } = test?;
         Some(format!("{name} {value:.3e} <= {limit:.3e}"))
     });
     given.collect::<Vec<_>>().join(" and ")

@@ -7,11 +7,11 @@
 //! and parameters together, from a response near the measurements.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::{Prepared, search, search_prepared};
 use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
+use super::solve_counts::SolveCounts;
 use super::start_projection::StartProjection;
 use super::starts::{
     Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
@@ -87,7 +87,7 @@ struct Attempts<'a, 'w> {
     /// Cost and gradient at the start values, which all attempts are compared to.
     reference: Option<Reference>,
     /// Work before and between the searches.
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     best: Option<Fit>,
     attempts: Vec<Attempt>,
@@ -115,7 +115,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             has_several,
             truncated: None,
             reference: None,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             best: None,
             attempts: Vec::new(),

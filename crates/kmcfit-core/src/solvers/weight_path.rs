@@ -1,13 +1,13 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
 use super::history::IterationRecord;
 use super::iterate::Iterate;
 use super::linearization::{Linearization, linearisation_tangents, linearise};
 use super::settings::FitSettings;
+use super::solve_counts::SolveCounts;
 use super::start_strategy::search_from_starts;
 use super::termination::{Outcome, Status};
 use super::timings::{Timings, timed};
@@ -141,7 +141,7 @@ pub fn choose_weight_watched(
     which: &[usize],
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
-    let mut walk = Walk {
+    let mut walk = WeightPathSearch {
         problem,
         settings: settings.clone(),
         which,
@@ -149,7 +149,7 @@ pub fn choose_weight_watched(
         from: start.to_vec(),
         last: None,
         attempts: Vec::new(),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: Duration::ZERO,
     };
@@ -187,7 +187,7 @@ pub fn choose_weight_watched(
 /// A walk along the path. The first fit tries the starting points of [`fit`]; every other starts where its
 /// neighbour ended, and needs none: a fit that explains the record is followed while its weight
 /// changes, also to weights so large that it explains the record no longer.
-struct Walk<'a, 'w> {
+struct WeightPathSearch<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
@@ -195,12 +195,12 @@ struct Walk<'a, 'w> {
     from: Vec<f64>,
     last: Option<Outcome>,
     attempts: Vec<Attempt>,
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     elapsed: Duration,
 }
 
-impl Walk<'_, '_> {
+impl WeightPathSearch<'_, '_> {
     /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
     /// at the middle a fit explains the record, which it need not at the largest weight, and
     /// converges fast, which it need not at the smallest.

@@ -23,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Where the noise of a replicate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Noise {
+pub enum ReplicateNoise {
     /// Normal, with the sigma of the readings or that of the residuals.
     Parametric,
     /// The residuals, drawn again.
@@ -57,7 +57,7 @@ pub fn intervals(
     problem: &Problem,
     optimum: &[f64],
     further: impl Iterator<Item = Linear>,
-    (noise, count, seed): (Noise, usize, u64),
+    (noise, count, seed): (ReplicateNoise, usize, u64),
     level: f64,
     threads: usize,
 ) -> Result<Vec<NumberInterval>, NoRefits> {
@@ -99,7 +99,7 @@ pub struct Bootstrap {
 pub fn bootstrap(
     problem: &Problem,
     optimum: &[f64],
-    noise: Noise,
+    noise: ReplicateNoise,
     count: usize,
     seed: u64,
     threads: usize,
@@ -109,11 +109,11 @@ pub fn bootstrap(
     let job = |index: usize| {
         let mut random = stream(seed, index);
         let errors = match noise {
-            Noise::Parametric => {
+            ReplicateNoise::Parametric => {
                 let unit = normal(&mut random, sigmas.len());
                 unit.iter().zip(&sigmas).map(|(u, s)| u * s).collect()
             }
-            Noise::Residual => drawn(problem, &evaluation, &mut random),
+            ReplicateNoise::Residual => drawn(problem, &evaluation, &mut random),
         };
         let simulated = with_samples(problem, &evaluation, &errors);
         match fit_from(&simulated, optimum, &settings()) {

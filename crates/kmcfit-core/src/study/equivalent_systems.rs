@@ -1,6 +1,6 @@
 //! Equivalent systems of a fit: those with chosen masses, each checked by a simulation of its own.
 
-use super::equivalent::{TargetResponse, Wish, equivalent};
+use super::equivalent_coefficients::{EquivalentOptions, TargetResponse, equivalent_coefficients};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::{NodalCoefficients, State};
@@ -56,7 +56,12 @@ pub fn equivalent_systems(
     let find = |choice: Choice| {
         let damping = choice.damping;
         let damping = damping.unwrap_or_else(|| nodal.coefficients[0].clone());
-        let found = equivalent(&choice.mass, &response, &Wish::near(damping, least)).ok()?;
+        let found = equivalent_coefficients(
+            &choice.mass,
+            &response,
+            &EquivalentOptions::near(damping, least),
+        )
+        .ok()?;
         let excitation = experiment.excitation.as_ref();
         let moved = problem.system.forward(&found, initial, excitation).ok()?;
         let largest = (response.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
+pub struct PredictionSummary {
     /// Initial displacement, m.
     pub displacement: f64,
     /// Initial velocity, m/s.
@@ -33,7 +33,7 @@ pub struct Prediction {
 #[derive(Debug, Clone)]
 pub struct PredictedResponse {
     /// In numbers.
-    pub summary: Prediction,
+    pub summary: PredictionSummary,
     /// The found device's motion.
     pub response: Trajectory,
     /// The true device's motion, where the truth is known.
@@ -72,14 +72,14 @@ fn summarise(
     state: State,
     response: &Trajectory,
     truth: Option<&Trajectory>,
-) -> Prediction {
+) -> PredictionSummary {
     let integral = |f: &dyn Fn(usize) -> f64| {
         let squares: Vec<f64> = (0..response.displacement.len())
             .map(|i| f(i).powi(2))
             .collect();
         trapezoid(&squares, system.grid.step())
     };
-    Prediction {
+    PredictionSummary {
         displacement: state.displacement,
         velocity: state.velocity,
         cost: truth.map(|t| integral(&|i| response.displacement[i] - t.displacement[i])),

@@ -2,7 +2,7 @@
 //!
 //! * [`Linear`]: a number that is linear in the parameters, the thing asked about;
 //! * [`profile()`]: which values of it the readings allow, by fits with it held fixed;
-//! * [`pull_apart`]: the extreme devices among all that explain the readings as well as stated;
+//! * [`extremes`]: the extreme devices among all that explain the readings as well as stated;
 //! * [`equivalent`]: other devices with the very same motion; [`equivalent_systems`] finds and checks those of a fit;
 //! * [`multistart`]: fits from many starts, their clusters, and whether two optima share a valley;
 //! * [`variation`]: whether a function varies at all;
@@ -13,20 +13,20 @@
 //! them.
 
 pub mod bootstrap;
-pub mod equivalent;
+pub mod constancy_test;
+pub mod equivalent_coefficients;
 mod equivalent_systems;
+pub mod extremes;
 mod free_response;
 mod functional;
 pub mod multistart;
 mod parallel;
 pub mod prediction;
 pub mod profile;
-pub mod pull_apart;
 mod refit;
 mod simulate;
-pub mod variation;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
-pub use free_response::{PredictedResponse, Prediction, predict};
+pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
 pub use profile::{Profile, ProfileSettings, profile, profiles};

@@ -2,10 +2,10 @@
 //!
 //! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
 //! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
-//! envelope of the motions of given extreme devices ([`super::pull_apart`]): the readings rule
+//! envelope of the motions of given extreme devices ([`super::extremes`]): the readings rule
 //! none of them out, however unlikely the linearisation calls them.
 
-use super::pull_apart::Extreme;
+use super::extremes::Extreme;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
 use crate::simulate::{SimulationError, Trajectory};
@@ -17,7 +17,7 @@ const Z_95: f64 = 1.959_963_984_540_054;
 
 /// An unseen run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct PredictionCase {
     /// Its name.
     pub name: String,
     /// State at the first node.
@@ -28,7 +28,7 @@ pub struct Run {
     pub nodal: usize,
 }
 
-impl Run {
+impl PredictionCase {
     /// Free motion of the main device.
     pub fn free(name: impl Into<String>, initial: State) -> Self {
         Self {
@@ -71,7 +71,7 @@ pub struct Prediction {
 pub fn predict(
     problem: &Problem,
     theta: &[f64],
-    run: &Run,
+    run: &PredictionCase,
     covariance: Option<&DMatrix<f64>>,
     extremes: &[Extreme],
 ) -> Result<Prediction, SimulationError> {
@@ -129,7 +129,7 @@ pub fn predict(
 }
 
 /// The problem with the run as its only experiment, its displacement read at all nodes.
-fn with_run(problem: &Problem, run: &Run) -> Problem {
+fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let mut seen = problem.clone();
     let grid = problem.system.grid;
     let nodes = grid.nodes();

@@ -1,7 +1,7 @@
 //! The input of a record: force and motion of the base.
 
 use super::TimePoint;
-use super::integrator::Position;
+use super::integrator::StagePosition;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a
 /// right end is the limit from the left, so that a jump at a node belongs to the step after it.
@@ -42,11 +42,11 @@ impl StageSamples {
     }
 
     #[inline(always)]
-    pub(crate) fn at(&self, i: usize, position: Position) -> f64 {
+    pub(crate) fn at(&self, i: usize, position: StagePosition) -> f64 {
         self.0[i][match position {
-            Position::Left => 0,
-            Position::Middle => 1,
-            Position::Right => 2,
+            StagePosition::Left => 0,
+            StagePosition::Middle => 1,
+            StagePosition::Right => 2,
         }]
     }
 }

@@ -11,7 +11,7 @@ mod input;
 mod integrator;
 pub mod quadrature;
 
-pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
+pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};

@@ -1,6 +1,6 @@
 use kmcfit_core::internals::qp::ConicStatus;
-use kmcfit_core::internals::study::equivalent::{
-    TargetResponse, Wish, anchors, equivalent, imbalance,
+use kmcfit_core::internals::study::equivalent_coefficients::{
+    EquivalentOptions, TargetResponse, anchors, equivalent_coefficients, imbalance,
 };
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
@@ -82,8 +82,8 @@ fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
 fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, TargetResponse) {
     let response = response(nodes);
     let mass = random_mass(seed, &response.grid);
-    let wish = Wish::near(vec![0.1; nodes], 0.05);
-    let nodal = equivalent(&mass, &response, &wish).unwrap();
+    let options = EquivalentOptions::near(vec![0.1; nodes], 0.05);
+    let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
     let excitation = Excitation::force_at_nodes(&response.force);
     let system = system(nodes, Method::Midpoint);
     let moved = system.forward(&nodal, INITIAL, Some(&excitation)).unwrap();
@@ -126,14 +126,14 @@ fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
     }
 }
 
-/// With the true mass the wish for the true damping is granted, and the true stiffness comes back.
+/// With the true mass the options for the true damping is granted, and the true stiffness comes back.
 #[test]
 fn the_true_mass_and_damping_bring_the_true_stiffness() {
     let response = response(401);
     let truth = truth(&response.grid);
-    let mut wish = Wish::near(truth.coefficients[0].clone(), 0.05);
-    wish.least_damping = Some(0.0);
-    let nodal = equivalent(&truth.mass, &response, &wish).unwrap();
+    let mut options = EquivalentOptions::near(truth.coefficients[0].clone(), 0.05);
+    options.least_damping = Some(0.0);
+    let nodal = equivalent_coefficients(&truth.mass, &response, &options).unwrap();
     let errors = crate::common::errors(&nodal, &truth);
     println!("{errors:?}");
     // The smoothness of k, 1e-9 of T^4 k''^2, bends it by thousandths.
@@ -150,10 +150,10 @@ fn what_no_device_can_do_is_said() {
         .iter()
         .map(|t| 0.5 + 0.5 * t)
         .collect();
-    let mut wish = Wish::near(vec![0.1; 401], 0.05);
-    wish.least_damping = Some(0.0);
+    let mut options = EquivalentOptions::near(vec![0.1; 401], 0.05);
+    options.least_damping = Some(0.0);
     let negative = anchors(&mass, &response).iter().any(|(_, c)| *c < -1e-3);
-    let found = equivalent(&mass, &response, &wish);
+    let found = equivalent_coefficients(&mass, &response, &options);
     println!("{negative} {:?}", found.as_ref().err());
     assert!(negative);
     assert_eq!(found, Err(ConicStatus::Infeasible));

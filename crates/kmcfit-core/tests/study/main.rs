@@ -4,10 +4,10 @@
 mod common;
 
 mod bootstrap;
+mod constancy_test;
 mod equivalent;
+mod extremes;
 mod multistart;
 mod prediction;
 mod problems;
 mod profile;
-mod pull_apart;
-mod variation;

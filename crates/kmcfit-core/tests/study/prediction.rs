@@ -2,10 +2,10 @@ use crate::common;
 use crate::problems::regular;
 use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
-use kmcfit_core::internals::study::prediction::{Run, predict};
+use kmcfit_core::internals::study::bootstrap::{ReplicateNoise, bootstrap};
+use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs, ratios_at};
+use kmcfit_core::internals::study::prediction::{PredictionCase, predict};
 use kmcfit_core::internals::study::profile::QUANTILE_95;
-use kmcfit_core::internals::study::pull_apart::{Level, ratios_at, tube};
 use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 
@@ -27,9 +27,9 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
         .iter()
         .map(|t| (1.1 * t).sin())
         .collect();
-    let run = Run {
+    let run = PredictionCase {
         excitation: Some(Excitation::force_at_nodes(&force)),
-        ..Run::free(
+        ..PredictionCase::free(
             "unseen",
             State {
                 displacement: -0.5,
@@ -37,9 +37,9 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
             },
         )
     };
-    let level = Level::of(best.evaluation.misfit + QUANTILE_95);
+    let level = MisfitLimit::of(best.evaluation.misfit + QUANTILE_95);
     let targets = [0, 1].map(|j| Target::Linear(Linear::parameter(j)));
-    let bands = tube(
+    let bands = extreme_pairs(
         &problem,
         std::slice::from_ref(&best.parameters),
         &targets,
@@ -61,7 +61,15 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     assert!(found.no_response.is_empty());
     assert_eq!(band[0], [-0.5, -0.5], "the state at the start is known");
 
-    let refits = bootstrap(&problem, &best.parameters, Noise::Parametric, 1000, 3, 2).unwrap();
+    let refits = bootstrap(
+        &problem,
+        &best.parameters,
+        ReplicateNoise::Parametric,
+        1000,
+        3,
+        2,
+    )
+    .unwrap();
     let responses: Vec<Vec<f64>> = refits
         .found()
         .map(|theta| {
@@ -111,18 +119,18 @@ fn devices_that_fit_alike_predict_apart() {
     let [c, k] = [0, 1].map(|j| &nodal.coefficients[j][..]);
     let truth = [&nodal.mass[..], c, k].concat();
     let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
-    let level = Level {
+    let level = MisfitLimit {
         budgets: (0..3).map(|f| (rows(f), 1e-3)).collect(),
         reach: 3.0,
         programs: 15,
-        ..Level::of(0.0114)
+        ..MisfitLimit::of(0.0114)
     };
     // What free motion shows: c/m and k/m, pushed apart.
     let targets: Vec<Target> = [1, 2]
         .iter()
         .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))
         .collect();
-    let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
     for band in &bands {
         println!(
             "{}: {:.3} .. {:.3}, {} + {} programs",
@@ -135,7 +143,7 @@ fn devices_that_fit_alike_predict_apart() {
     }
     let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
     let distance = |displacement: f64, velocity: f64| {
-        let run = Run::free(
+        let run = PredictionCase::free(
             "other",
             State {
                 displacement,

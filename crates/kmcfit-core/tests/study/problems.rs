@@ -2,7 +2,8 @@
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
+    ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
@@ -127,7 +128,7 @@ pub fn linear(seed: u64) -> Problem {
     let truth = [1.0, 0.1, 2.0];
     let values = samples(&system, &nodal(201, truth), None, 4, SIGMA, seed);
     let sensor = Sensor {
-        offset: Value::Sought(2),
+        offset: ScalarValue::Estimated(2),
         ..Sensor::default()
     };
     let record = Record {

@@ -4,13 +4,13 @@ use crate::problems::{
 };
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Penalty, Value,
+    Basis, CoefficientFunction, CoefficientKind, Penalty, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
+use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
 use kmcfit_core::internals::study::profile::{End, Interval, QUANTILE_95};
-use kmcfit_core::internals::study::pull_apart::{Level, tube};
 use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
 use kmcfit_core::internals::system::{Excitation, Method};
 
@@ -90,8 +90,8 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
     let values = samples(&system, &nodal(201, truth), Some(&excitation), 4, 0.05, 2);
     let record = Record {
         sensor: Sensor {
-            gain: Value::Sought(0),
-            offset: Value::Sought(1),
+            gain: ScalarValue::Estimated(0),
+            offset: ScalarValue::Estimated(1),
             ..Sensor::default()
         },
         excitation: Some(excitation),
@@ -296,8 +296,8 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let again = profiles(&problem, &best, &list, &how, 1).unwrap();
     assert_eq!(found, again, "the threads change no bit");
     let targets = list.map(Target::Linear);
-    let level = Level::of(misfit + QUANTILE_95);
-    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
     for (profile, band) in found.iter().zip(&bands) {
         let [low, high] = profile.interval.map(Option::unwrap);
         println!(

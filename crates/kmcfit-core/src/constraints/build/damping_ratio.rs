@@ -1,7 +1,7 @@
 //! A cap on the damping ratio, as second-order cones.
 
 use super::All;
-use super::form::Form;
+use super::linear_form::LinearForm;
 use super::sampling::value;
 use crate::constraints::{Cone, ConeGroup, Rows};
 
@@ -27,7 +27,7 @@ pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3], zeta: f64) -> ConeGrou
     }
 }
 
-fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
+fn cone(m: &LinearForm, c: &LinearForm, k: &LinearForm) -> Cone {
     let mut sum = m.clone();
     sum.add(1.0, k);
     let mut difference = m.clone();

@@ -1,18 +1,18 @@
 //! The derivatives of all predictions with respect to all parameters, from tangents in lanes.
 
-mod moving;
-mod reader;
+mod observation_rows;
+mod sensitivity_layout;
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
-use crate::simd::tall_qr::Piece;
+use crate::simd::tall_qr::RowBlock;
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
-use moving::Moving;
 use nalgebra::DMatrix;
-use reader::Reader;
+use observation_rows::JacobianRows;
+use sensitivity_layout::Moving;
 use std::ops::Range;
 
 impl Problem {
@@ -79,7 +79,7 @@ impl Problem {
         &self,
         evaluation: &Evaluation,
         order: &[usize],
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
@@ -110,7 +110,7 @@ impl Problem {
         evaluation: &Evaluation,
         order: &[usize],
         steps: Range<usize>,
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) -> Vec<[f64; 2]> {
         let (experiment, view) = (&self.experiments[0], self.view(evaluation, 0));
         sweep(self, experiment, view, order, 0, steps, &mut take)
@@ -138,7 +138,7 @@ fn sweep(
     order: &[usize],
     mut row: usize,
     steps: Range<usize>,
-    take: &mut impl FnMut(Piece) -> Piece,
+    take: &mut impl FnMut(RowBlock) -> RowBlock,
 ) -> Vec<[f64; 2]> {
     let moving = Moving::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
@@ -150,12 +150,12 @@ fn sweep(
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
         let first = channel.places().partition_point(|p| p.step < steps.start);
-        let mut piece = Piece::new(places);
+        let mut piece = RowBlock::new(places);
         piece.restart(row + first);
-        readers.push((Reader::new(channel, view, first), piece));
+        readers.push((JacobianRows::new(channel, view, first), piece));
         row += channel.len();
     }
-    let mut give = |piece: &mut Piece| {
+    let mut give = |piece: &mut RowBlock| {
         let next = piece.first + piece.count;
         let full = std::mem::take(piece);
         *piece = take(full);

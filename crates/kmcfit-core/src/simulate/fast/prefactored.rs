@@ -27,7 +27,7 @@ pub(crate) fn forward(
         Term::CoulombFriction { width } => Some(*width),
         _ => None,
     });
-    simd::run(Forward {
+    simd::run(PrefactoredForward {
         equation,
         method,
         kinds,
@@ -102,7 +102,7 @@ const NOTHING: StageRates = {
     }
 };
 
-struct Forward<'a> {
+struct PrefactoredForward<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
     /// The term of each kind.
@@ -112,7 +112,7 @@ struct Forward<'a> {
     trajectory: &'a mut Trajectory,
 }
 
-impl Kernel for Forward<'_> {
+impl Kernel for PrefactoredForward<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -129,7 +129,7 @@ impl Kernel for Forward<'_> {
     }
 }
 
-impl Forward<'_> {
+impl PrefactoredForward<'_> {
     #[inline(always)]
     fn sweep<A: Arithmetic, const S: usize>(
         self,

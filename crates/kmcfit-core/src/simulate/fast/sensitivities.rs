@@ -6,7 +6,7 @@
 //! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
 //! are ever in memory as a whole.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -195,7 +195,7 @@ impl Kernel for Advance<'_> {
                 .any(|slot| tangents.moves[slot]);
         }
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         for (slot, steady) in tangents.slots.iter().zip(&tangents.steady) {
             match steady {
                 Some(_) => wanted.sum[slot.function] = true,

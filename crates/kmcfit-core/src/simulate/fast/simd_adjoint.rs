@@ -1,7 +1,7 @@
 //! The discrete adjoint with its steps linearised eight at a time: the motion is known, so only two
 //! products of a step wait for the step after it.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::simulate::{CoefficientGradient, Trajectory};
@@ -57,7 +57,7 @@ impl Kernel for Back<'_> {
         let mut gradient = self.gradient;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         let asked = match &gradient {
             CoefficientGradient::AtNodes(_) => &mut wanted.ends,
             CoefficientGradient::Summed(_) => &mut wanted.sum,

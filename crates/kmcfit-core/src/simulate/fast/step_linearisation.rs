@@ -6,7 +6,7 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{
-    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, StageSamples, Tableau, Term,
+    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, RK4, StagePosition, StageSamples, Tableau, Term,
 };
 
 /// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
@@ -34,14 +34,14 @@ impl StepLinearisation {
 
 /// Requested derivatives, mass first.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Wanted {
+pub(super) struct RequestedDerivatives {
     /// With respect to the values at both nodes.
     pub ends: [bool; FUNCTIONS],
     /// With respect to one value for both.
     pub sum: [bool; FUNCTIONS],
 }
 
-/// A function at the three [`Position`]s of eight steps.
+/// A function at the three [`StagePosition`]s of eight steps.
 #[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
 
@@ -57,7 +57,7 @@ impl<A: Arithmetic> Places<A> {
     }
 
     #[inline(always)]
-    fn at(&self, position: Position) -> Eight<A> {
+    fn at(&self, position: StagePosition) -> Eight<A> {
         self.0[position as usize]
     }
 }
@@ -74,7 +74,7 @@ pub(super) fn linearise<A: Arithmetic>(
     equation: &EquationOfMotion,
     response: &Trajectory,
     i: usize,
-    wanted: &Wanted,
+    wanted: &RequestedDerivatives,
     maps: &mut StepLinearisation,
 ) {
     let terms = equation.terms;
@@ -174,7 +174,7 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: usize,
         dt: f64,
-        wanted: &Wanted,
+        wanted: &RequestedDerivatives,
         maps: &mut StepLinearisation,
     ) {
         let zero = Eight::splat(arithmetic, 0.0);
@@ -240,9 +240,9 @@ fn at_ends<A: Arithmetic, const S: usize>(
     let [mut left, mut middle, mut right] = [Eight::splat(arithmetic, 0.0); 3];
     for (s, stage) in stages.into_iter().enumerate() {
         match tableau.position[s] {
-            Position::Left => left += stage,
-            Position::Middle => middle += stage,
-            Position::Right => right += stage,
+            StagePosition::Left => left += stage,
+            StagePosition::Middle => middle += stage,
+            StagePosition::Right => right += stage,
         }
     }
     middle = middle * Eight::splat(arithmetic, 0.5);

@@ -1,6 +1,6 @@
 //! The equation of motion at the stages of one step.
 
-use crate::system::{Excitation, NodalCoefficients, Position, System, Tableau, Term};
+use crate::system::{Excitation, NodalCoefficients, StagePosition, System, Tableau, Term};
 
 /// The equation of motion of one device in one experiment.
 #[derive(Clone, Copy)]
@@ -65,7 +65,7 @@ impl<'a> EquationOfMotion<'a> {
     /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
     /// these are the paper's operations in the paper's order, and its run depends on every bit.
     #[inline(always)]
-    pub fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
+    pub fn acceleration(&self, i: usize, position: StagePosition, y: f64, v: f64) -> f64 {
         let mass = position.of(&self.nodal.mass, i);
         let force = self.excitation.and_then(|e| e.force.as_ref());
         let mut a = force.map_or(0.0, |f| f.at(i, position) / mass);
@@ -80,7 +80,7 @@ impl<'a> EquationOfMotion<'a> {
 
     /// The absolute acceleration `y'' + b''` for the acceleration `y'' = a`.
     #[inline(always)]
-    pub fn absolute(&self, i: usize, position: Position, a: f64) -> f64 {
+    pub fn absolute(&self, i: usize, position: StagePosition, a: f64) -> f64 {
         match self.excitation.and_then(|e| e.base.as_ref()) {
             Some(base) => a + base.at(i, position),
             None => a,
@@ -89,7 +89,7 @@ impl<'a> EquationOfMotion<'a> {
 
     /// Mass and partial derivatives of [`EquationOfMotion::acceleration`].
     #[inline(always)]
-    pub fn partials(&self, i: usize, position: Position, y: f64, v: f64) -> Partials {
+    pub fn partials(&self, i: usize, position: StagePosition, y: f64, v: f64) -> Partials {
         let mass = position.of(&self.nodal.mass, i);
         let (mut da_dy, mut da_dv) = (0.0, 0.0);
         for (term, p) in self.terms.iter().zip(&self.nodal.coefficients) {

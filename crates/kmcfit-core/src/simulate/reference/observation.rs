@@ -9,7 +9,7 @@ use super::equation::EquationOfMotion;
 use crate::record::ChannelKind;
 use crate::simulate::Trajectory;
 use crate::system::{
-    Excitation, FUNCTIONS, InputSample, NodalCoefficients, Position, StageSamples, System,
+    Excitation, FUNCTIONS, InputSample, NodalCoefficients, StagePosition, StageSamples, System,
     TimePoint,
 };
 
@@ -121,7 +121,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
         1.0 => Observation::state(3, v[i + 1]),
         x => {
             let at_end = |right: usize| {
-                let position = [Position::Left, Position::Right][right];
+                let position = [StagePosition::Left, StagePosition::Right][right];
                 let part = |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.at(i, position));
                 let around = equation
                     .excitation

@@ -45,7 +45,7 @@ pub fn subproblem(
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
         let view = problem.view(evaluation, e);
-        let columns = Columns {
+        let columns = UnknownColumns {
             problem,
             experiment,
             base,
@@ -60,13 +60,13 @@ pub fn subproblem(
 }
 
 /// Where the unknowns of one experiment stand.
-struct Columns<'a> {
+struct UnknownColumns<'a> {
     problem: &'a Problem,
     experiment: &'a Experiment,
     base: usize,
 }
 
-impl Columns<'_> {
+impl UnknownColumns<'_> {
     /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
     /// first state that is known.
     fn state(&self, i: usize, q: usize) -> Option<usize> {

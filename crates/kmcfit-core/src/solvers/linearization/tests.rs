@@ -6,10 +6,10 @@ use crate::functions::{
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
-use crate::solvers::counts::Counts;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::{Fit, fit, fit_from};
 use crate::system::{Excitation, Grid, Method, State, System, Term};
 use crate::threads;
@@ -122,7 +122,7 @@ fn after_short_steps_the_jacobian_stays() {
     let fit = fit_from(&problem, &problem.start(), &settings).expect("a motion");
     let points = fit.history.len() as u64 + 1;
     let parameters = problem.parameters() as u64;
-    let Counts {
+    let SolveCounts {
         adjoint, tangent, ..
     } = fit.counts;
     assert!(0 < adjoint && adjoint < points);
@@ -172,7 +172,7 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
         let Step::Moved { point, .. } = method.step(&mut work, &point) else {
             panic!("no step");
         };
-        (point.parameters, Counts::of(&counted))
+        (point.parameters, SolveCounts::of(&counted))
     };
     let (expected, before) = stepped(None);
     let elsewhere = [2.0, 1.0, 3.0, 1.0].iter().zip(&start);

@@ -10,10 +10,10 @@ const TRIALS: u32 = 30;
 const GROWTH: f64 = 4.0;
 
 /// What a line search sees of a trial point.
-pub(super) trait Line {
+pub(super) trait LineFunction {
     /// Cost at step `a`; `None` if there is no motion at this point.
     fn cost(&mut self, a: f64) -> Option<f64>;
-    /// Slope at the step last asked for by [`Line::cost`].
+    /// Slope at the step last asked for by [`LineFunction::cost`].
     fn slope(&mut self) -> f64;
 }
 
@@ -24,7 +24,12 @@ pub(super) trait Line {
 ///
 /// The slope is only asked for where the cost is low enough, so a rejected trial costs one
 /// forward solve and no adjoint.
-pub(super) fn weak_wolfe(line: &mut dyn Line, cost: f64, slope: f64, first: f64) -> Option<f64> {
+pub(super) fn weak_wolfe(
+    line: &mut dyn LineFunction,
+    cost: f64,
+    slope: f64,
+    first: f64,
+) -> Option<f64> {
     let (mut low, mut high) = (0.0, f64::INFINITY);
     let mut low_slope = slope;
     let mut a = first;

@@ -10,10 +10,10 @@ use crate::host::Instant;
 use crate::problem::Problem;
 use crate::record::{Experiment, Input, LONG_RECORD_STEPS};
 use crate::solvers::checkpoint::Observer;
-use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
@@ -129,7 +129,7 @@ pub(in crate::solvers) struct TruncatedStart {
     /// Cost and gradient at the start values.
     pub referred: Referred,
     /// Work of the fit of the first steps.
-    pub counts: Counts,
+    pub counts: SolveCounts,
     /// What that work took.
     pub timings: Timings,
     /// Wall-clock time, also of what was done before an interrupt.
@@ -137,7 +137,7 @@ pub(in crate::solvers) struct TruncatedStart {
 }
 
 /// A fit of the first steps and the evaluation of the whole problem where it ended.
-struct Part {
+struct PartialFit {
     fit: Fit,
     better: Option<Prepared>,
     evaluating: Duration,
@@ -161,7 +161,7 @@ pub(in crate::solvers) fn truncated_start(
         return TruncatedStart {
             start: None,
             referred,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             elapsed: Duration::ZERO,
         };
@@ -190,7 +190,7 @@ fn fit_part(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Option<Part> {
+) -> Option<PartialFit> {
     let mut short = settings.clone();
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
     short.stopping.tolerance = Some(TOLERANCE);
@@ -205,7 +205,7 @@ fn fit_part(
         parameters,
         spare: None,
     });
-    Some(Part {
+    Some(PartialFit {
         fit,
         better,
         evaluating: clock.elapsed(),

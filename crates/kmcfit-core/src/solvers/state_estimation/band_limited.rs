@@ -25,7 +25,7 @@ const FEWEST: usize = 8;
 
 /// The band of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct PassBand {
     /// Dominant frequency: root-mean-square velocity over root-mean-square displacement, rad/s.
     pub frequency: f64,
     /// Spacing of the readings, s.
@@ -43,7 +43,7 @@ pub struct InBand {
     pub a: Vec<f64>,
 }
 
-impl Band {
+impl PassBand {
     /// The band of a motion with these accelerations, `spacing` seconds apart; `None` if they are too
     /// few or show no oscillation.
     ///
@@ -147,7 +147,7 @@ mod tests {
     fn a_sine_passes_by_the_response_of_the_filter() {
         let (w, h) = (2.0 * PI * 3.0, 0.01);
         let acceleration: Vec<f64> = (0..4000).map(|i| (w * h * f64::from(i)).sin()).collect();
-        let band = Band::of(&acceleration, h).expect("it oscillates");
+        let band = PassBand::of(&acceleration, h).expect("it oscillates");
         // The ends, of which the filter knows one side alone, leave 2e-3.
         assert!(
             (band.frequency / w - 1.0).abs() < 5e-3,
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn what_does_not_oscillate_has_no_band() {
-        assert_eq!(Band::of(&[1.0; 50], 0.1), None);
-        assert_eq!(Band::of(&[1.0, -1.0, 1.0], 0.1), None);
+        assert_eq!(PassBand::of(&[1.0; 50], 0.1), None);
+        assert_eq!(PassBand::of(&[1.0, -1.0, 1.0], 0.1), None);
     }
 }

@@ -6,7 +6,7 @@ mod spline;
 mod stencil;
 mod uniform;
 
-pub(super) use band_limited::Band;
+pub(super) use band_limited::PassBand;
 pub(super) use spline::kinematics as by_spline;
 
 use crate::problem::Problem;

@@ -82,7 +82,7 @@ pub enum End {
 
 /// A constraint that becomes active along the profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
+pub struct ActivationPoint {
     /// The value from which on it is, outwards from the optimum.
     pub value: f64,
     /// Its name.
@@ -113,7 +113,7 @@ pub struct Profile {
     /// In one word.
     pub verdict: Interval,
     /// Where other constraints become active.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<ActivationPoint>,
     /// Parameters of a better optimum, if one was met.
     pub better_optimum: Option<Vec<f64>>,
 }

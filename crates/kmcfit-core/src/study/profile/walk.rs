@@ -1,6 +1,6 @@
 //! The walk along a profile.
 
-use super::{End, FAR, Interval, Mark, Profile, ProfileSettings};
+use super::{ActivationPoint, End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
@@ -72,7 +72,7 @@ pub struct ProfileSearch<'a> {
     base: f64,
     sample_count: f64,
     sigma: bool,
-    marks: Vec<Mark>,
+    marks: Vec<ActivationPoint>,
     points: Vec<ProfilePoint>,
 }
 
@@ -307,7 +307,7 @@ impl<'a> ProfileSearch<'a> {
                         Err(_) => break,
                     }
                 }
-                self.marks.push(Mark {
+                self.marks.push(ActivationPoint {
                     value: with.value,
                     constraint: constraint.clone(),
                 });

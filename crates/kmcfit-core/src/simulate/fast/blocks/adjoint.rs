@@ -1,14 +1,14 @@
 //! The discrete adjoint in blocks.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES, Row};
 use crate::system::State;
 
 /// Everything that one solve needs.
-pub(super) struct Adjoint<'a> {
-    pub nodal: LinearDevice<'a>,
+pub(super) struct BlockAdjoint<'a> {
+    pub nodal: LinearSystem<'a>,
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
     /// Derivative of the cost with respect to displacement and, if there is any, velocity.
@@ -18,7 +18,7 @@ pub(super) struct Adjoint<'a> {
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Adjoint<'_> {
+impl Kernel for BlockAdjoint<'_> {
     type Output = State;
 
     #[inline(always)]

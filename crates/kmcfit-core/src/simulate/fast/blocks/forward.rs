@@ -1,21 +1,21 @@
 //! The forward solve in blocks.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES};
 use crate::system::State;
 
 /// Everything that one solve needs.
-pub(super) struct Forward<'a> {
-    pub nodal: LinearDevice<'a>,
+pub(super) struct BlockForward<'a> {
+    pub nodal: LinearSystem<'a>,
     pub initial: State,
     pub displacement: &'a mut [f64],
     pub velocity: &'a mut [f64],
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Forward<'_> {
+impl Kernel for BlockForward<'_> {
     type Output = ();
 
     #[inline(always)]

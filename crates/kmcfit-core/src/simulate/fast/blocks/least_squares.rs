@@ -7,11 +7,11 @@
 //! nothing down but the gradient. Long records are shared by two threads; what a tile gives
 //! does not depend on who computes it.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::adjoint::{collect, ends};
 use super::forward::starts;
 use super::tile::Tile;
-use super::workspace::{Chart, Ends, Workspace, with_workspace};
+use super::workspace::{BlockMap, Ends, Workspace, with_workspace};
 use crate::simd::{self, Arithmetic, Kernel, LANES};
 use crate::system::State;
 use crate::threads;
@@ -22,7 +22,7 @@ const WORTH_A_THREAD: usize = 24;
 /// `J = sum_i w_i (y_i - reading_i)^2` over all nodes.
 #[derive(Clone, Copy)]
 pub(super) struct LeastSquares<'a> {
-    pub nodal: LinearDevice<'a>,
+    pub nodal: LinearSystem<'a>,
     pub initial: State,
     /// One a node.
     pub samples: &'a [f64],
@@ -45,10 +45,10 @@ pub(super) struct Survey<'a> {
 }
 
 impl Kernel for Survey<'_> {
-    type Output = Vec<Chart>;
+    type Output = Vec<BlockMap>;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<Chart> {
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<BlockMap> {
         let Self {
             of,
             tiles,
@@ -135,7 +135,7 @@ pub(super) struct Joint {
     squares: f64,
     /// Residual at the last node.
     last: f64,
-    /// Adjoint state at the first node.
+    /// BlockAdjoint state at the first node.
     adjoint: [f64; 2],
 }
 
@@ -197,7 +197,12 @@ impl LeastSquares<'_> {
 
     /// States and adjoint states between all blocks, from their charts; the steps behind the last
     /// tile are done one by one, with their gradient.
-    pub fn join(&self, tiles: &[Tile], charts: &[Chart], gradient: &mut [&mut [f64]; 3]) -> Joint {
+    pub fn join(
+        &self,
+        tiles: &[Tile],
+        charts: &[BlockMap],
+        gradient: &mut [&mut [f64]; 3],
+    ) -> Joint {
         let Self {
             nodal,
             initial,

@@ -24,7 +24,7 @@ mod workspace;
 use crate::simd::{self, Arithmetic};
 use crate::simulate::Trajectory;
 use crate::system::{NodalCoefficients, State, System, SystemTangent};
-use step::{Coefficients, Constants, Rates};
+use step::{Constants, NodeCoefficients, StepRates};
 use tile::Tile;
 use workspace::{Workspace, with_workspace};
 
@@ -33,14 +33,14 @@ const MASSES: std::ops::Range<f64> = 1e-150..1e150;
 
 /// A device with damping and stiffness alone, and the step `h` (s).
 #[derive(Clone, Copy)]
-pub(crate) struct LinearDevice<'a> {
+pub(crate) struct LinearSystem<'a> {
     mass: &'a [f64],
     damping: &'a [f64],
     stiffness: &'a [f64],
     h: f64,
 }
 
-impl<'a> LinearDevice<'a> {
+impl<'a> LinearSystem<'a> {
     /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
     /// the terms damping and stiffness.
     pub fn of(system: &System, nodal: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
@@ -60,7 +60,7 @@ impl<'a> LinearDevice<'a> {
             h,
         };
         // Also behind the end of a record that is shorter than the grid.
-        simd::run(Within(mass)).then_some(nodal)
+        simd::run(MassRange(mass)).then_some(nodal)
     }
 
     /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner
@@ -96,13 +96,13 @@ impl<'a> LinearDevice<'a> {
     }
 
     #[inline(always)]
-    fn rates(&self, i: usize) -> Rates<f64> {
-        let at = |i: usize| Coefficients {
+    fn rates(&self, i: usize) -> StepRates<f64> {
+        let at = |i: usize| NodeCoefficients {
             m: self.mass[i],
             c: self.damping[i],
             hk: self.h * self.stiffness[i],
         };
-        Rates::new(at(i), at(i + 1), self.constants())
+        StepRates::new(at(i), at(i + 1), self.constants())
     }
 
     /// One step of the adjoint by itself: carries `x` from node `i + 1` to node `i` and adds the
@@ -131,7 +131,7 @@ impl<'a> LinearDevice<'a> {
     /// leaves the finite numbers, the last state is not finite.
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {
-            simd::run(forward::Forward {
+            simd::run(forward::BlockForward {
                 nodal: self,
                 initial,
                 displacement: &mut trajectory.displacement,
@@ -155,7 +155,7 @@ impl<'a> LinearDevice<'a> {
         };
         let parts = [&mut gradient.mass, damping, stiffness].map(|g| &mut g[..nodes]);
         let initial = with_workspace(|workspace| {
-            simd::run(adjoint::Adjoint {
+            simd::run(adjoint::BlockAdjoint {
                 nodal: self,
                 displacement: &trajectory.displacement,
                 velocity: &trajectory.velocity,
@@ -173,9 +173,9 @@ impl<'a> LinearDevice<'a> {
 
 /// Whether all masses are positive, and neither so large nor so small that a product of two leaves
 /// the range of numbers.
-struct Within<'a>(&'a [f64]);
+struct MassRange<'a>(&'a [f64]);
 
-impl simd::Kernel for Within<'_> {
+impl simd::Kernel for MassRange<'_> {
     type Output = bool;
 
     #[inline(always)]

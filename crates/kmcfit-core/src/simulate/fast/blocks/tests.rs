@@ -47,7 +47,7 @@ fn source(response: &Trajectory, velocity: f64) -> Trajectory {
     }
 }
 
-fn squares_of<'a>(nodal: LinearDevice<'a>, samples: &'a [f64]) -> least_squares::LeastSquares<'a> {
+fn squares_of<'a>(nodal: LinearSystem<'a>, samples: &'a [f64]) -> least_squares::LeastSquares<'a> {
     least_squares::LeastSquares {
         nodal,
         initial: INITIAL,
@@ -74,7 +74,7 @@ fn motions_are_those_of_single_steps() {
         let (system, nodal) = (system(nodes), nodal(nodes));
         let one_by_one = system.forward(&nodal, INITIAL, None).unwrap();
         let mut response = Trajectory::zeros(nodes);
-        let linear = LinearDevice::of(&system, &nodal, nodes).unwrap();
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
         linear.forward(INITIAL, &mut response);
         for (a, b) in [
             (&response.displacement, &one_by_one.displacement),
@@ -93,7 +93,7 @@ fn gradients_are_those_of_single_steps() {
         let response = system.forward(&nodal, INITIAL, None).unwrap();
         let source = source(&response, by_velocity);
         let expected = reference::discrete_adjoint(&system, &nodal, None, &response, &source);
-        let linear = LinearDevice::of(&system, &nodal, nodes).unwrap();
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
         let found = linear.gradient(&response, &source);
         for (a, b) in found.nodal.functions().zip(expected.nodal.functions()) {
             let error = distance(a, b) / largest(b);
@@ -158,11 +158,11 @@ impl simd::Kernel for Whole<'_> {
     fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<u64> {
         let Self(system, nodal) = self;
         let nodes = nodal.mass.len();
-        let linear = LinearDevice::of(system, nodal, nodes).unwrap();
+        let linear = LinearSystem::of(system, nodal, nodes).unwrap();
         let mut response = Trajectory::zeros(nodes);
         let mut gradient = NodalCoefficients::zeros(nodes, 2);
         with_workspace(|workspace| {
-            forward::Forward {
+            forward::BlockForward {
                 nodal: linear,
                 initial: INITIAL,
                 displacement: &mut response.displacement,
@@ -226,7 +226,7 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
     for f in tiny.functions_mut() {
         f.iter_mut().for_each(|x| *x *= 1e-200);
     }
-    assert!(LinearDevice::of(&system, &tiny, nodes).is_none());
+    assert!(LinearSystem::of(&system, &tiny, nodes).is_none());
     let mut response = Trajectory::zeros(nodes);
     Engine::ParallelInTime
         .forward_into(&system, &tiny, INITIAL, None, &mut response)
@@ -273,7 +273,7 @@ fn squares_lose_nothing_near_the_readings() {
         .enumerate()
         .map(wave)
         .collect();
-    let linear = LinearDevice::of(&system, &nodal, nodes).unwrap();
+    let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
     let mut in_blocks = Trajectory::zeros(nodes);
     linear.forward(INITIAL, &mut in_blocks);
     let [expected, other] = [&in_blocks, &one_by_one].map(|response| {
@@ -299,7 +299,7 @@ fn squares_lose_nothing_near_the_readings() {
 fn every_cut_gives_the_same_bits() {
     for nodes in [2000, 4097, 20_000] {
         let (system, nodal) = (system(nodes), nodal(nodes));
-        let linear = LinearDevice::of(&system, &nodal, nodes).unwrap();
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
         let response = system.forward(&nodal, INITIAL, None).unwrap();
         let samples = samples(&response);
         let of = squares_of(linear, &samples);

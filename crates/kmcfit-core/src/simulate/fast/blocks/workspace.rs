@@ -1,12 +1,12 @@
 //! One tile in lanes: storage that is used again and again, and the passes over it.
 
-use super::step::{Coefficients, Constants, Rates};
+use super::step::{Constants, NodeCoefficients, StepRates};
 use super::tile::LONGEST;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use std::cell::RefCell;
 
 /// One row a node.
-type Rows = [Row; LONGEST + 1];
+type NodeRows = [Row; LONGEST + 1];
 
 /// A state in every lane, at the ends of both halves.
 pub(super) type Ends = [[Row; 2]; 2];
@@ -17,7 +17,7 @@ pub(super) type Maps = [[[Row; 2]; 2]; 2];
 
 /// What becomes of any state at the start of a block: the block's map, and half the derivative of the sum of the
 /// squares of its residuals, `H x - g`, with respect to that state.
-pub(super) struct Chart {
+pub(super) struct BlockMap {
     pub maps: Maps,
     /// `H` of both halves: its diagonal, then what stands beside it.
     curvature: [[Row; 3]; 2],
@@ -25,7 +25,7 @@ pub(super) struct Chart {
     slope: [[Row; 2]; 2],
 }
 
-impl Chart {
+impl BlockMap {
     /// `factor (H x - g)`: the adjoint state at the start of every block that is zero at its end.
     pub fn driven(&self, starts: &Ends, factor: f64) -> Ends {
         let mut driven = [[[0.0; LANES]; 2]; 2];
@@ -44,15 +44,15 @@ impl Chart {
 /// A tile in lanes.
 pub(super) struct Workspace {
     /// Mass, damping, stiffness.
-    pub functions: [Rows; 3],
-    /// The six numbers of every step's [`Rates`].
-    rates: [Rows; 6],
+    pub functions: [NodeRows; 3],
+    /// The six numbers of every step's [`StepRates`].
+    rates: [NodeRows; 6],
     /// Displacement and velocity.
-    pub response: [Rows; 2],
+    pub response: [NodeRows; 2],
     /// Derivative of the cost with respect to displacement and velocity.
-    pub source: [Rows; 2],
+    pub source: [NodeRows; 2],
     /// Gradient with respect to the functions.
-    pub gradient: [Rows; 3],
+    pub gradient: [NodeRows; 3],
 }
 
 thread_local! {
@@ -84,9 +84,9 @@ impl Workspace {
         arithmetic: A,
         j: usize,
         of: Constants<Eight<A>>,
-    ) -> Coefficients<Eight<A>> {
+    ) -> NodeCoefficients<Eight<A>> {
         let [m, c, k] = &self.functions;
-        Coefficients {
+        NodeCoefficients {
             m: Eight::load(arithmetic, &m[j]),
             c: Eight::load(arithmetic, &c[j]),
             hk: of.h * Eight::load(arithmetic, &k[j]),
@@ -94,9 +94,9 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> Rates<Eight<A>> {
+    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> StepRates<Eight<A>> {
         let [alpha, beta, gamma, delta, left, middle] = &self.rates;
-        Rates {
+        StepRates {
             alpha: Eight::load(arithmetic, &alpha[j]),
             beta: Eight::load(arithmetic, &beta[j]),
             gamma: Eight::load(arithmetic, &gamma[j]),
@@ -109,7 +109,7 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &Rates<Eight<A>>) {
+    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &StepRates<Eight<A>>) {
         let [alpha, beta, gamma, delta, left, middle] = &mut self.rates;
         alpha[j] = rates.alpha.row();
         beta[j] = rates.beta.row();
@@ -123,7 +123,7 @@ impl Workspace {
     #[inline(always)]
     fn backward<A: Arithmetic, const VELOCITY: bool>(
         &self,
-        rates: &Rates<Eight<A>>,
+        rates: &StepRates<Eight<A>>,
         j: usize,
         x: [Eight<A>; 2],
         arithmetic: A,
@@ -140,7 +140,7 @@ impl Workspace {
         }
     }
 
-    /// Rates of all steps from the functions, and the maps of all blocks.
+    /// StepRates of all steps from the functions, and the maps of all blocks.
     #[inline(always)]
     pub fn prepare<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) -> Maps {
         let of = Constants::new(h).in_lanes(arithmetic);
@@ -152,7 +152,7 @@ impl Workspace {
             let mut from_w = [of.zero, of.one];
             for j in first..first + length / 2 {
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left, right, of);
+                let rates = StepRates::new(left, right, of);
                 self.keep_rates(j, &rates);
                 let increment = rates.increment(of);
                 from_y = increment.forward(from_y);
@@ -175,7 +175,7 @@ impl Workspace {
         arithmetic: A,
         h: f64,
         length: usize,
-    ) -> Chart {
+    ) -> BlockMap {
         let of = Constants::new(h).in_lanes(arithmetic);
         let half = length / 2;
         let mut left = [
@@ -197,7 +197,7 @@ impl Workspace {
                 slope[block][0] += from_y[0] * sample;
                 slope[block][1] += from_w[0] * sample;
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left[block], right, of);
+                let rates = StepRates::new(left[block], right, of);
                 if KEEP {
                     self.keep_rates(j, &rates);
                 }
@@ -208,7 +208,7 @@ impl Workspace {
             }
         }
         let empty = [0.0; LANES];
-        let mut chart = Chart {
+        let mut chart = BlockMap {
             maps: [[[empty; 2]; 2]; 2],
             curvature: [[empty; 3]; 2],
             slope: [[empty; 2]; 2],
@@ -227,14 +227,14 @@ impl Workspace {
         chart
     }
 
-    /// Rates of all steps from the functions.
+    /// StepRates of all steps from the functions.
     #[inline(always)]
     pub fn prepare_rates<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) {
         let of = Constants::new(h).in_lanes(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         for j in 0..length {
             let right = self.coefficients(arithmetic, j + 1, of);
-            self.keep_rates(j, &Rates::new(left, right, of));
+            self.keep_rates(j, &StepRates::new(left, right, of));
             left = right;
         }
     }

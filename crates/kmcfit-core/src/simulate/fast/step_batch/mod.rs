@@ -16,7 +16,7 @@ use std::ops::Range;
 
 pub(crate) use reconstruct::reconstruct;
 
-/// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
+/// BatchCoefficients `p - a g` in linear free motion by the midpoint rule, seen at every node.
 #[derive(Clone, Copy)]
 pub(crate) struct SearchRay<'a> {
     /// Mass, damping, stiffness at the nodes.
@@ -153,7 +153,7 @@ impl StepBatch {
     fn of_rows<const R: usize>(&mut self, ray: SearchRay, lengths: &[Row]) {
         let (states, costs) = (self.states.first_chunk_mut(), self.costs.first_chunk_mut());
         if let (Some(lengths), Some(states), Some(costs)) = (lengths.first_chunk(), states, costs) {
-            simd::run(rows::Rows::<R> {
+            simd::run(rows::BatchRows::<R> {
                 ray,
                 lengths,
                 states,

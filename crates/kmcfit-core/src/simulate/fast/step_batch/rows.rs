@@ -1,10 +1,10 @@
-//! Rows of devices, one a lane, and the steps that they take.
+//! BatchRows of devices, one a lane, and the steps that they take.
 
 use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
 
 /// `R` rows of systems.
-pub(super) struct Rows<'a, const R: usize> {
+pub(super) struct BatchRows<'a, const R: usize> {
     pub ray: SearchRay<'a>,
     pub lengths: &'a [Row; R],
     pub states: &'a mut [States; R],
@@ -80,7 +80,7 @@ impl<A: Arithmetic> Steps<A> {
 
 /// A row of devices on their way.
 #[derive(Clone, Copy)]
-struct Devices<A: Arithmetic> {
+struct BatchCoefficients<A: Arithmetic> {
     arithmetic: A,
     length: Row,
     left: Values<A>,
@@ -89,7 +89,7 @@ struct Devices<A: Arithmetic> {
     sum: Eight<A>,
 }
 
-impl<A: Arithmetic> Devices<A> {
+impl<A: Arithmetic> BatchCoefficients<A> {
     #[inline(always)]
     fn begin(ray: &SearchRay, arithmetic: A, length: &Row) -> Self {
         let splat = |x| Eight::splat(arithmetic, x);
@@ -131,12 +131,12 @@ impl<A: Arithmetic> Devices<A> {
     }
 }
 
-impl<const R: usize> Kernel for Rows<'_, R> {
+impl<const R: usize> Kernel for BatchRows<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
-        let Rows {
+        let BatchRows {
             ray,
             lengths,
             states,
@@ -147,9 +147,9 @@ impl<const R: usize> Kernel for Rows<'_, R> {
         let last = nodes - 1;
         let part = part(nodes);
 
-        let mut rows = [Devices::begin(&ray, arithmetic, &lengths[0]); R];
+        let mut rows = [BatchCoefficients::begin(&ray, arithmetic, &lengths[0]); R];
         for r in 1..R {
-            rows[r] = Devices::begin(&ray, arithmetic, &lengths[r]);
+            rows[r] = BatchCoefficients::begin(&ray, arithmetic, &lengths[r]);
         }
         let (mut next, mut which) = (0, 0);
         for i in 0..=last {

@@ -1,19 +1,19 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
 use super::measured::{Measured, Measurements};
-use super::{Accuracy, Minimum, add_rows, minimise, nodal};
+use super::{Accuracy, ConvexMinimum, add_rows, minimise, nodal};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::record::Experiment;
-use crate::solvers::counts::Counts;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
 use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::reason::{Reason, UnsupportedRecord};
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use crate::system::NodalCoefficients;
@@ -49,7 +49,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         measurements: &measurements,
     };
     let first = cost.point(start.to_vec());
-    let mut counts = Counts::default();
+    let mut counts = SolveCounts::default();
     let mut optimality = None;
     let (outcome, found) = match cost.minimise(start, &mut timings) {
         Ok((minimum, programs)) => {
@@ -101,7 +101,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
     }
 }
 
-fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
+fn reason(problem: &Problem, minimum: &ConvexMinimum, has_mass: bool) -> Reason {
     if problem.functions.iter().all(|f| f.parameters() == 0) {
         return Reason::NoParameters;
     }
@@ -151,7 +151,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
         history: Vec::new(),
         snapshots: Vec::new(),
         outcome: Outcome::new(Status::Failed, Reason::UnsupportedRecord(reason)),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         attempts: Vec::new(),
@@ -179,7 +179,7 @@ impl<'a> Cost<'a> {
         &self,
         start: &[f64],
         timings: &mut Timings,
-    ) -> Result<(Minimum, u64), ConicStatus> {
+    ) -> Result<(ConvexMinimum, u64), ConicStatus> {
         let mut minimum = self.minimise_from(start, timings)?;
         let mut programs = u64::from(minimum.program.is_some());
         let mut from = self.measurements.sizes(self.problem, start);
@@ -205,7 +205,7 @@ impl<'a> Cost<'a> {
     fn optimality(
         &self,
         point: &Iterate,
-        minimum: &Minimum,
+        minimum: &ConvexMinimum,
         timings: &mut Timings,
     ) -> Option<Optimality> {
         let problem = self.problem;
@@ -237,7 +237,11 @@ impl<'a> Cost<'a> {
         2.0 * rounding * point.evaluation.cost.sqrt() + rounding * rounding
     }
 
-    fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+    fn minimise_from(
+        &self,
+        start: &[f64],
+        timings: &mut Timings,
+    ) -> Result<ConvexMinimum, ConicStatus> {
         let problem = self.problem;
         let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
         let sizes = self.measurements.sizes(problem, start);

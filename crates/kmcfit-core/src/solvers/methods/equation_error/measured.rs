@@ -8,7 +8,7 @@ use crate::signal::zero_phase;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
-use crate::solvers::state_estimation::{Band, Kinematics, unsensed};
+use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
@@ -88,7 +88,7 @@ impl Measured {
         scalars: &[f64],
     ) -> Option<Self> {
         let (values, _) = unsensed(channel, scalars);
-        let band = Band::of(&values, spacing)?;
+        let band = PassBand::of(&values, spacing)?;
         let excitation = experiment.excitation.as_ref();
         let around = (0..channel.len()).map(|i| channel.around_sample(excitation, i));
         let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();

@@ -96,7 +96,7 @@ pub(in crate::solvers) fn from_kinematics(
 }
 
 /// The minimum of a convex problem.
-struct Minimum {
+struct ConvexMinimum {
     parameters: Vec<f64>,
     /// How the quadratic program ended, if one was needed.
     program: Option<ConicStatus>,
@@ -107,7 +107,7 @@ struct Minimum {
     pull: Vec<f64>,
 }
 
-impl Minimum {
+impl ConvexMinimum {
     /// What the pull adds to the cost at `theta`.
     fn pull(&self, theta: &[f64]) -> f64 {
         let steps = theta.iter().zip(&self.from).zip(&self.pull);
@@ -132,7 +132,7 @@ fn minimise(
     accuracy: Accuracy,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
     timings: &mut Timings,
-) -> Result<Minimum, ConicStatus> {
+) -> Result<ConvexMinimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
     sub.constrain(&constraints, start);
     let duration = problem.system.grid.duration();
@@ -154,7 +154,7 @@ fn minimise(
         let enough =
             sub.value(&step) - least <= (1.0 - accuracy.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
-            return Ok(Minimum {
+            return Ok(ConvexMinimum {
                 parameters,
                 program: None,
                 kkt: None,
@@ -173,7 +173,7 @@ fn minimise(
     let z = solution.z.iter_mut().zip(&units);
     z.for_each(|(z, unit)| *z *= unit);
     match solution.status {
-        status if status.is_point() => Ok(Minimum {
+        status if status.is_point() => Ok(ConvexMinimum {
             parameters: moved(&solution.z),
             program: Some(status),
             kkt: solution.kkt,

@@ -35,7 +35,7 @@ use search::Search;
 
 /// What bounds the devices beside the problem's own constraints.
 #[derive(Debug, Clone)]
-pub struct Level {
+pub struct MisfitLimit {
     /// Largest misfit, in the unit of the cost: for readings with sigma the best chi-square plus a
     /// quantile, or a stated J.
     pub misfit: f64,
@@ -48,7 +48,7 @@ pub struct Level {
     pub programs: usize,
 }
 
-impl Level {
+impl MisfitLimit {
     /// A misfit, and nothing else; numbers up to ten times their natural sizes.
     pub fn of(misfit: f64) -> Self {
         Self {
@@ -62,15 +62,15 @@ impl Level {
 
 /// How the search for an extreme ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum ExtremeStatus {
     /// No step of the convex programs gains any more.
-    Settled,
+    Converged,
     /// The stated reach is met: the number has no end before it.
-    Reach,
+    SearchLimit,
     /// No trial could be brought back to the level.
-    Stuck,
+    NoFeasibleStep,
     /// The programs ran out.
-    Programs,
+    ProgramLimit,
 }
 
 /// An extreme device.
@@ -89,7 +89,7 @@ pub struct Extreme {
     /// Misfit by a fresh forward solve, at most the level.
     pub misfit: f64,
     /// How the search ended.
-    pub ended: Ended,
+    pub ended: ExtremeStatus,
     /// Convex programs solved.
     pub programs: usize,
 }
@@ -104,7 +104,7 @@ impl Extreme {
 
 /// Both ends of one number.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Band {
+pub struct ExtremePair {
     /// The device with the smallest value.
     pub low: Extreme,
     /// The device with the largest.
@@ -130,13 +130,13 @@ pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) ->
 
 /// Both extremes of every target, each from all `starts` that are within the level, on up to
 /// `threads` threads; `None` if no start is.
-pub fn tube(
+pub fn extreme_pairs(
     problem: &Problem,
     starts: &[Vec<f64>],
     targets: &[Target],
-    level: &Level,
+    level: &MisfitLimit,
     threads: usize,
-) -> Option<Vec<Band>> {
+) -> Option<Vec<ExtremePair>> {
     let search = Search { problem, level };
     let usable: Vec<&Vec<f64>> = starts
         .iter()
@@ -158,7 +158,7 @@ pub fn tube(
     let mut extremes = map(2 * targets.len(), threads, job).into_iter();
     let mut bands = Vec::with_capacity(targets.len());
     while let (Some(low), Some(high)) = (extremes.next(), extremes.next()) {
-        bands.push(Band { low, high });
+        bands.push(ExtremePair { low, high });
     }
     Some(bands)
 }
@@ -169,7 +169,7 @@ pub fn extreme(
     start: &[f64],
     target: &Target,
     largest: bool,
-    level: &Level,
+    level: &MisfitLimit,
 ) -> Option<Extreme> {
     let side = if largest { 1.0 } else { -1.0 };
     Search { problem, level }.extreme(start, target, side)

@@ -28,12 +28,12 @@ use super::refit::{nearest, settings, sizes};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use crate::solvers::fit_from;
-use linearised::Linearised;
-use reduced::Reduced;
+use linearised::LinearisedModels;
+use reduced::ConstantModel;
 
 /// The verdict on one function.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Varies {
+pub struct ConstancyTest {
     /// Its name.
     pub function: String,
     /// Index in the list of functions.
@@ -56,7 +56,7 @@ pub struct Varies {
     pub level: f64,
 }
 
-impl Varies {
+impl ConstancyTest {
     /// Whether the readings say that it varies.
     pub fn varies(&self) -> bool {
         self.p_value <= self.level
@@ -86,7 +86,7 @@ impl Varies {
 
 /// How the question is asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asking {
+pub struct ConstancySettings {
     /// Largest p-value called varying, as 0.05.
     pub level: f64,
     /// Simulated records.
@@ -97,7 +97,7 @@ pub struct Asking {
     pub threads: usize,
 }
 
-impl Default for Asking {
+impl Default for ConstancySettings {
     fn default() -> Self {
         Self {
             level: 0.05,
@@ -112,11 +112,11 @@ impl Default for Asking {
 ///
 /// # Errors
 /// A [`SimulationError`] if the optimum, or a constant in its place, has no motion.
-pub fn variation(
+pub fn constancy_tests(
     problem: &Problem,
     optimum: &[f64],
-    how: &Asking,
-) -> Result<Vec<Varies>, SimulationError> {
+    how: &ConstancySettings,
+) -> Result<Vec<ConstancyTest>, SimulationError> {
     let varies = |f: &usize| problem.functions.ranges()[*f].len() > 1;
     let each = (0..problem.functions.ranges().len()).filter(varies);
     each.map(|f| of_function(problem, optimum, f, how))
@@ -131,9 +131,9 @@ pub fn of_function(
     problem: &Problem,
     optimum: &[f64],
     function: usize,
-    how: &Asking,
-) -> Result<Varies, SimulationError> {
-    let reduced = Reduced::new(problem, function);
+    how: &ConstancySettings,
+) -> Result<ConstancyTest, SimulationError> {
+    let reduced = ConstantModel::new(problem, function);
     let start = reduced.mean_of(optimum);
     let sizes_of = sizes(&reduced.problem, &start);
     let start = nearest(&reduced.problem, &start, &sizes_of).unwrap_or(start);
@@ -155,7 +155,7 @@ pub fn of_function(
     };
     let statistic = ratio(constant.evaluation.cost, there.min(here));
     let evaluation = problem.evaluate(&embedded)?;
-    let linear = Linearised::new(problem, &reduced, &embedded, &evaluation);
+    let linear = LinearisedModels::new(problem, &reduced, &embedded, &evaluation);
     let simulated = map(how.simulations, how.threads, |index| {
         let [constant, varying] = linear.costs(how.seed, index);
         ratio(constant, varying)
@@ -163,7 +163,7 @@ pub fn of_function(
     let above = simulated.iter().filter(|s| **s >= statistic).count();
     let list = problem.functions.get(function);
     let extra = (problem.parameters() - reduced.problem.parameters()) as f64;
-    Ok(Varies {
+    Ok(ConstancyTest {
         function: list.name(),
         index: function,
         statistic,

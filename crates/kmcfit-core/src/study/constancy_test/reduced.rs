@@ -5,7 +5,7 @@ use crate::functions::{CoefficientFunction, Parameterization, Penalty};
 use crate::problem::Problem;
 
 /// The problem with one function constant, and how its parameters become those of the whole one.
-pub struct Reduced {
+pub struct ConstantModel {
     pub problem: Problem,
     function: usize,
     /// Where the constant stands.
@@ -14,7 +14,7 @@ pub struct Reduced {
     one: Vec<f64>,
 }
 
-impl Reduced {
+impl ConstantModel {
     pub fn new(problem: &Problem, function: usize) -> Self {
         let grid = &problem.system.grid;
         let whole = problem.functions.get(function);
@@ -159,7 +159,7 @@ impl Reduced {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::constraints::Statement;
+    use crate::constraints::Constraint;
     use crate::functions::CoefficientKind;
 
     fn whole() -> Problem {
@@ -175,12 +175,12 @@ mod tests {
                 .tikhonov(2, 0.2),
             CoefficientSpec::piecewise_constant(6, 1.7).total_variation(0.4),
         ];
-        let value = |of, value| Statement::Mean { of, value };
+        let value = |of, value| Constraint::Mean { of, value };
         Builder::new(parts)
             .record(record)
             .constrain(value(CoefficientKind::Mass, 1.1))
-            .constrain(Statement::DampingRatio { max: 0.8 })
-            .constrain(Statement::Slope {
+            .constrain(Constraint::DampingRatio { max: 0.8 })
+            .constrain(Constraint::Slope {
                 of: CoefficientKind::Damping,
                 min: Some(-0.5),
                 max: None,
@@ -197,7 +197,7 @@ mod tests {
     fn the_reduced_problem_is_the_whole_one_at_constants() {
         let whole = whole();
         for function in 0..3 {
-            let reduced = Reduced::new(&whole, function);
+            let reduced = ConstantModel::new(&whole, function);
             let count = reduced.problem.parameters();
             let own = whole.functions.ranges()[function].len();
             assert_eq!(count, whole.parameters() + 1 - own);
@@ -238,9 +238,9 @@ mod tests {
             of_slopes.map(|group| group.rows.len()).sum::<usize>()
         };
         assert_eq!(slopes(&whole), 3);
-        assert_eq!(slopes(&Reduced::new(&whole, 1).problem), 0);
-        assert_eq!(slopes(&Reduced::new(&whole, 0).problem), 3);
-        assert!(Reduced::new(&whole, 2).problem.variations.is_empty());
-        assert_eq!(Reduced::new(&whole, 1).problem.penalties.len(), 2);
+        assert_eq!(slopes(&ConstantModel::new(&whole, 1).problem), 0);
+        assert_eq!(slopes(&ConstantModel::new(&whole, 0).problem), 3);
+        assert!(ConstantModel::new(&whole, 2).problem.variations.is_empty());
+        assert_eq!(ConstantModel::new(&whole, 1).problem.penalties.len(), 2);
     }
 }

@@ -13,11 +13,11 @@ use std::collections::BTreeMap;
 const INDEPENDENT: f64 = 1e-9;
 
 /// Readings of one kind at one place.
-type Key = (usize, ChannelKind, usize, u64);
+type SampleKey = (usize, ChannelKind, usize, u64);
 
 /// The number of independent equations, and what is to be said of them.
 pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
-    let mut groups: BTreeMap<Key, (TimePoint, Vec<usize>)> = BTreeMap::new();
+    let mut groups: BTreeMap<SampleKey, (TimePoint, Vec<usize>)> = BTreeMap::new();
     let mut others = 0;
     for (e, experiment) in problem.experiments.iter().enumerate() {
         for channel in &experiment.channels {

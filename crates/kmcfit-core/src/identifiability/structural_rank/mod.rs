@@ -27,7 +27,7 @@ use super::components::components;
 use crate::problem::Problem;
 use columns::{parameter_is_visible, visible_nodes};
 use rows::equations;
-use scale::Scale;
+use scale::CommonScale;
 use serde::{Deserialize, Serialize};
 
 /// Which factor of all functions nothing in the problem fixes.
@@ -39,13 +39,13 @@ pub enum Symmetry {
     ConstantFactor,
     /// One factor for all times exactly, and nearly any slow `s(t)`: the bases have many knots.
     NearlyFunction,
-    /// Any function `s(t)`, on [`Count::free_on`].
+    /// Any function `s(t)`, on [`StructuralRank::free_on`].
     Function,
 }
 
 /// What can be seen at most.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Count {
+pub struct StructuralRank {
     /// Upper bound of the number of directions that the readings see.
     pub seen_at_most: usize,
     /// Number of parameters.
@@ -60,7 +60,7 @@ pub struct Count {
     pub findings: Vec<RankFinding>,
 }
 
-impl Count {
+impl StructuralRank {
     /// The headline and the sentences of all findings.
     pub fn sentences(&self) -> Vec<String> {
         let all = self.findings.iter().map(|s| s.sentence.clone());
@@ -114,7 +114,7 @@ impl RankFinding {
 }
 
 /// Counts what the records of `problem` can show.
-pub fn count(problem: &Problem) -> Count {
+pub fn structural_rank(problem: &Problem) -> StructuralRank {
     let (equations, mut findings) = equations(problem);
     let visible = visible_nodes(problem);
     let mut seen = (0..problem.parameters())
@@ -123,7 +123,7 @@ pub fn count(problem: &Problem) -> Count {
     let mut worst = Symmetry::None;
     let mut free_on = Vec::new();
     for component in components(problem) {
-        let scale = Scale::of(problem, &component);
+        let scale = CommonScale::of(problem, &component);
         seen -= scale.directions(&visible).min(seen);
         let (left, finding) = scale.left(problem, &component);
         if left > worst {
@@ -132,7 +132,7 @@ pub fn count(problem: &Problem) -> Count {
         }
         findings.push(finding);
     }
-    Count {
+    StructuralRank {
         seen_at_most: seen.min(equations),
         of: problem.parameters(),
         equations,

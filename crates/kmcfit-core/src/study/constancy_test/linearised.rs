@@ -1,6 +1,6 @@
 //! Refits of both models to simulated readings, by their linearisation.
 
-use super::reduced::Reduced;
+use super::reduced::ConstantModel;
 use crate::identifiability::Factorisation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -10,7 +10,7 @@ use crate::study::simulate::{normal, sigmas, stream};
 use nalgebra::{DMatrix, DVector};
 
 /// Both models, linearised at the constant optimum.
-pub struct Linearised {
+pub struct LinearisedModels {
     /// Orthonormal columns that span what each model can do: constant, varying.
     spans: [DMatrix<f64>; 2],
     /// Root weight times sigma of each reading.
@@ -19,8 +19,13 @@ pub struct Linearised {
     asked: Vec<f64>,
 }
 
-impl Linearised {
-    pub fn new(problem: &Problem, reduced: &Reduced, theta: &[f64], here: &Evaluation) -> Self {
+impl LinearisedModels {
+    pub fn new(
+        problem: &Problem,
+        reduced: &ConstantModel,
+        theta: &[f64],
+        here: &Evaluation,
+    ) -> Self {
         let jacobian = weighted_jacobian(problem, here);
         let n = theta.len();
         let mut rest = Subproblem::new(n);

@@ -27,7 +27,7 @@ use crate::system::quadrature::trapezoid_weights;
 use crate::system::{Grid, NodalCoefficients};
 
 /// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
-/// record, so that the wish comes first between the anchors.
+/// record, so that the options comes first between the anchors.
 const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
 
 /// A motion at the nodes of a grid, and the force that drives it.
@@ -77,7 +77,7 @@ impl TargetResponse {
 
 /// Which of the devices with the motion is wanted.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wish {
+pub struct EquivalentOptions {
     /// The damping to be near to, N s/m at the nodes.
     pub damping: Vec<f64>,
     /// Least stiffness, N/m.
@@ -88,7 +88,7 @@ pub struct Wish {
     pub smoothness: [f64; 2],
 }
 
-impl Wish {
+impl EquivalentOptions {
     /// Near to `damping`, with a stiffness of at least `least_stiffness` (N/m).
     pub fn near(damping: Vec<f64>, least_stiffness: f64) -> Self {
         Self {
@@ -100,19 +100,23 @@ impl Wish {
     }
 }
 
-/// The device with mass `mass` (kg at the nodes), damping near the wish, and the stiffness that gives
+/// The device with mass `mass` (kg at the nodes), damping near the options, and the stiffness that gives
 /// it the motion; `Err` says how the program ended where there is none, as where a crossing asks for
-/// less damping than the wish allows.
+/// less damping than the options allows.
 ///
 /// # Panics
-/// If mass, motion and wish do not have one value per node.
-pub fn equivalent(
+/// If mass, motion and options do not have one value per node.
+pub fn equivalent_coefficients(
     mass: &[f64],
     response: &TargetResponse,
-    wish: &Wish,
+    options: &EquivalentOptions,
 ) -> Result<NodalCoefficients, ConicStatus> {
     let n = response.grid.nodes();
-    let lengths = [mass.len(), response.displacement.len(), wish.damping.len()];
+    let lengths = [
+        mass.len(),
+        response.displacement.len(),
+        options.damping.len(),
+    ];
     assert_eq!(lengths, [n; 3], "one value per node");
     let step = response.grid.step();
     let duration = response.grid.duration();
@@ -129,13 +133,13 @@ pub fn equivalent(
     for (i, w) in weights.iter().enumerate() {
         let root = (w / duration).sqrt();
         sub.residuals
-            .push([(i, root)], root * wish.damping[i] / large_c);
+            .push([(i, root)], root * options.damping[i] / large_c);
     }
-    let slope = (wish.smoothness[0] * duration / step).sqrt();
+    let slope = (options.smoothness[0] * duration / step).sqrt();
     for i in 0..n - 1 {
         sub.residuals.push([(i, -slope), (i + 1, slope)], 0.0);
     }
-    let bend = (wish.smoothness[1] * (duration / step).powi(3)).sqrt();
+    let bend = (options.smoothness[1] * (duration / step).powi(3)).sqrt();
     for i in n + 1..2 * n - 1 {
         sub.residuals
             .push([(i - 1, bend), (i, -2.0 * bend), (i + 1, bend)], 0.0);
@@ -148,10 +152,10 @@ pub fn equivalent(
         sub.equalities.push(row, needed / inertia);
         sub.bound(
             [(n + i, 1.0)],
-            wish.least_stiffness / large_k,
+            options.least_stiffness / large_k,
             f64::INFINITY,
         );
-        if let Some(least) = wish.least_damping {
+        if let Some(least) = options.least_damping {
             sub.bound([(i, 1.0)], least / large_c, f64::INFINITY);
         }
     }

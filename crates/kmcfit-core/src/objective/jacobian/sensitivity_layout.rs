@@ -7,7 +7,7 @@ use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
 
 /// The functions of an experiment's device that have parameters, and where these stand.
 pub(super) struct Moving<'a> {
-    parts: Vec<Part<'a>>,
+    parts: Vec<FunctionLayout<'a>>,
     slots: Vec<Slot>,
     groups: usize,
     /// Initial states that are sought: which, and their places.
@@ -16,7 +16,7 @@ pub(super) struct Moving<'a> {
     places: usize,
 }
 
-struct Part<'a> {
+struct FunctionLayout<'a> {
     design: &'a Design,
     /// The slots of its groups.
     slots: Vec<usize>,
@@ -53,7 +53,7 @@ impl<'a> Moving<'a> {
             let design = &functions.get(f).design;
             let lane = |j: usize| (find(slot_of(function, j)), places[j] % LANES);
             let own = (0..slots.len()).filter(|s| slots[*s].function == function);
-            Part {
+            FunctionLayout {
                 design,
                 slots: own.collect(),
                 lanes: functions.ranges()[f].clone().map(lane).collect(),
@@ -99,7 +99,7 @@ impl<'a> Moving<'a> {
     }
 }
 
-impl Part<'_> {
+impl FunctionLayout<'_> {
     /// A constant changes along its one parameter, everywhere by the same.
     fn hold(&self, tangents: &mut Tangents) {
         for ((_, value), &(slot, lane)) in self.design.row(0).zip(&self.lanes) {
