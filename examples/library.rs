@@ -1,4 +1,4 @@
-// A fit from Rust: the model file becomes a problem, the problem a device.
+// A fit from Rust: the model file becomes a problem, the problem a system.
 
 use kmcfit::config::{ModelFile, Purpose, build};
 use kmcfit_core::fit;

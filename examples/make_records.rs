@@ -1,4 +1,4 @@
-//! Makes the records of `data/` that stand for measurements: devices of known values, simulated on a
+//! Makes the records of `data/` that stand for measurements: systems of known values, simulated on a
 //! fine grid, read by sensors with noise, and written as instruments write.
 //!
 //! `cargo run --example make_records -- data`
@@ -18,13 +18,13 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 const GRAVITY: f64 = 9.80665;
-/// Steps of the simulation between two readings.
+/// Steps of the simulation between two samples.
 const FINE: usize = 16;
 
 /// A function of time.
 type Function<'a> = &'a dyn Fn(f64) -> f64;
 
-/// A device, what drives it, and how long it is watched.
+/// A system, what drives it, and how long it is watched.
 struct Run<'a> {
     mass: f64,
     terms: Vec<(Term, Function<'a>)>,
@@ -32,7 +32,7 @@ struct Run<'a> {
     /// Acceleration of the base, m/s^2.
     base: Option<Function<'a>>,
     initial: State,
-    /// Readings per s, and their number.
+    /// Samples per s, and their number.
     rate: f64,
     count: usize,
 }
@@ -42,7 +42,7 @@ impl Run<'_> {
         i as f64 / self.rate
     }
 
-    /// Displacement and acceleration at the times of the readings.
+    /// Displacement and acceleration at the times of the samples.
     fn response(&self) -> (Vec<f64>, Vec<f64>) {
         let nodes = FINE * (self.count - 1) + 1;
         let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
@@ -116,7 +116,7 @@ fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Term, Function<'a>)> {
 
 /// A ring-down of 2 kg on a spring that softens from 3000 to 2700 N/m, c = 1.2 N s/m, read in g at
 /// 400 Hz by an accelerometer with an offset of 0.05 g and noise of 0.01 g, as a data logger writes
-/// it: preamble, semicolons, decimal commas, a row of units, Windows line ends, lost readings.
+/// it: preamble, semicolons, decimal commas, a row of units, Windows line ends, lost samples.
 pub fn accelerometer() -> String {
     let run = Run {
         mass: 2.0,
@@ -146,7 +146,7 @@ pub fn accelerometer() -> String {
     text
 }
 
-/// The device of the hammer tests and the shaker run: 1.2 kg, 0.9 N s/m, 480 N/m.
+/// The system of the hammer tests and the shaker run: 1.2 kg, 0.9 N s/m, 480 N/m.
 const TESTED: [f64; 3] = [1.2, 0.9, 480.0];
 
 /// A hammer test: displacement in mm after a blow, noise of 0.02 mm.
@@ -171,7 +171,7 @@ pub fn hammer(number: u64) -> String {
     text
 }
 
-/// The shaker run of the same device: force in N (a sweep from 1 to 6 Hz) and acceleration in m/s^2 with
+/// The shaker run of the same system: force in N (a sweep from 1 to 6 Hz) and acceleration in m/s^2 with
 /// noise of 0.02.
 pub fn shaker() -> String {
     let sweep = |t: f64| 1.5 * libm::sin(TAU * (t + 5.0 / 16.0 * t * t));
@@ -341,8 +341,8 @@ pub fn table() -> String {
     text
 }
 
-/// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing readings, one
-/// reading in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
+/// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing samples, one
+/// sample in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
 pub fn camera() -> String {
     let run = Run {
         mass: 1.0,

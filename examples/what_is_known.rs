@@ -1,4 +1,4 @@
-// The paper's record: what turns an optimum that matches the data into the device that made them.
+// The paper's record: what turns an optimum that matches the data into the system that made them.
 
 use kmcfit::observations::Table;
 use kmcfit_core::CoefficientKind;
@@ -17,7 +17,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
         // Positive, and bent as little as the record lets it be.
         CoefficientSpec::nodal(2.0).min(0.05).tikhonov(2, 1e-3),
         CoefficientSpec::nodal(1.0).min(0.0).tikhonov(2, 1e-3),
-        // Free motion shows ratios alone: one function must be known.
+        // Free response shows ratios alone: one function must be known.
         CoefficientSpec::fixed(1.0),
     ];
     let problem = Builder::new(nodal)

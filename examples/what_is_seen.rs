@@ -8,7 +8,7 @@ use std::error::Error;
 /// For one free record and for the pair: directions seen at most, and whether a factor of all functions
 /// stays free.
 pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
-    // Any motion will do: what can be counted depends on the records, not on what they read.
+    // Any response will do: what can be counted depends on the records, not on what they read.
     let grid = Grid::new(0.0, 20.0, 401).ok_or("a grid")?;
     let system = System {
         grid,

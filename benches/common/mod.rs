@@ -25,7 +25,7 @@ const INITIAL: State = State {
 const SPREAD: f64 = 3.0;
 
 /// The paper's problem on `nodes` nodes: one free value per node for mass, damping and stiffness, the
-/// midpoint rule, the start (2, 1, 1), and readings that the same stepper made.
+/// midpoint rule, the start (2, 1, 1), and samples that the same stepper made.
 pub fn paper(nodes: usize) -> Problem {
     let system = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
@@ -122,7 +122,7 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
 }
 
 /// A hardening spring under three sines, seen by a displacement and an acceleration sensor with
-/// `samples` readings each; mass, damping, stiffness and cubic stiffness are sought.
+/// `samples` samples each; mass, damping, stiffness and cubic stiffness are estimated.
 pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let grid = Grid::new(0.0, 0.001 * (samples - 1) as f64, samples).expect("a grid");
     let times = grid.times();

@@ -269,18 +269,18 @@ impl Problem {
         self.experiments.iter().flat_map(|e| &e.channels)
     }
 
-    /// Number of readings of all experiments.
+    /// Number of samples of all experiments.
     pub fn sample_count(&self) -> usize {
         self.channels().map(Channel::len).sum()
     }
 
-    /// The misfit of no motion at all: what there is to explain.
+    /// The misfit of no response at all: what there is to explain.
     pub fn zero_response_misfit(&self) -> f64 {
         let silence = |c: &Channel| c.cost(&vec![0.0; c.len()]);
         self.channels().map(silence).sum()
     }
 
-    /// The same problem with only the first part of the readings, `share` of the time of each
+    /// The same problem with only the first part of the samples, `share` of the time of each
     /// record.
     #[must_use]
     pub fn truncated(&self, share: f64) -> Self {
@@ -297,7 +297,7 @@ impl Problem {
         part
     }
 
-    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading of the
+    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one sample of the
     /// displacement per node, over the whole grid.
     pub fn supports_continuous(&self) -> bool {
         let nodes = self.system.grid.nodes();

@@ -1,4 +1,4 @@
-//! The gradient of J with every kind of reading, term, excitation, sensor and loss, against dual
+//! The gradient of J with every kind of sample, term, excitation, sensor and loss, against dual
 //! numbers through an independent evaluation.
 
 mod common;
@@ -61,7 +61,7 @@ struct Readings {
     sigmas: Vec<f64>,
     around: Vec<(f64, f64)>,
     fixed_in_space: Vec<f64>,
-    /// Gain, offset and drift, all sought.
+    /// Gain, offset and drift, all estimated.
     sensor: [f64; 3],
     loss: Loss,
 }
@@ -372,7 +372,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
             .collect(),
     };
     let list = problem.functions.iter().enumerate().map(|(i, nodal)| {
-        // No term that drives the motion out of bounds.
+        // No term that drives the response out of bounds.
         let start = nodal.start[0].abs();
         match i % 3 {
             1 if with_knots => {
@@ -433,7 +433,7 @@ fn index_of_prior(problem: &Problem) -> usize {
     problem.functions.scalar_range().start + 1
 }
 
-/// The motions are far apart, so that the difference of two rounded costs is exact enough.
+/// The responses are far apart, so that the difference of two rounded costs is exact enough.
 #[test]
 fn the_difference_of_costs_is_that_of_both_costs() {
     let grid = Grid::new(0.0, 1.0, 9).unwrap();

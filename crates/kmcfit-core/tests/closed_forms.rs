@@ -1,4 +1,4 @@
-//! The forward solve against motions known in closed form.
+//! The forward solve against responses known in closed form.
 
 mod common;
 

@@ -71,7 +71,7 @@ fn with_a_sigma_and_with_penalties() {
     agree(&smooth, &uneven(&smooth));
 }
 
-/// Every second node is read, or other bases are sought: no short way.
+/// Every second node is read, or other bases are estimated: no short way.
 #[test]
 fn of_everything_else() {
     let mut problem = paper_problem(301, [2.0, 1.0, 1.0]);

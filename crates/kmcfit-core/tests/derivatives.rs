@@ -27,7 +27,7 @@ fn discrete_adjoint(
     engine.discrete_adjoint(system, nodal, excitation, response, source)
 }
 
-/// A random device with a random force, initial state and cost weights.
+/// A random system with a random force, initial state and cost weights.
 #[derive(Debug, Clone)]
 struct Case {
     method: Method,
@@ -293,7 +293,7 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
     }
 }
 
-/// Of a device whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
+/// Of a system whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
 fn initial_gradients(nodes: usize) -> [State; 2] {
     let system = common::system(nodes, Method::Midpoint);
     let times = system.grid.times();

@@ -1,4 +1,4 @@
-//! Driven motions against closed forms: harmonic, base and transient excitation, Coulomb friction, and
+//! Driven responses against closed forms: harmonic, base and transient excitation, Coulomb friction, and
 //! what sensors see between nodes.
 
 mod common;
@@ -85,7 +85,7 @@ fn tone(times: &[f64], values: &[f64], w: f64) -> (f64, f64) {
 }
 
 /// How many times as many steps the long records take: 0.02 and 0.01 s, 50 and 100 or more steps in
-/// the shorter of the periods of force and device.
+/// the shorter of the periods of force and system.
 const STEADY: usize = 30;
 
 /// Far below, near and far above resonance (3 rad/s), long after the beginning is forgotten:
@@ -203,7 +203,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
     }
 }
 
-/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the push, free motion after it.
+/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the push, free response after it.
 #[test]
 fn a_half_sine_gives_the_response_of_the_textbook() {
     let (w, wn) = (PI / 2.0, (K / M).sqrt());
@@ -240,7 +240,7 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
     }
 }
 
-/// A free motion under dry friction: its turning points, as displacements.
+/// A free response under dry friction: its turning points, as displacements.
 fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     // A step 1/20 of the time that the speed takes to cross the narrowest width.
     let nodes = 40_001;
@@ -338,7 +338,7 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
     for method in METHODS {
         for kind in ChannelKind::ALL {
             let error = |nodes: usize| {
-                // 16 to 32 steps in a period of the device: with more, rounding would show.
+                // 16 to 32 steps in a period of the system: with more, rounding would show.
                 let nodes = (nodes - 1) / 4 + 1;
                 let system = system(nodes, 10.0, method);
                 let grid = system.grid;

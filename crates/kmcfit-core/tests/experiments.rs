@@ -1,4 +1,4 @@
-//! What several records of one device determine together that one alone does not.
+//! What several records of one system determine together that one alone does not.
 
 mod common;
 
@@ -69,7 +69,7 @@ fn force(grid: &Grid) -> Excitation {
 /// Which records there are: of each the initial state, and whether it is forced.
 type Records<'a> = &'a [(State, bool)];
 
-/// One value per step for each function, from (2, 1, 1), with readings at all nodes.
+/// One value per step for each function, from (2, 1, 1), with samples at all nodes.
 fn problem(nodes: usize, nodal: &NodalCoefficients, records: Records) -> Problem {
     let system = system(nodes);
     let grid = system.grid;
@@ -96,7 +96,7 @@ fn problem(nodes: usize, nodal: &NodalCoefficients, records: Records) -> Problem
     Problem::new(system, functions, records).unwrap()
 }
 
-/// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside readings whose
+/// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside samples whose
 /// misfit is counted in thousandths of a metre.
 const SMOOTHNESS: f64 = 1e-2;
 
@@ -135,7 +135,7 @@ fn ratio_errors(found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
     ]
 }
 
-/// A fit of one record that explains it, but with another device.
+/// A fit of one record that explains it, but with another system.
 fn another_system(records: Records, scale_fixed: bool, truth: &NodalCoefficients) -> Fit {
     let problem = smooth(problem(NODES, truth, records), scale_fixed);
     let found = fit(&problem, &problem.start(), &settings(), &mut |_| {}).unwrap();

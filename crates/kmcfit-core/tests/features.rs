@@ -1,4 +1,4 @@
-//! What records, sensors, devices and terms can be, each alone and all together: noise-free records
+//! What records, sensors, systems and terms can be, each alone and all together: noise-free records
 //! by an independent evaluation, from which the truth is found again to 1e-8.
 
 mod common;
@@ -19,10 +19,10 @@ use kmcfit_core::internals::system::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// 63 steps in a period of the device.
+/// 63 steps in a period of the system.
 const NODES: usize = 301;
 const DURATION: f64 = 15.0;
-/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the motion by
+/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the response by
 /// about as much as they move themselves: 1e-8 leaves room for those that are not.
 const EXACT: f64 = 1e-8;
 const WIDTH: f64 = 0.3;
@@ -91,7 +91,7 @@ impl Sought {
     }
 }
 
-/// Damping and stiffness of the linear device, which most tests look for; the mass is known.
+/// Damping and stiffness of the linear system, which most tests look for; the mass is known.
 fn damping() -> Sought {
     constant(CoefficientKind::Damping, 0.25, 0.4)
 }
@@ -107,7 +107,7 @@ fn known_mass() -> Vec<f64> {
     times.iter().map(|t| 1.1 - 0.01 * t).collect()
 }
 
-/// The times of a record: irregular, off the nodes, with missing readings and a gap.
+/// The times of a record: irregular, off the nodes, with missing samples and a gap.
 fn scattered(count: usize, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut times: Vec<f64> = (0..count)
@@ -124,7 +124,7 @@ struct Reading {
     kind: ChannelKind,
     times: Vec<f64>,
     sigma: Weighting,
-    /// True gain, offset and drift, and which scalars they are where they are sought.
+    /// True gain, offset and drift, and which scalars they are where they are estimated.
     sensor: [f64; 3],
     initial_parameters: [Option<usize>; 3],
     around: Vec<InputSample>,
@@ -152,7 +152,7 @@ impl Reading {
         Self::of(kind, grid().times())
     }
 
-    /// Gain, offset and drift, which are sought as the scalars from `first` on.
+    /// Gain, offset and drift, which are estimated as the scalars from `first` on.
     fn unknown_sensor(mut self, sensor: [f64; 3], first: usize) -> Self {
         self.sensor = sensor;
         self.initial_parameters = [first, first + 1, first + 2].map(Some);
@@ -197,11 +197,11 @@ impl Reading {
 #[derive(Clone)]
 struct Record {
     initial: State,
-    /// The scalars that the initial state is, where it is sought.
+    /// The scalars that the initial state is, where it is estimated.
     initial_parameters: [Option<usize>; 2],
     excitation: Option<Excitation>,
     samples: Vec<Reading>,
-    /// Which device of the case.
+    /// Which system of the case.
     coefficient_set: usize,
 }
 
@@ -237,13 +237,13 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
     (truth, scalar)
 }
 
-/// A device, its records, and what is to be found.
+/// A system, its records, and what is to be found.
 struct Case {
     terms: Vec<Term>,
     /// `None` where the mass is known.
     mass: Option<Sought>,
     functions: Vec<Sought>,
-    /// Functions that replace one of the main device in the other devices: which one of its list.
+    /// Functions that replace one of the shared coefficient set in the other systems: which one of its list.
     own: Vec<(usize, Sought)>,
     scalars: Vec<(f64, ScalarParameter)>,
     records: Vec<Record>,
@@ -310,7 +310,7 @@ impl Case {
                 .unwrap()
                 .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
         let records = self.records.iter().map(|record| {
-            // A record ends with its last reading, at the next node.
+            // A record ends with its last sample, at the next node.
             let ends = record.samples.iter().map(|r| r.times[r.times.len() - 1]);
             let end = ends.fold(0.0, f64::max);
             let nodes = ((end / system.grid.step() - 1e-9).ceil() as usize + 1).min(NODES);
@@ -482,7 +482,7 @@ fn a_measured_force_gives_the_mass_too() {
 fn base_excitation_with_sensors_on_the_base_and_in_space() {
     let times = scattered(200, 7);
     let (h, steps) = (grid().step(), base());
-    // Force and base at the readings: linear over each step, as the stepper's own.
+    // Force and base at the samples: linear over each step, as the stepper's own.
     let base_at = |t: &f64| {
         let i = ((t / h).floor() as usize).min(NODES - 2);
         let x = t / h - i as f64;
@@ -653,7 +653,7 @@ fn all_together() {
 }
 
 /// One value per node: the states are unknowns of the subproblem. The truth is linear in time, so
-/// that light smoothness charges nothing for it and decides what the readings leave open.
+/// that light smoothness charges nothing for it and decides what the samples leave open.
 #[test]
 fn one_value_per_node_with_sensors_states_and_a_filter() {
     let nodal = |quantity, from: f64, slope: f64, start: f64| Sought {
@@ -704,13 +704,13 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     assert!(error < EXACT, "{error:e} {:#?}", found.attempts);
 }
 
-/// Fifty periods, with six nodes in each, of a device that is three times as stiff as the start says:
+/// Fifty periods, with six nodes in each, of a system that is three times as stiff as the start says:
 /// differences are too coarse for an equation error. States and functions are corrected at once for
-/// several devices, sensors, unknown states and a filter together.
+/// several systems, sensors, unknown states and a filter together.
 #[test]
 fn all_of_it_from_far_away_on_a_coarse_grid() {
     let rate = 1.0 / grid().step();
-    // Some six irregular readings in a period, every tenth of them missing.
+    // Some six irregular samples in a period, every tenth of them missing.
     let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
     let times = (0..NODES - 1).filter(|i| i % 10 != 7);
     let times = times.map(|i| (i as f64 + late(i)) * grid().step());
@@ -752,7 +752,7 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     case.check("far away");
 }
 
-/// A prior with another mean pulls, by as much as its weight beside that of the readings says.
+/// A prior with another mean pulls, by as much as its weight beside that of the samples says.
 #[test]
 fn a_prior_pulls_towards_its_mean() {
     let mut record = Record::free(vec![Reading::of(

@@ -51,7 +51,7 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
     (STATES[i], Some(force))
 }
 
-/// Displacement of `device` at all nodes, for each record; sigma 1e-3.
+/// Displacement of `system` at all nodes, for each record; sigma 1e-3.
 fn with_records(
     system: &System,
     list: Vec<CoefficientFunction>,
@@ -75,7 +75,7 @@ fn with_records(
     Problem::new(system.clone(), functions, records.collect()).unwrap()
 }
 
-/// One value per node for each function, starting at the device itself.
+/// One value per node for each function, starting at the system itself.
 fn nodal_problem(system: &System, nodal: &NodalCoefficients, records: &[Record]) -> Problem {
     let list = QUANTITIES.into_iter().zip(nodal.functions());
     let list = list.map(|(q, p)| CoefficientFunction::nodal(q, p.to_vec()));
@@ -202,7 +202,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
 proptest! {
     #![proptest_config(properties(12, 1))]
 
-    /// Devices that vary, by each stepper, under up to four records: the rank never exceeds the count,
+    /// Systems that vary, by each stepper, under up to four records: the rank never exceeds the count,
     /// and by the midpoint rule it is the count.
     #[test]
     fn the_count_bounds_the_rank_of_random_devices(
@@ -255,7 +255,7 @@ fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
     );
     let cost = (a.cost - b.cost).abs() / a.cost;
     println!("motion {off:.1e} m, cost {cost:.1e} of itself");
-    // Relative to a motion of 3.3 m, and to the cost.
+    // Relative to a response of 3.3 m, and to the cost.
     assert!(off < 1e-13 * 3.3, "{off}");
     assert!(cost < 1e-13, "{cost}");
     let seen = Sensitivity::of(&problem, &a).spectrum();
@@ -426,7 +426,7 @@ impl Coverage {
     }
 }
 
-/// Fits of 200 records with noise: the coverage of every function that is sought, and of the ratios.
+/// Fits of 200 records with noise: the coverage of every function that is estimated, and of the ratios.
 fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     let clean = (problem.system)
         .forward(truth, problem.experiments[0].initial, None)
@@ -683,7 +683,7 @@ fn without_sigma_the_residuals_say_it() {
         spacing: system.grid.step(),
     });
     assert_eq!(known.sigma, None);
-    // The scatter of a standard deviation from 396 readings is 3.6 %: three of these, for both.
+    // The scatter of a standard deviation from 396 samples is 3.6 %: three of these, for both.
     let found = guessed.sigma.unwrap();
     assert!((found / sigma - 1.0).abs() < 0.11, "{found}");
     for (a, b) in known.functions.iter().zip(&guessed.functions) {
@@ -745,7 +745,7 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
     assert_eq!(first[1].name, "repeat");
     let gain = first[1].gain.clone().unwrap();
     assert_eq!((gain.new_directions, gain.sees_scale), (0, Some(false)));
-    // Twice the readings: all standard errors by the root of two. The worst directions carry the
+    // Twice the samples: all standard errors by the root of two. The worst directions carry the
     // rounding of the Jacobian, some 1e-16 beside 1e-6 of the best.
     for ratio in [gain.volume, gain.average, gain.worst] {
         assert!((ratio - 0.5f64.sqrt()).abs() < 1e-6, "{ratio}");
@@ -779,7 +779,7 @@ fn tangents_and_adjoints_give_the_same_jacobian() {
     let system = common::system(nodes, Method::Rk4);
     let nodal = common::paper_system(nodes);
     let drive = forced(1, &system.grid, 0);
-    // 40 readings of 120 parameters: adjoints. Four times as many: tangents.
+    // 40 samples of 120 parameters: adjoints. Four times as many: tangents.
     let one = nodal_problem(&system, &nodal, std::slice::from_ref(&drive));
     let four = nodal_problem(&system, &nodal, &vec![drive; 4]);
     let jacobian = |p: &Problem| {
@@ -820,7 +820,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
             parts.experiments[0].nodes = half;
         })
         .unwrap();
-    // Half of the knots are beyond the last reading.
+    // Half of the knots are beyond the last sample.
     assert_eq!(structural_rank(&problem).seen_at_most, 7);
     assert_eq!(spectrum(&problem).rank(), 7);
     let theta = problem.start();
@@ -832,7 +832,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         panic!("{}", words[0].sentence);
     };
     assert_eq!(spans.len(), 1);
-    // Up to the last reading at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
+    // Up to the last sample at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
     assert_eq!(spans[0][0], 0.0);
     assert!((12.4..=12.5).contains(&spans[0][1]), "{spans:?}");
     assert!(matches!(

@@ -1,4 +1,4 @@
-//! Problems without a device, and quadratic programs without an answer: the fit ends with a word for
+//! Problems without a system, and quadratic programs without an answer: the fit ends with a word for
 //! it, and keeps its best point.
 
 mod common;
@@ -17,7 +17,7 @@ use kmcfit_core::internals::system::{Method, NodalCoefficients};
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;
 
-/// Readings of a mass that grows, `m = 0.8 + 0.01 t`; the mass is sought in `basis`.
+/// Samples of a mass that grows, `m = 0.8 + 0.01 t`; the mass is estimated in `basis`.
 fn problem(basis: &Basis) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let grid = system.grid;

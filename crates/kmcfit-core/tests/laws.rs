@@ -1,4 +1,4 @@
-//! Laws that hold for every device: checked on random ones, the same in every run.
+//! Laws that hold for every system: checked on random ones, the same in every run.
 
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
@@ -16,7 +16,7 @@ mod properties;
 
 const DURATION: f64 = 12.0;
 
-/// A smooth device, a start and a force, on any grid.
+/// A smooth system, a start and a force, on any grid.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     /// Mean, share of change, angular frequency of the change of mass, damping, stiffness.
@@ -102,7 +102,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     size(&differences)
 }
 
-/// Rounding of a motion of some hundred steps, relative to its size.
+/// Rounding of a response of some hundred steps, relative to its size.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
@@ -218,7 +218,7 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
     });
 }
 
-/// Readings of a case in a unit that is `per_metre` to the metre, `later` seconds later.
+/// Samples of a case in a unit that is `per_metre` to the metre, `later` seconds later.
 fn record(case: Case, per_metre: f64, later: f64) -> Record {
     let system = system(121, Method::Rk4);
     let grid = system.grid;

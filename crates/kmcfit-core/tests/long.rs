@@ -1,4 +1,4 @@
-//! Long records of devices that vary in time: 300 periods, while the frequency doubles, with one per
+//! Long records of systems that vary in time: 300 periods, while the frequency doubles, with one per
 //! cent of noise, from a constant stiffness that is off by a factor of three.
 
 mod common;
@@ -206,15 +206,15 @@ fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
     check(&spline(&system().grid), sample, 1e-3);
 }
 
-/// Five readings in the shortest period. Differences over them take several per cent off the
-/// acceleration, and the equation error is wrong by several periods; the motion is not.
+/// Five samples in the shortest period. Differences over them take several per cent off the
+/// acceleration, and the equation error is wrong by several periods; the response is not.
 #[test]
 fn few_displacements_in_a_period_need_states_and_functions_at_once() {
     let sample = Reading {
         stride: 3,
         ..Reading::every_node(ChannelKind::Displacement)
     };
-    // Four times fewer readings: errors twice as large.
+    // Four times fewer samples: errors twice as large.
     let last = check(&line(&system().grid), sample, 2e-3);
     assert_eq!(last, ["motion of the samples"; 2]);
 }
@@ -231,7 +231,7 @@ fn few_irregular_accelerations_need_states_and_functions_at_once() {
     assert_eq!(last, ["motion of the samples"; 2]);
 }
 
-/// With so much noise that smoothing takes a part of the motion with it.
+/// With so much noise that smoothing takes a part of the response with it.
 #[test]
 fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
     let sample = Reading {

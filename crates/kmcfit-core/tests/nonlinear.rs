@@ -1,4 +1,4 @@
-//! Nonlinear devices from what drives them and how they move, with one per cent of noise.
+//! Nonlinear systems from what drives them and how they move, with one per cent of noise.
 
 mod common;
 
@@ -110,7 +110,7 @@ fn push(grid: &Grid, force: impl Fn(f64) -> f64) -> Excitation {
 
 fn duffing(factors: [f64; 4]) -> Case {
     let terms = [Term::Damping, Term::Stiffness, Term::CubicStiffness];
-    // 30 to 60 steps in a period of the device, which is 2 to 4 s.
+    // 30 to 60 steps in a period of the system, which is 2 to 4 s.
     let system = system(1501, 100.0, &terms);
     let truth = [
         (CoefficientKind::Mass, 1.0),

@@ -1,4 +1,4 @@
-//! The true device is found again.
+//! The true system is found again.
 
 mod common;
 
@@ -140,7 +140,7 @@ fn one_value_per_step_recovers_all_three_functions_from_the_start_of_the_paper()
     assert!(errors.iter().all(|e| *e <= 1e-4), "{errors:?}");
 }
 
-/// Readings from the closed form for m = 1 - 0.02 t.
+/// Samples from the closed form for m = 1 - 0.02 t.
 fn bessel_fit(nodes: usize, method: Method) -> f64 {
     let system = common::system(nodes, method);
     let times = system.grid.times();
@@ -160,7 +160,7 @@ fn bessel_fit(nodes: usize, method: Method) -> f64 {
 
 #[test]
 fn data_that_our_stepper_did_not_make_give_the_mass_to_the_order_of_the_stepper() {
-    // RK4's own error, 4e-9 of the motion at N = 2000, leaves the mass nearly untouched.
+    // RK4's own error, 4e-9 of the response at N = 2000, leaves the mass nearly untouched.
     let rk4 = bessel_fit(2000, Method::Rk4);
     assert!(rk4 <= 1e-7, "{rk4}");
     // The midpoint rule moves too slowly or too fast by a share (w dt)^2 of the period, and the fit
@@ -235,7 +235,7 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
     assert!((30.3..102.7).contains(&sum), "{sum}");
 }
 
-/// Positivity alone: an exact fit, and another device. Without a force only k/m and c/m can be
+/// Positivity alone: an exact fit, and another system. Without a force only k/m and c/m can be
 /// seen, and one record gives one equation per instant for the two.
 #[test]
 fn positivity_alone_does_not_find_the_device() {

@@ -21,7 +21,7 @@ use rand_chacha::ChaCha8Rng;
 const NODES: usize = 201;
 const DURATION: f64 = 12.0;
 const SEEDS: u64 = 200;
-/// Of the readings' size: small enough that the problem is linear over the errors that it makes (per
+/// Of the samples' size: small enough that the problem is linear over the errors that it makes (per
 /// mille to per cent), whose bias of second order is a hundredth of their spread.
 const NOISE: f64 = 0.02;
 const INITIAL: State = State {
@@ -29,10 +29,10 @@ const INITIAL: State = State {
     velocity: -0.8,
 };
 
-/// Readings from clean ones, sigma and a seed.
+/// Samples from clean ones, sigma and a seed.
 type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
 
-/// A device of constants that is read through one channel at all nodes.
+/// A system of constants that is read through one channel at all nodes.
 struct Setup {
     terms: Vec<(Term, CoefficientKind)>,
     /// Mass first; `None` for what is known.
@@ -40,9 +40,9 @@ struct Setup {
     truth: Vec<f64>,
     kind: ChannelKind,
     excitation: Option<Excitation>,
-    /// Whether the initial state is sought.
+    /// Whether the initial state is estimated.
     state: bool,
-    /// Gain and offset, where they are sought.
+    /// Gain and offset, where they are estimated.
     sensor: Option<[f64; 2]>,
     loss: Loss,
 }
@@ -159,7 +159,7 @@ impl Setup {
         Problem::new(system, functions, vec![experiment.with_channel(channel)]).unwrap()
     }
 
-    /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
+    /// Errors of all parameters in units of the spread of Cramer and Rao, for samples that `spoil`
     /// makes of the clean ones and sigma.
     fn errors(&self, seeds: std::ops::RangeInclusive<u64>, spoil: Spoil) -> Vec<Vec<f64>> {
         let clean = self.clean();
@@ -230,7 +230,7 @@ fn a_force_that_gives_the_mass() {
     setup.check("m, c, k under a force, from velocity");
 }
 
-/// One reading in twenty is off by 30 standard deviations, to either side.
+/// One sample in twenty is off by 30 standard deviations, to either side.
 fn with_outliers(clean: &[f64], sigma: f64, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
     let mut spoiled = with_noise(clean, sigma, seed);
@@ -259,7 +259,7 @@ fn robust_losses_stay_close_where_least_squares_does_not() {
     let huber = with_loss(Loss::Huber { threshold: 1.345 });
     let student = with_loss(Loss::StudentT { degrees: 4.0 });
     println!("5 % outliers: squares {squares:.2}, Huber {huber:.2}, Student {student:.2}");
-    // The variance of a reading is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
+    // The variance of a sample is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
     // know that to a tenth.
     assert!((5.4..8.2).contains(&squares), "{squares}");
     // Huber (1964): with a share e of outliers and the threshold a = 1.345 the variance is
@@ -316,7 +316,7 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
         let ratio = covariance[(j, j)] / expected[(j, j)];
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
     }
-    // Readings that leave no residual do not tell it.
+    // Samples that leave no residual do not tell it.
     let exact = evaluation.predictions[0][0].clone();
     assert!(found(exact).2.is_none());
 }
@@ -352,14 +352,14 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             .unwrap();
         problem.covariance(&problem.evaluate(&problem.start()).unwrap())
     };
-    // The stiffness at the last knot moves the last reading by next to nothing: one knot fewer is seen.
+    // The stiffness at the last knot moves the last sample by next to nothing: one knot fewer is seen.
     assert!(covariance(63, NODES).is_some());
     assert!(covariance(64, NODES).is_some());
     assert!(covariance(65, NODES).is_none());
     assert!(covariance(20, NODES / 2).is_none());
 }
 
-/// A free motion tells the ratios to the mass alone; and as many readings as functions leave nothing to
+/// A free response tells the ratios to the mass alone; and as many samples as functions leave nothing to
 /// judge these by.
 #[test]
 fn what_the_readings_do_not_see_has_no_covariance() {
@@ -384,7 +384,7 @@ fn what_the_readings_do_not_see_has_no_covariance() {
     assert!(covariance(&setup, 100).is_none());
 }
 
-/// Readings of a known motion by a sensor whose offset is sought, with an unknown sigma.
+/// Samples of a known response by a sensor whose offset is estimated, with an unknown sigma.
 fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
     let mut problem = setup.problem(values, 1.0);
     let offset = ScalarParameter {
@@ -419,7 +419,7 @@ fn sigma_of(problem: &Problem) -> f64 {
     channel.weighting().sigma(0).expect("a sigma")
 }
 
-/// The offset of readings of a known motion is their mean distance from it, and the sigma their sample
+/// The offset of samples of a known response is their mean distance from it, and the sigma their sample
 /// standard deviation, with `n - 1` below the squares.
 #[test]
 fn the_sigma_is_the_sample_standard_deviation() {
@@ -438,16 +438,16 @@ fn the_sigma_is_the_sample_standard_deviation() {
     let squares: f64 = residuals.map(|r| (r - mean).powi(2)).sum();
     let expected = (squares / (n - 1.0)).sqrt();
     let sigma = sigma_of(&with_sigma);
-    // The readings are simulated twice, to rounding.
+    // The samples are simulated twice, to rounding.
     assert!((fit.best.parameters[0] - mean).abs() < 1e-9);
     assert!((sigma / expected - 1.0).abs() < 1e-9, "{sigma} {expected}");
     // The sigma changes nothing about the mean: it is found in the first round and confirmed by the
-    // second. Twenty rounds would take twenty motions at least; the first fit takes two, and each of the
+    // second. Twenty rounds would take twenty responses at least; the first fit takes two, and each of the
     // two rounds one at least.
     assert!((4..20).contains(&fit.counts.forward), "{:?}", fit.counts);
 }
 
-/// Two sensors of one motion with the same offset, one ten times as noisy: their sigmas are those about the
+/// Two sensors of one response with the same offset, one ten times as noisy: their sigmas are those about the
 /// offset, and the offset is the mean with the weights of these sigmas.
 #[test]
 fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
@@ -477,7 +477,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     for _ in 0..100 {
         let [one, two] = variances;
         offset = (means[0] / one + means[1] / two) / (1.0 / one + 1.0 / two);
-        // One parameter of 2 n readings.
+        // One parameter of 2 n samples.
         variances = residuals.each_ref().map(|r| {
             let squares = r.iter().map(|r| (r - offset).powi(2)).sum::<f64>();
             squares / n / (1.0 - 0.5 / n)
@@ -518,7 +518,7 @@ fn a_robust_sigma_is_that_of_the_median() {
     assert!((sigma / expected - 1.0).abs() < 1e-4, "{sigma} {expected}");
 }
 
-/// Readings without noise: their sigma is the last digit of a reading, and not zero.
+/// Samples without noise: their sigma is the last digit of a sample, and not zero.
 #[test]
 fn readings_that_are_fitted_exactly_have_a_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
@@ -533,7 +533,7 @@ fn readings_that_are_fitted_exactly_have_a_sigma() {
     assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
 }
 
-/// Readings that are all zero, of what is at rest, have no scale: the sigma stays as it was.
+/// Samples that are all zero, of what is at rest, have no scale: the sigma stays as it was.
 #[test]
 fn readings_of_nothing_keep_their_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);

@@ -1,4 +1,4 @@
-//! Choosing the weight of the smoothness from noisy readings.
+//! Choosing the weight of the smoothness from noisy samples.
 
 mod common;
 
@@ -89,7 +89,7 @@ fn the_weight_by_discrepancy_finds_the_paper_s_device_in_the_noise() {
     the_paper_s_device_in_the_noise(2000, true, 1..=2);
 }
 
-/// Half the readings and no bounds: no program is solved, so twenty seeds take seconds each.
+/// Half the samples and no bounds: no program is solved, so twenty seeds take seconds each.
 #[test]
 fn the_weight_by_discrepancy_finds_the_device_without_bounds_for_twenty_seeds() {
     the_paper_s_device_in_the_noise(1000, false, 1..=20);

@@ -5,10 +5,10 @@ use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 use serde::{Deserialize, Serialize};
 
-/// Residuals below this share of the largest reading are rounding.
+/// Residuals below this share of the largest sample are rounding.
 const ROUNDING: f64 = 1e-6;
 /// Half of the energy of a tone lies within this share of its frequency, which is further than that other share from
-/// that of the readings.
+/// that of the samples.
 const NARROW: f64 = 0.15;
 const APART: f64 = 0.25;
 /// A multiple of a frequency is met to within this share.
@@ -67,7 +67,7 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     }
 }
 
-/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the readings', nor
+/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the samples', nor
 /// a multiple of it, which is the nonlinearity's. Without a sigma nothing says that residuals are more than what a descent
 /// has left.
 fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
-    /// SI unit: that of a motion along a line, unless it is changed.
+    /// SI unit: that of a response along a line, unless it is changed.
     #[serde(default)]
     pub unit: String,
     /// Smallest value at a node.
@@ -36,11 +36,11 @@ pub struct FunctionSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_range: Option<[f64; 2]>,
     /// For a constant its standard error from the linearised fit, without constraints, penalties and
-    /// priors, where the readings determine all parameters.
+    /// priors, where the samples determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
     /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
-    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
+    /// that converged, with residuals that may be noise, where the samples determine all parameters and nothing else has a say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub constant_p_value: Option<f64>,
     /// Largest distance from the truth at a node, where the truth is known.

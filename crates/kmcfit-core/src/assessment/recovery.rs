@@ -35,7 +35,7 @@ pub struct TruthErrors {
 }
 
 impl TruthErrors {
-    /// The distances of `device` from `truth`, on the same grid.
+    /// The distances of `system` from `truth`, on the same grid.
     pub fn of(nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
         let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);

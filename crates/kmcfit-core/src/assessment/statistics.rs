@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 /// Goodness of fit and information criteria of a fit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitStatistics {
-    /// Number of readings.
+    /// Number of samples.
     pub samples: usize,
     /// Number of parameters of functions and scalars.
     pub parameters: usize,
-    /// `J / (n - p)` for a chi-square of readings with known sigma; `None` where it has no meaning.
+    /// `J / (n - p)` for a chi-square of samples with known sigma; `None` where it has no meaning.
     pub reduced_chi_square: Option<f64>,
     /// Akaike's criterion.
     pub aic: Option<f64>,

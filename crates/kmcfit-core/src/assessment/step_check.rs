@@ -18,12 +18,12 @@ pub struct StepCheck {
     /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
     #[serde(deserialize_with = "number_or_nan")]
     pub change_per_residual: f64,
-    /// Largest change of a prediction as a share of the largest reading, over the channels.
+    /// Largest change of a prediction as a share of the largest sample, over the channels.
     #[serde(deserialize_with = "number_or_nan")]
     pub change_per_sample: f64,
 }
 
-/// The check: `None` where the readings do not lie on the finer grid, an error where there is no response on it.
+/// The check: `None` where the samples do not lie on the finer grid, an error where there is no response on it.
 pub type StepCheckOutcome = Result<Option<StepCheck>, SimulationError>;
 
 /// Simulates the optimum with half the step.

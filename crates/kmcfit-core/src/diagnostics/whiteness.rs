@@ -1,4 +1,4 @@
-//! Whether residuals are white: what a right model leaves of readings with independent errors.
+//! Whether residuals are white: what a right model leaves of samples with independent errors.
 
 use super::Autocorrelation;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Residuals whose probability under whiteness is below this are called correlated: one white
 /// sequence in twenty is, wrongly.
 pub const SIGNIFICANCE: f64 = 0.05;
-/// With fewer readings nothing is said.
+/// With fewer samples nothing is said.
 pub const FEWEST_READINGS: usize = 20;
 
 /// The outcome of the test.
@@ -17,7 +17,7 @@ pub enum WhitenessResult {
     /// Neighbours are alike: every lag up to this time, in the unit of the step, is outside the
     /// band. Residuals that oscillate cross zero after a quarter of their period.
     CorrelatedOver(f64),
-    /// Neighbours are not alike, but readings this far apart, in the unit of the step, are, more
+    /// Neighbours are not alike, but samples this far apart, in the unit of the step, are, more
     /// than at any other lag.
     CorrelatedAt(f64),
     /// Nothing can be said, for this reason.
@@ -29,9 +29,9 @@ pub enum WhitenessResult {
 pub enum UntestedReason {
     /// Fewer than [`FEWEST_READINGS`].
     FewReadings,
-    /// No more lags with a pair of readings than fitted parameters of the noise.
+    /// No more lags with a pair of samples than fitted parameters of the noise.
     FewLags,
-    /// All are zero: the model goes through every reading.
+    /// All are zero: the model goes through every sample.
     NoResiduals,
 }
 

@@ -31,9 +31,9 @@ use crate::system::Grid;
 pub struct CoefficientFunction {
     /// Which function this is.
     pub quantity: CoefficientKind,
-    /// The experiment that has it for itself; `None` if it belongs to the main device.
+    /// The experiment that has it for itself; `None` if it belongs to the shared coefficient set.
     pub owner: Option<String>,
-    /// The space that the function is sought in; `None` if it is fixed.
+    /// The space that the function is estimated in; `None` if it is fixed.
     pub basis: Option<Basis>,
     /// How parameters become values at the nodes.
     pub design: Design,

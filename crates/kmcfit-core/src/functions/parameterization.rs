@@ -9,8 +9,8 @@ use std::ops::Range;
 /// The functions to be found and the scalars beside them. Their parameters stand one after the other
 /// in one vector `theta`, functions first.
 ///
-/// The first functions make up the main device: mass, then one per force term. Further ones belong
-/// to single experiments and replace one of the main device there: each device is a list of
+/// The first functions make up the shared coefficient set: mass, then one per force term. Further ones belong
+/// to single experiments and replace one of the shared coefficient set there: each system is a list of
 /// functions ([`Parameterization::assembly`]).
 #[derive(Debug, Clone)]
 pub struct Parameterization {
@@ -31,16 +31,16 @@ pub struct Parameterization {
 
 impl Parameterization {
     /// Collects `list` (mass first) on `nodes` nodes of step `step` (s), as the functions of one
-    /// device; `None` if some basis is linearly dependent on the grid or the list is empty.
+    /// system; `None` if some basis is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
         let main = (0..list.len()).collect();
         Self::with_coefficient_sets(list, vec![main], nodes, step)
     }
 
-    /// [`Parameterization::new`] with several devices: each is a list of indices into `list`, mass first.
+    /// [`Parameterization::new`] with several systems: each is a list of indices into `list`, mass first.
     ///
     /// # Panics
-    /// If there is no device, or one names a function that is not there, or one twice.
+    /// If there is no system, or one names a function that is not there, or one twice.
     pub fn with_coefficient_sets(
         list: Vec<CoefficientFunction>,
         coefficient_sets: Vec<Vec<usize>>,
@@ -116,12 +116,12 @@ impl Parameterization {
         first..first + self.scalars.len()
     }
 
-    /// The functions that make up each device, mass first; the main device is the first.
+    /// The functions that make up each system, mass first; the shared coefficient set is the first.
     pub fn coefficient_sets(&self) -> &[Vec<usize>] {
         &self.coefficient_sets
     }
 
-    /// The functions that make up device `device`, mass first.
+    /// The functions that make up system `system`, mass first.
     pub fn coefficient_set(&self, set: usize) -> &[usize] {
         &self.coefficient_sets[set]
     }
@@ -142,7 +142,7 @@ impl Parameterization {
         &self.grams[index]
     }
 
-    /// The functions: those of the main device, mass first, then those of single experiments.
+    /// The functions: those of the shared coefficient set, mass first, then those of single experiments.
     pub fn iter(&self) -> impl Iterator<Item = &CoefficientFunction> {
         self.list.iter()
     }
@@ -226,19 +226,19 @@ impl Parameterization {
         }
     }
 
-    /// A device of the right shape, all zero.
+    /// A system of the right shape, all zero.
     pub fn empty_nodal(&self) -> NodalCoefficients {
         NodalCoefficients::zeros(self.nodes, self.coefficient_sets[0].len() - 1)
     }
 
-    /// The main device with parameters `theta`.
+    /// The shared coefficient set with parameters `theta`.
     pub fn nodal(&self, theta: &[f64]) -> NodalCoefficients {
         let mut nodal = self.empty_nodal();
         self.nodal_into(theta, 0, &mut nodal);
         nodal
     }
 
-    /// Device `which` with parameters `theta`, into storage that is used again.
+    /// System `which` with parameters `theta`, into storage that is used again.
     pub fn nodal_into(&self, theta: &[f64], which: usize, nodal: &mut NodalCoefficients) {
         for (&f, values) in self.coefficient_sets[which]
             .iter()
@@ -262,7 +262,7 @@ impl Parameterization {
         each.collect()
     }
 
-    /// `B theta` of device `which` without the fixed parts: its change along a direction.
+    /// `B theta` of system `which` without the fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
         let mut nodal = self.empty_nodal();
         for (&f, values) in self.coefficient_sets[which]
@@ -275,7 +275,7 @@ impl Parameterization {
         nodal
     }
 
-    /// Adds `B^T` applied to nodal values of device `which` to `out`: Euclidean gradient in nodal
+    /// Adds `B^T` applied to nodal values of system `which` to `out`: Euclidean gradient in nodal
     /// values to Euclidean gradient in parameters.
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
         for (&f, values) in self.coefficient_sets[which].iter().zip(nodal.functions()) {
@@ -284,7 +284,7 @@ impl Parameterization {
         }
     }
 
-    /// [`Parameterization::add_transpose`] of the main device to zero.
+    /// [`Parameterization::add_transpose`] of the shared coefficient set to zero.
     pub fn transpose(&self, nodal: &NodalCoefficients) -> Vec<f64> {
         let mut out = vec![0.0; self.parameters()];
         self.add_transpose(nodal, 0, &mut out);

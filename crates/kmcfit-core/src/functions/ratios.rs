@@ -16,10 +16,10 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// The ratios of a device whose first two coefficients are damping and stiffness.
+    /// The ratios of a system whose first two coefficients are damping and stiffness.
     ///
     /// # Panics
-    /// If the device has fewer coefficients.
+    /// If the system has fewer coefficients.
     pub fn of(nodal: &NodalCoefficients) -> Self {
         let (m, c, k) = (&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]);
         let over_mass = |f: &[f64]| -> Vec<f64> { f.iter().zip(m).map(|(f, m)| f / m).collect() };

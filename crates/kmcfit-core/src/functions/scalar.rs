@@ -56,7 +56,7 @@ impl ScalarValue {
         }
     }
 
-    /// The index of the scalar, if it is sought.
+    /// The index of the scalar, if it is estimated.
     pub fn index(self) -> Option<usize> {
         match self {
             Self::Known(_) => None,

@@ -1,6 +1,6 @@
-//! The instants at which a free motion fixes one ratio whatever the other is.
+//! The instants at which a free response fixes one ratio whatever the other is.
 //!
-//! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the motion says `k/m = (f/m - y'')/y`, where `y = 0`
+//! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the response says `k/m = (f/m - y'')/y`, where `y = 0`
 //! it says `c/m = (f/m - y'')/y'`.
 
 use crate::simulate::Trajectory;
@@ -15,10 +15,10 @@ pub struct Anchors {
     pub zero_crossings: Vec<f64>,
 }
 
-/// The anchors of a motion, by cubic Hermite interpolation of displacement and velocity: of order 4 in
+/// The anchors of a response, by cubic Hermite interpolation of displacement and velocity: of order 4 in
 /// the step for zero crossings, of order 3 for turning points.
 ///
-/// A motion at rest has none.
+/// A response at rest has none.
 pub fn anchors(grid: &Grid, response: &Trajectory) -> Anchors {
     let (y, v, h) = (&response.displacement, &response.velocity, grid.step());
     let mut anchors = Anchors::default();

@@ -35,7 +35,7 @@ use std::f64::consts::TAU;
 const MOST_PARAMETERS: usize = 800;
 /// Most of these.
 const MOST_SMOOTH: usize = 400;
-/// Most work of their decomposition, readings x directions^2.
+/// Most work of their decomposition, samples x directions^2.
 const MOST_WORK: f64 = 2e9;
 /// Most nodes at which bands are computed; beyond, at every second, third, ...
 const MOST_NODES: usize = 4000;
@@ -68,7 +68,7 @@ impl Default for BandSettings {
     }
 }
 
-/// Bands of all functions and of the ratios of the main device.
+/// Bands of all functions and of the ratios of the shared coefficient set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
     /// s.
@@ -77,7 +77,7 @@ pub struct Bands {
     pub functions: Vec<Band>,
     /// `k/m`, `c/m`, natural frequency, damping ratio; those whose terms the oscillator has.
     pub ratios: Vec<Band>,
-    /// Estimated standard deviation of the readings that have none, in their unit.
+    /// Estimated standard deviation of the samples that have none, in their unit.
     pub sigma: Option<f64>,
     /// Number of directions that nothing sees.
     pub unseen: usize,
@@ -353,7 +353,7 @@ impl Maker<'_> {
         Some(most[index.clamp(1, most.len()) - 1])
     }
 
-    /// Ratios of the main system by the delta method.
+    /// Ratios of the shared coefficient set by the delta method.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
         let assembly = self.problem.functions.coefficient_set(0);
         let terms = &self.problem.system.terms;

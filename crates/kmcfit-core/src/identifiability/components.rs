@@ -5,16 +5,16 @@ use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::system::StageSamples;
 
-/// Functions that one factor multiplies: those of devices that have a function in common.
+/// Functions that one factor multiplies: those of systems that have a function in common.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Component {
     /// Indices into the list of functions.
     pub functions: Vec<usize>,
-    /// Indices of the devices.
+    /// Indices of the systems.
     pub coefficient_sets: Vec<usize>,
 }
 
-/// The components of the devices that take part in an experiment.
+/// The components of the systems that take part in an experiment.
 pub(super) fn components(problem: &Problem) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
     for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
@@ -69,7 +69,7 @@ impl Component {
     }
 
     /// The nodes at which a force acts in one of its experiments: at the node itself or in a step
-    /// beside it. Motion of the base is no force here: it pushes with `m b''`, which scales with `m`.
+    /// beside it. Response of the base is no force here: it pushes with `m b''`, which scales with `m`.
     pub fn forced(&self, problem: &Problem) -> Vec<bool> {
         let mut forced = vec![false; problem.functions.nodes()];
         for experiment in self.experiments(problem) {

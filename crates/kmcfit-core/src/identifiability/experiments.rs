@@ -27,18 +27,18 @@ use nalgebra::{DMatrix, DVector};
 pub struct CandidateChannel {
     /// What.
     pub kind: ChannelKind,
-    /// Standard deviation of a reading, in the unit of the kind.
+    /// Standard deviation of a sample, in the unit of the kind.
     pub sigma: f64,
 }
 
-/// A record that could be made, of the main device over the whole grid.
+/// A record that could be made, of the shared coefficient set over the whole grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CandidateExperiment {
     /// Its name.
     pub name: String,
     /// Displacement and velocity at the first node.
     pub initial: State,
-    /// What drives it; `None` is free motion.
+    /// What drives it; `None` is free response.
     pub excitation: Option<Excitation>,
     /// What is measured.
     pub channels: Vec<CandidateChannel>,
@@ -105,7 +105,7 @@ impl Ranked {
 
 /// The candidates, best first: by new directions, then by the volume of the bands. Those that cannot be
 /// simulated come last. With `penalties` these count as seen when the bands are compared; new
-/// directions are always those of the readings.
+/// directions are always those of the samples.
 pub fn rank_experiments(
     problem: &Problem,
     theta: &[f64],

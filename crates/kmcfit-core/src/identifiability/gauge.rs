@@ -1,6 +1,6 @@
-//! The directions in which the motion cannot change: the common scale of the functions.
+//! The directions in which the response cannot change: the common scale of the functions.
 //!
-//! With `f = 0` the motion of `s(t) (m, c, k)` is that of `(m, c, k)`. At a point, `s = 1 + epsilon sigma(t)`
+//! With `f = 0` the response of `s(t) (m, c, k)` is that of `(m, c, k)`. At a point, `s = 1 + epsilon sigma(t)`
 //! changes the functions by `delta p_j = epsilon sigma(t) p_j`, for all `j` alike. A gauge direction is a
 //! `delta theta` that does this in every basis, with `sigma = 0` where a force acts or a function that
 //! is known is not zero, and that no equality constraint forbids.
@@ -42,7 +42,7 @@ pub struct Gauge {
     pub directions: Vec<GaugeDirection>,
 }
 
-/// A direction that the readings do not see, with the name of what it does.
+/// A direction that the samples do not see, with the name of what it does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
     /// The gauge it belongs to.
@@ -119,7 +119,7 @@ impl Gauge {
         inside.norm_squared() / z.norm_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// The directions that the readings do not see and that are mostly gauge: constant factors
+    /// The directions that the samples do not see and that are mostly gauge: constant factors
     /// first, then those over time, orthogonal to them. The rest of [`SingularSpectrum::unseen`] has other
     /// reasons.
     pub fn unseen(&self, spectrum: &SingularSpectrum) -> Vec<Named> {

@@ -1,10 +1,10 @@
-//! What the readings can show of the functions, before a fit and after it, and which experiment would
+//! What the samples can show of the functions, before a fit and after it, and which experiment would
 //! show more.
 //!
 //! * [`count`]: from the problem alone, how many directions of the parameters can be seen at most, and
 //!   which scale stays free;
 //! * [`Sensitivity`] and [`SingularSpectrum`]: how well each direction is seen at a point;
-//! * [`Gauge`]: the directions that leave the motion unchanged, and whether an unseen direction is one;
+//! * [`Gauge`]: the directions that leave the response unchanged, and whether an unseen direction is one;
 //! * [`Bands`]: how far each function and ratio may be off;
 //! * [`verdicts`]: the same in words; [`anchors`]: the instants at which a ratio is fixed;
 //! * [`rank_experiments`]: which further record adds most.
@@ -28,7 +28,7 @@ pub use classification::is_rounding;
 
 use crate::problem::Problem;
 
-/// Whether the readings alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
+/// Whether the samples alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
 pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
 }

@@ -10,7 +10,7 @@ impl Problem {
     /// The cost `J` at `theta`, and its Euclidean gradient `dJ/dtheta` by the discrete adjoint into
     /// `gradient`: what an optimiser of one's own asks for.
     ///
-    /// One record of a device with one value a node, in linear free motion by the midpoint rule and
+    /// One record of a system with one value a node, in linear free response by the midpoint rule and
     /// seen at every node, is never written down: forward and adjoint solve run in blocks of the
     /// record at once, and memory is what `theta` and `gradient` take. A record of some 100,000 nodes or more is
     /// shared with a second thread, where a processor is to spare; the bits are the same. Everything
@@ -65,8 +65,8 @@ impl Problem {
         finite.then_some(cost)
     }
 
-    /// The only record, with its channel and the weights of its readings, if it is of free motion, has a
-    /// reading at every node, and its device has the functions as they are listed, with one value a node.
+    /// The only record, with its channel and the weights of its samples, if it is of free response, has a
+    /// sample at every node, and its system has the functions as they are listed, with one value a node.
     pub(crate) fn one_full_record(&self) -> Option<(&Experiment, &Channel, [f64; 2])> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
@@ -121,7 +121,7 @@ mod tests {
         assert!(problem.fused_least_squares(&theta, &mut gradient).is_some());
     }
 
-    /// A device that takes its functions in another order than they are listed in.
+    /// A system that takes its functions in another order than they are listed in.
     #[test]
     fn functions_in_any_order() {
         let mut problem = problem();

@@ -145,7 +145,7 @@ impl Problem {
         gradient
     }
 
-    /// The derivative of the misfit of experiment `e` with respect to its motion; those at fixed states are added to
+    /// The derivative of the misfit of experiment `e` with respect to its response; those at fixed states are added to
     /// `direct` and `scalars`.
     fn source(
         &self,
@@ -163,7 +163,7 @@ impl Problem {
         source
     }
 
-    /// Adds the part of experiment `e` if all functions of its device are constants: nothing is then written to the
+    /// Adds the part of experiment `e` if all functions of its system are constants: nothing is then written to the
     /// nodes. Whether that was possible; if not, nothing is added.
     fn add_gradient_of_constants(
         &self,

@@ -29,24 +29,24 @@ use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 pub struct Evaluation {
     /// Cost `J`, the sum of the next two.
     pub cost: f64,
-    /// Part of the readings.
+    /// Part of the samples.
     pub misfit: f64,
     /// Part of the penalties.
     pub regularisation: f64,
-    /// The main device at this point.
+    /// The shared coefficient set at this point.
     pub nodal: NodalCoefficients,
-    /// The other devices of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    /// The other systems of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
     pub own_nodal: Vec<NodalCoefficients>,
     /// The scalars at this point.
     pub scalars: Vec<f64>,
-    /// The motion in each experiment.
+    /// The response in each experiment.
     pub trajectories: Vec<Trajectory>,
-    /// What the model says of the readings, for each experiment and each of its channels.
+    /// What the model says of the samples, for each experiment and each of its channels.
     pub predictions: Vec<Vec<Vec<f64>>>,
 }
 
 impl Evaluation {
-    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    /// System `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
     pub fn nodal_of(&self, which: usize) -> &NodalCoefficients {
         match which {
             0 => &self.nodal,
@@ -75,7 +75,7 @@ impl Problem {
         }
     }
 
-    /// Cost, devices and motions for the parameters `theta`.
+    /// Cost, systems and responses for the parameters `theta`.
     ///
     /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
@@ -84,7 +84,7 @@ impl Problem {
     /// ([`crate::functions::ScalarParameter::price`]).
     ///
     /// # Errors
-    /// A [`SimulationError`] if a motion does not exist (the mass is not positive, or it overflows), or the
+    /// A [`SimulationError`] if a response does not exist (the mass is not positive, or it overflows), or the
     /// cost overflows.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, SimulationError> {
         let mut evaluation = self.workspace();

@@ -9,12 +9,12 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
-    /// Whether reading `i` is the acceleration at node `i`.
+    /// Whether sample `i` is the acceleration at node `i`.
     pub(super) fn is_acceleration_on_nodes(&self) -> bool {
         self.is_on_every_node() && self.kind() == ChannelKind::Acceleration
     }
 
-    /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
+    /// Force and acceleration of the base at eight samples from sample `i` on; beyond the last one they mean
     /// nothing.
     #[inline(always)]
     fn around_eight<A: Arithmetic>(
@@ -57,7 +57,7 @@ impl Channel {
     }
 }
 
-/// Appends what the model says of the readings of `channel`.
+/// Appends what the model says of the samples of `channel`.
 pub(super) struct Predict<'a> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -94,7 +94,7 @@ impl Kernel for Predict<'_> {
     }
 }
 
-/// [`Channel::add_transpose`] of such readings, after the filter.
+/// [`Channel::add_transpose`] of such samples, after the filter.
 pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -143,7 +143,7 @@ impl Kernel for AddTranspose<'_, '_> {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
-                // Lanes without a reading have no slope.
+                // Lanes without a sample have no slope.
                 CoefficientGradient::Summed(_) => {
                     for (sums, by) in sums.iter_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, sums);

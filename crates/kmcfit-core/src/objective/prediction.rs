@@ -10,7 +10,7 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::TimePoint;
 
 impl Channel {
-    /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
+    /// What the sensor sees at sample `i`, before gain, offset and drift, and its derivatives.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
             view.system,
@@ -39,7 +39,7 @@ impl Channel {
         }
     }
 
-    /// What the model says of the readings.
+    /// What the model says of the samples.
     pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
         self.predict_into(view, &mut out);
@@ -149,7 +149,7 @@ impl Channel {
     }
 }
 
-/// The change of what is sensed when the motion and the device change.
+/// The change of what is sensed when the response and the system change.
 fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
     let (y, v) = (&along.response.displacement, &along.response.velocity);
     let by_states = sensed.states[0] * y[step]

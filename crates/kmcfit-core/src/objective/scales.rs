@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 impl Problem {
     /// For each function of the list the larger of its own largest value and of the value at which
-    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
+    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the responses of
     /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
     /// of a damping that matters.
     pub fn natural_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
@@ -145,7 +145,7 @@ fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
     sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
 
-/// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
+/// How large displacement and velocity of a response are, from samples of one `kind` that are `spacing`
 /// (s) apart: their rms, and their dominant frequency.
 pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -198,7 +198,7 @@ mod tests {
     }
 
     /// One period of `y = size cos(w t)` with m = 1 and k = w^2, a cubic stiffness of next to nothing, and
-    /// another such motion of three times the size, read or not.
+    /// another such response of three times the size, read or not.
     fn swinging(size: f64, other_is_read: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let record = |name: &str, size: f64| {
@@ -233,7 +233,7 @@ mod tests {
     #[test]
     fn the_natural_size_makes_a_force_as_large_as_that_of_the_mass() {
         let omega = TAU / 10.0;
-        // One motion of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
+        // One response of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
         // sixth powers.
         for (read, six_over_two) in [(false, 1.0), (true, 73.0)] {
             let found = sizes(&swinging(0.5, read));
@@ -246,7 +246,7 @@ mod tests {
         }
     }
 
-    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
+    /// A response of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
     /// then the size of its own values, and not an infinite one.
     #[test]
     fn a_term_that_sees_nothing_has_its_own_size() {

@@ -8,11 +8,11 @@ use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
     pub system: &'a System,
-    /// The device that moves.
+    /// The system that moves.
     pub nodal: &'a NodalCoefficients,
     /// What drives it.
     pub excitation: Option<&'a Excitation>,
-    /// Its motion.
+    /// Its response.
     pub response: &'a Trajectory,
     /// Values of all scalars.
     pub scalars: &'a [f64],
@@ -21,9 +21,9 @@ pub struct SimulatedRecord<'a> {
 /// How a view changes along a direction.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordTangent<'a> {
-    /// Change of the device.
+    /// Change of the system.
     pub nodal: &'a NodalCoefficients,
-    /// Change of the motion.
+    /// Change of the response.
     pub response: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
@@ -36,7 +36,7 @@ impl SimulatedRecord<'_> {
         Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
+    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its response.
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
             system,

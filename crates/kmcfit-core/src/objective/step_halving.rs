@@ -18,11 +18,11 @@ pub struct Refined {
 }
 
 impl Problem {
-    /// The same devices and scalars on a grid of half the step: functions stay linear between the
-    /// old nodes, forces are sampled anew. `None` where readings do not lie on the finer grid.
+    /// The same systems and scalars on a grid of half the step: functions stay linear between the
+    /// old nodes, forces are sampled anew. `None` where samples do not lie on the finer grid.
     ///
     /// # Errors
-    /// A [`SimulationError`] if there is no motion on the finer grid.
+    /// A [`SimulationError`] if there is no response on the finer grid.
     pub fn on_half_step(
         &self,
         evaluation: &Evaluation,

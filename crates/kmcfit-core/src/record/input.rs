@@ -22,7 +22,7 @@ pub enum BaseMotion {
     Displacement(Signal),
 }
 
-/// What drives a motion, at any time: from it the excitation on any grid is made.
+/// What drives a response, at any time: from it the excitation on any grid is made.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Input {
     /// The force.
@@ -32,7 +32,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
+    /// The excitation at the stages of the steps of a response over the first `nodes` nodes of `grid`.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
         let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
             let step = |i: usize| {

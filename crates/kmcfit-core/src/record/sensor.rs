@@ -2,12 +2,12 @@
 
 use crate::functions::ScalarValue;
 
-/// Reading `= gain * motion + offset + drift * time`.
+/// Sample `= gain * response + offset + drift * time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
     /// Factor, without unit.
     pub gain: ScalarValue,
-    /// Reading at rest, in the unit of the channel.
+    /// Sample at rest, in the unit of the channel.
     pub offset: ScalarValue,
     /// Change of the offset, in the unit of the channel per s.
     pub drift: ScalarValue,
@@ -40,7 +40,7 @@ impl Sensor {
             .map(|index| index.map_or(0.0, |i| scalars[i]))
     }
 
-    /// Which scalars they are, where they are sought.
+    /// Which scalars they are, where they are estimated.
     pub fn indices(self) -> [Option<usize>; 3] {
         self.list().map(ScalarValue::index)
     }

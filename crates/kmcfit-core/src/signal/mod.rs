@@ -1,4 +1,4 @@
-//! Signals over time, without knowledge of the device: values between samples, shapes of
+//! Signals over time, without knowledge of the system: values between samples, shapes of
 //! excitation, filters, spectra.
 //!
 //! ```

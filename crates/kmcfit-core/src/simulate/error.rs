@@ -5,14 +5,14 @@ use crate::simd::sum::are_positive;
 use crate::system::{Grid, NodalCoefficients};
 use thiserror::Error;
 
-/// Why a motion could not be computed.
+/// Why a response could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
     /// The mass is zero, negative or not a number: the equation of motion has no meaning there.
     Mass,
-    /// The motion left the range of floating-point numbers.
+    /// The response left the range of floating-point numbers.
     Overflow,
-    /// The motion exists, but the square of a residual leaves the range of floating-point numbers.
+    /// The response exists, but the square of a residual leaves the range of floating-point numbers.
     CostOverflow,
 }
 

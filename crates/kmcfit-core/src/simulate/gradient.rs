@@ -2,7 +2,7 @@
 
 use crate::system::NodalCoefficients;
 
-/// Where derivatives with respect to the functions of a device are added.
+/// Where derivatives with respect to the functions of a system are added.
 #[derive(Debug)]
 pub enum CoefficientGradient<'a> {
     /// To those with respect to the values at the nodes.

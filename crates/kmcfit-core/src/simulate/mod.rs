@@ -33,7 +33,7 @@ impl System {
     /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
     ///
     /// # Panics
-    /// If `device` or `excitation` does not fit the grid and the terms.
+    /// If `system` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
         nodal: &NodalCoefficients,

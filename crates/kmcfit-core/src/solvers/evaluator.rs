@@ -78,7 +78,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         (point.fingerprint() == fingerprint).then_some(point)
     }
 
-    /// The motions at a point that was there before, computed again without counting.
+    /// The responses at a point that was there before, computed again without counting.
     pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();

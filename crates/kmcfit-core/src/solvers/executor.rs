@@ -69,7 +69,7 @@ pub(super) fn search_prepared(
             watch.observe(),
         ));
     }
-    // A part of a record has not a reading at every node of the grid.
+    // A part of a record has not a sample at every node of the grid.
     let mut settings = settings.clone();
     if !problem.supports_continuous() {
         settings.gradient = GradientKind::Discrete;
@@ -108,7 +108,7 @@ pub(super) fn search_prepared(
 /// near an optimum, or whose start is the question.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself has no motion.
+/// A [`SimulationError`] if the start itself has no response.
 pub fn fit_from(
     problem: &Problem,
     start: &[f64],
@@ -332,7 +332,7 @@ impl SearchDriver<'_, '_> {
             if problem.is_some_and(|p| p.channels().any(infinite)) {
                 return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
-            // Squares of readings below 1e-154 are zero.
+            // Squares of samples below 1e-154 are zero.
             return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
                 true => converged(Reason::ZeroReadings),
                 false => converged(Reason::ExactStart),

@@ -69,9 +69,9 @@ impl Fit {
 pub struct Attempt {
     /// Where it started.
     pub start: StartStrategy,
-    /// J at its start; NaN if the start had no motion.
+    /// J at its start; NaN if the start had no response.
     pub initial_cost: f64,
-    /// J at its end; NaN if the start had no motion.
+    /// J at its end; NaN if the start had no response.
     pub cost: f64,
     /// Iterations it took.
     pub iterations: u64,

@@ -59,7 +59,7 @@ impl Problem {
     /// Fits from the problem's start with the usual settings.
     ///
     /// # Errors
-    /// A [`SimulationError`] if the start itself has no motion.
+    /// A [`SimulationError`] if the start itself has no response.
     pub fn fit(&self) -> Result<Fit, SimulationError> {
         self.fit_with(&FitSettings::default())
     }

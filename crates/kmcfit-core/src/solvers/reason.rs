@@ -54,13 +54,13 @@ pub enum Reason {
     /// All functions are fixed.
     #[error("there is nothing to fit: every function is fixed")]
     NoParameters,
-    /// The readings, or their squares, are zero.
+    /// The samples, or their squares, are zero.
     #[error("there is nothing to explain: the samples, or their squares, are zero")]
     ZeroReadings,
     /// The cost at the start is zero.
     #[error("the start fits exactly")]
     ExactStart,
-    /// The squares of the readings overflow.
+    /// The squares of the samples overflow.
     #[error("the squares of the samples leave the range of numbers: give them in a larger unit")]
     Overflow,
     /// The cost is zero to machine precision.
@@ -172,7 +172,7 @@ pub enum MissingMeasurement {
         "its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations"
     )]
     FilteredDrive,
-    /// Readings.
+    /// Samples.
     #[error("there are too few samples")]
     Readings,
     /// Anything that moves.

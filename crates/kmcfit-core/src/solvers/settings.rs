@@ -42,7 +42,7 @@ impl Solver {
 pub enum Initial {
     /// From the start values of the functions.
     Functions,
-    /// From the equation error of the readings.
+    /// From the equation error of the samples.
     Data,
 }
 

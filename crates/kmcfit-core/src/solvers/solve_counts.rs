@@ -4,7 +4,7 @@ use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// How often the equations were solved; one count is one pass over all experiments, or over the part of them that a
-/// start is sought in.
+/// start is estimated in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SolveCounts {
     /// Forward solves.

@@ -5,7 +5,7 @@ use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project};
 
-/// Smallest mass that counts as positive, as a share of the start's largest: a lighter device swings
+/// Smallest mass that counts as positive, as a share of the start's largest: a lighter system swings
 /// a thousand times in the time of one swing of the start, which no grid that suits the start resolves.
 const POSITIVE: f64 = 1e-6;
 

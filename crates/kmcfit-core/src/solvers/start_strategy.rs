@@ -28,7 +28,7 @@ use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A fit explains the readings of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// A fit explains the samples of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another attempt.
 const EXPLAINED: f64 = 1e-3;
 /// Most iterations of an attempt before the next is tried: Gauss-Newton from a good start takes some ten.
@@ -336,7 +336,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     winner.with_work_of(other.counts, other.timings, other.elapsed)
 }
 
-/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
+/// Each channel for itself: beside the velocity of a stiff system its displacement weighs nothing.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
     let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
@@ -352,7 +352,7 @@ fn explains(problem: &Problem, fit: &Fit) -> bool {
 
 impl Problem {
     /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
-    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
+    /// `n + 2 sqrt(2 n)`; `None` unless all samples have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.channels().all(|c| c.weighting().is_sigma());
         known.then(|| largest_chi_square(self.sample_count()))
@@ -360,7 +360,7 @@ impl Problem {
 }
 
 impl Channel {
-    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
+    /// [`Problem::largest_chi_square`] of its own samples; `None` unless they have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.weighting().is_sigma();
         known.then(|| largest_chi_square(self.len()))

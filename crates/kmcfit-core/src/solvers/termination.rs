@@ -22,7 +22,7 @@ pub enum Status {
     Stalled,
     /// Ended from outside.
     Interrupted,
-    /// No device satisfies the constraints and the motion.
+    /// No system satisfies the constraints and the response.
     Infeasible,
     /// The start cannot be evaluated.
     Failed,

@@ -10,11 +10,11 @@ use crate::record::Experiment;
 use crate::simulate::SimulationError;
 
 /// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
-/// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own readings.
+/// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own samples.
 /// Returns the problem of that experiment alone and the point found.
 ///
 /// # Errors
-/// A [`SimulationError`] if there is no motion.
+/// A [`SimulationError`] if there is no response.
 pub fn predict_validation(
     problem: &Problem,
     evaluation: &Evaluation,

@@ -49,7 +49,7 @@ pub struct PathPoint {
     pub weight: f64,
     /// Iterations of the fit, all its starts together.
     pub iterations: u64,
-    /// Misfit of the readings; chi-square where they have a sigma.
+    /// Misfit of the samples; chi-square where they have a sigma.
     pub misfit: f64,
     /// `sum |L theta - target|^2` of the penalties on the path, without the weight.
     pub roughness: f64,
@@ -83,7 +83,7 @@ impl WeightPath {
     }
 }
 
-/// Largest weight of the path, relative to the misfit of no motion over a roughness of one.
+/// Largest weight of the path, relative to the misfit of no response over a roughness of one.
 const LARGEST: f64 = 1e4;
 /// Decades that the path spans, and points per decade.
 const DECADES: f64 = 8.0;
@@ -109,7 +109,7 @@ impl Problem {
 /// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
-/// A [`SimulationError`] if the fit at the middle weight, the first, has no motion at its start.
+/// A [`SimulationError`] if the fit at the middle weight, the first, has no response at its start.
 pub fn choose_weight(
     problem: &Problem,
     start: &[f64],
@@ -303,7 +303,7 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
         .sum()
 }
 
-/// Trace of the matrix that takes the readings to their fitted values, by random signs.
+/// Trace of the matrix that takes the samples to their fitted values, by random signs.
 fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
     let Iterate {
         parameters,

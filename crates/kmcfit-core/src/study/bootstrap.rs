@@ -1,7 +1,7 @@
-//! Intervals from fits to simulated readings.
+//! Intervals from fits to simulated samples.
 //!
-//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to readings
-//! made from the optimum's predictions plus noise: normal with the readings' sigma (parametric), or
+//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to samples
+//! made from the optimum's predictions plus noise: normal with the samples' sigma (parametric), or
 //! the residuals themselves drawn with replacement within each channel, after their mean is taken off
 //! and they are widened by `sqrt(n / (n - p))` (residual). What is not in the predictions, a prior or
 //! a penalty, stays as it is.
@@ -24,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 /// Where the noise of a replicate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplicateNoise {
-    /// Normal, with the sigma of the readings or that of the residuals.
+    /// Normal, with the sigma of the samples or that of the residuals.
     Parametric,
     /// The residuals, drawn again.
     Residual,
@@ -33,7 +33,7 @@ pub enum ReplicateNoise {
 /// Why there are no refits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoRefits {
-    /// The readings do not determine all parameters, or these are too many: refits from the optimum would not move along
+    /// The samples do not determine all parameters, or these are too many: refits from the optimum would not move along
     /// the others.
     Undetermined,
     /// The optimum has no response.
@@ -95,7 +95,7 @@ pub struct Bootstrap {
 /// `count` refits about `optimum`, on up to `threads` threads; the same bits for any number of them.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no response.
 pub fn bootstrap(
     problem: &Problem,
     optimum: &[f64],
@@ -131,7 +131,7 @@ pub fn bootstrap(
     })
 }
 
-/// Residuals of every channel, centred, widened and drawn again. Readings with sigmas of their own
+/// Residuals of every channel, centred, widened and drawn again. Samples with sigmas of their own
 /// keep them: what is drawn is the residual in units of sigma.
 fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
     let samples = problem.sample_count() as f64;

@@ -1,6 +1,6 @@
-//! Other devices with the very same motion.
+//! Other systems with the very same response.
 //!
-//! Along a known motion `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
+//! Along a known response `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
 //!
 //! ```text
 //! k = (f - m a - c v) / y
@@ -17,7 +17,7 @@
 //! as one quadratic program with both functions as unknowns: at the crossings the equation itself
 //! holds the anchor, and nothing is divided by a small `y`. `C` and `K` are the sizes at which damping
 //! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
-//! a stepper of order two reproduces the motion to the square of its step.
+//! a stepper of order two reproduces the response to the square of its step.
 
 use super::refit::positive_rms;
 use crate::objective::Evaluation;
@@ -30,7 +30,7 @@ use crate::system::{Grid, NodalCoefficients};
 /// record, so that the options comes first between the anchors.
 const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
 
-/// A motion at the nodes of a grid, and the force that drives it.
+/// A response at the nodes of a grid, and the force that drives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetResponse {
     /// The nodes.
@@ -46,7 +46,7 @@ pub struct TargetResponse {
 }
 
 impl TargetResponse {
-    /// The motion of experiment `e` of a fit, its acceleration from the equation itself.
+    /// The response of experiment `e` of a fit, its acceleration from the equation itself.
     pub fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Self {
         let experiment = &problem.experiments[e];
         let nodal = evaluation.nodal_of(experiment.coefficient_set);
@@ -75,7 +75,7 @@ impl TargetResponse {
     }
 }
 
-/// Which of the devices with the motion is wanted.
+/// Which of the systems with the response is wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EquivalentOptions {
     /// The damping to be near to, N s/m at the nodes.
@@ -100,12 +100,12 @@ impl EquivalentOptions {
     }
 }
 
-/// The device with mass `mass` (kg at the nodes), damping near the options, and the stiffness that gives
-/// it the motion; `Err` says how the program ended where there is none, as where a crossing asks for
+/// The system with mass `mass` (kg at the nodes), damping near the options, and the stiffness that gives
+/// it the response; `Err` says how the program ended where there is none, as where a crossing asks for
 /// less damping than the options allows.
 ///
 /// # Panics
-/// If mass, motion and options do not have one value per node.
+/// If mass, response and options do not have one value per node.
 pub fn equivalent_coefficients(
     mass: &[f64],
     response: &TargetResponse,
@@ -194,7 +194,7 @@ pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
     (0..y.len() - 1).filter_map(crossing).collect()
 }
 
-/// How far the equation is from holding along the motion for `device`, N at the nodes.
+/// How far the equation is from holding along the response for `system`, N at the nodes.
 pub fn imbalance(nodal: &NodalCoefficients, response: &TargetResponse) -> Vec<f64> {
     let at = |i: usize| {
         nodal.mass[i] * response.acceleration[i]

@@ -5,7 +5,7 @@ use crate::system::quadrature::trapezoid;
 use crate::system::{NodalCoefficients, State, System};
 use serde::{Deserialize, Serialize};
 
-/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
+/// The response of the found system from one initial state, against the true system's. Of a rotation rad stands for m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PredictionSummary {
     /// Initial displacement, m.
@@ -18,33 +18,33 @@ pub struct PredictionSummary {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
-    /// Largest distance of the motion from zero, m; `None` where there is no motion.
+    /// Largest distance of the response from zero, m; `None` where there is no response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest: Option<f64>,
-    /// Displacement at the last node, m; `None` where there is no motion.
+    /// Displacement at the last node, m; `None` where there is no response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last: Option<f64>,
-    /// Why there is no motion from there, if there is none.
+    /// Why there is no response from there, if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// A prediction and the motions that it sums up.
+/// A prediction and the responses that it sums up.
 #[derive(Debug, Clone)]
 pub struct PredictedResponse {
     /// In numbers.
     pub summary: PredictionSummary,
-    /// The found device's motion.
+    /// The found system's response.
     pub response: Trajectory,
-    /// The true device's motion, where the truth is known.
+    /// The true system's response, where the truth is known.
     pub truth: Option<Trajectory>,
 }
 
-/// The free motion of `device` from each of `states`; `truth` is the true device, where known. The
+/// The free response of `system` from each of `states`; `truth` is the true system, where known. The
 /// cost is `integral (y - y_true)^2 dt`, the energy `integral y_true^2 dt`, by the trapezoid rule.
 ///
 /// # Errors
-/// A [`SimulationError`] if a motion does not exist.
+/// A [`SimulationError`] if a response does not exist.
 pub fn predict(
     system: &System,
     nodal: &NodalCoefficients,

@@ -1,8 +1,8 @@
 //! Prediction of an unseen run, with its uncertainty.
 //!
-//! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
+//! The band is that of the linearised response, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
 //! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
-//! envelope of the motions of given extreme devices ([`super::extremes`]): the readings rule
+//! envelope of the responses of given extreme systems ([`super::extremes`]): the samples rule
 //! none of them out, however unlikely the linearisation calls them.
 
 use super::extremes::Extreme;
@@ -22,14 +22,14 @@ pub struct PredictionCase {
     pub name: String,
     /// State at the first node.
     pub initial: State,
-    /// What drives it, on the problem's grid; `None` for free motion.
+    /// What drives it, on the problem's grid; `None` for free response.
     pub excitation: Option<Excitation>,
-    /// Which device of the problem moves.
+    /// Which system of the problem moves.
     pub nodal: usize,
 }
 
 impl PredictionCase {
-    /// Free motion of the main device.
+    /// Free response of the shared coefficient set.
     pub fn free(name: impl Into<String>, initial: State) -> Self {
         Self {
             name: name.into(),
@@ -47,16 +47,16 @@ pub struct Prediction {
     pub name: String,
     /// Times of the nodes, s.
     pub times: Vec<f64>,
-    /// The optimum's motion.
+    /// The optimum's response.
     pub response: Trajectory,
     /// 95 % band of the displacement at each node, m; `None` without a covariance.
     pub band: Option<Vec<[f64; 2]>>,
-    /// Envelope of the displacements of the optimum and the extreme devices, m; `None` without
-    /// extreme devices that have a motion.
+    /// Envelope of the displacements of the optimum and the extreme systems, m; `None` without
+    /// extreme systems that have a response.
     pub worst: Option<Vec<[f64; 2]>>,
-    /// The extreme device that is furthest from the optimum, and the largest distance, m.
+    /// The extreme system that is furthest from the optimum, and the largest distance, m.
     pub furthest: Option<(String, f64)>,
-    /// Extreme devices without a motion in this run.
+    /// Extreme systems without a response in this run.
     pub no_response: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ pub struct Prediction {
 /// `extremes`.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion in the run.
+/// A [`SimulationError`] if the optimum has no response in the run.
 ///
 /// # Panics
 /// If the covariance is not one of the parameters.

@@ -25,7 +25,7 @@ pub struct NodalCoefficients {
 }
 
 impl NodalCoefficients {
-    /// A device with all values zero: `nodes` nodes, `terms` terms.
+    /// A system with all values zero: `nodes` nodes, `terms` terms.
     pub fn zeros(nodes: usize, terms: usize) -> Self {
         Self {
             mass: vec![0.0; nodes],
@@ -54,7 +54,7 @@ impl NodalCoefficients {
     }
 }
 
-/// A direction in which device and initial state change.
+/// A direction in which system and initial state change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemTangent {
     /// Change of every function at the nodes.

@@ -1,6 +1,6 @@
 //! Explicit Runge–Kutta tableaux whose stages sit on nodes or half-way between them.
 
-/// Which explicit Runge–Kutta method steps the motion.
+/// Which explicit Runge–Kutta method steps the response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Explicit midpoint rule, order 2: the paper's.

@@ -31,7 +31,7 @@ pub fn system(nodes: usize, method: Method) -> System {
     }
 }
 
-/// The device that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
+/// The system that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
 pub fn paper_system(nodes: usize) -> NodalCoefficients {
     let mass = (0..nodes)
         .map(|i| 1.0 - 0.5 * (i + 1) as f64 / nodes as f64)
@@ -106,7 +106,7 @@ pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// Simulated displacement of `device` with Gaussian noise.
+/// Simulated displacement of `system` with Gaussian noise.
 pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -120,7 +120,7 @@ pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) 
         .collect()
 }
 
-/// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
+/// A problem over `DURATION` from `INITIAL` with the given functions and samples at all nodes.
 pub fn problem_of(
     system: System,
     list: Vec<CoefficientFunction>,

@@ -35,7 +35,7 @@ impl Response {
     }
 }
 
-/// A device, what drives it, and where it starts.
+/// A system, what drives it, and where it starts.
 pub struct Record<D> {
     pub method: Method,
     pub dt: f64,

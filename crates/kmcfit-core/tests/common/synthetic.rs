@@ -1,4 +1,4 @@
-//! Records of known devices by the independent evaluation of [`super::sensed`], and how they are
+//! Records of known systems by the independent evaluation of [`super::sensed`], and how they are
 //! fitted.
 
 use super::sensed::{Record, Response};
@@ -23,7 +23,7 @@ pub struct Truth<'a> {
 }
 
 impl Truth<'_> {
-    /// Readings of a perfect sensor at `times`; force and base there are `around`, or else linear
+    /// Samples of a perfect sensor at `times`; force and base there are `around`, or else linear
     /// over each step.
     pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[InputSample]) -> Vec<f64> {
         let record = self.record();
@@ -120,7 +120,7 @@ pub fn rms(values: &[f64]) -> f64 {
 }
 
 /// Covariance of the parameters by Cramer and Rao, `(J' W J)^-1` with the Jacobian of all predictions
-/// at `theta` and the weights of the readings.
+/// at `theta` and the weights of the samples.
 pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let jacobian = weighted_jacobian(problem, theta);
     let information = jacobian.transpose() * &jacobian;
@@ -134,7 +134,7 @@ pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     &scale * inverse * &scale
 }
 
-/// `dz / dtheta` of all predictions, each row by the root of its reading's weight.
+/// `dz / dtheta` of all predictions, each row by the root of its sample's weight.
 pub fn weighted_jacobian(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let here = problem.evaluate(theta).unwrap();
     let roots: Vec<f64> = (problem.channels())

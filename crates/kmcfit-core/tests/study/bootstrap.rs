@@ -37,7 +37,7 @@ fn the_refits_spread_as_the_covariance_says() {
         }
     };
     check(&problem, ReplicateNoise::Parametric);
-    // The residuals of 51 readings know their own spread to a tenth: the covariance from them.
+    // The residuals of 51 samples know their own spread to a tenth: the covariance from them.
     let problem = problem
         .with(|parts| {
             for experiment in &mut parts.experiments {

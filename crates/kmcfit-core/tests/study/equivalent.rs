@@ -34,7 +34,7 @@ fn force(grid: &Grid) -> Excitation {
     Excitation::force_at_nodes(&values)
 }
 
-/// The true motion at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
+/// The true response at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
 fn response(nodes: usize) -> TargetResponse {
     let fine = system(32 * (nodes - 1) + 1, Method::Rk4);
     let nodal = truth(&fine.grid);
@@ -78,7 +78,7 @@ fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
     grid.times().iter().map(|t| at(*t)).collect()
 }
 
-/// Largest error of the equivalent device's motion by the midpoint rule.
+/// Largest error of the equivalent system's response by the midpoint rule.
 fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, TargetResponse) {
     let response = response(nodes);
     let mass = random_mass(seed, &response.grid);
@@ -120,7 +120,7 @@ fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
             let found = nodal.coefficients[0][i];
             assert!((found - c).abs() < 0.05, "at {t}: {found} {c}");
         }
-        // It is another device.
+        // It is another system.
         let truth = truth(&response.grid);
         assert!(crate::common::errors(&nodal, &truth)[0] > 0.1);
     }

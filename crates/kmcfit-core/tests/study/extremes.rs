@@ -78,7 +78,7 @@ fn the_extremes_are_the_ends_of_the_profile() {
     }
 }
 
-/// A robust loss, with readings that are far off: still the same question.
+/// A robust loss, with samples that are far off: still the same question.
 #[test]
 fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
@@ -101,7 +101,7 @@ fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let found = [bands[0].low.value, bands[0].high.value];
     println!("{found:?} {low} {high}");
-    // Few readings change sides of the threshold near the level, so reweighting loses little: 1e-7.
+    // Few samples change sides of the threshold near the level, so reweighting loses little: 1e-7.
     let tolerance = 1e-5 * (high - low);
     assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
 }
@@ -126,7 +126,7 @@ fn positive() -> Problem {
 }
 
 /// 200 nodes, the misfit of the paper's own optimum, 0.0114 m^2 s: the tubes, started at the true
-/// device alone, hold the paper's optimum too.
+/// system alone, hold the paper's optimum too.
 #[test]
 fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
@@ -187,7 +187,7 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     }
 }
 
-/// k/m, which free motion shows, has a bounded tube where k and m have none.
+/// k/m, which free response shows, has a bounded tube where k and m have none.
 #[test]
 fn ratios_have_tubes_of_their_own() {
     let problem = regular(3);

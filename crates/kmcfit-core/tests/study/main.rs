@@ -1,4 +1,4 @@
-//! What the readings say beyond one fit.
+//! What the samples say beyond one fit.
 
 #[path = "../common/mod.rs"]
 mod common;

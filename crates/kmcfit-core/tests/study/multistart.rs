@@ -5,8 +5,8 @@ use kmcfit_core::internals::study::multistart::{
     Distance, Multistart, Ranges, between, multistart,
 };
 
-/// One reading per second of an undamped motion from rest, `cos(w n)`: the frequencies
-/// `2 pi j +- w` give the same readings. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
+/// One sample per second of an undamped response from rest, `cos(w n)`: the frequencies
+/// `2 pi j +- w` give the same samples. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
 pub fn aliased(noise: f64) -> Problem {
     let system = system(6.0, 601);
     assert_eq!(REST.velocity, 0.0);
@@ -110,7 +110,7 @@ fn the_threads_change_no_bit() {
     assert_eq!(bits(&one), bits(&two));
 }
 
-/// Starts with a negative mass have no motion: they are records, and the others are fitted.
+/// Starts with a negative mass have no response: they are records, and the others are fitted.
 #[test]
 fn starts_without_a_motion_are_kept_with_their_reason() {
     let system = system(6.0, 301);
@@ -128,7 +128,7 @@ fn starts_without_a_motion_are_kept_with_their_reason() {
     assert!(failed.reason.contains("mass"), "{}", failed.reason);
 }
 
-/// Free motion: two devices of which one is twice the other fit alike, and the gauge joins them.
+/// Free response: two systems of which one is twice the other fit alike, and the gauge joins them.
 #[test]
 fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
     let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);

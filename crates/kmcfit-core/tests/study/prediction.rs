@@ -9,9 +9,9 @@ use kmcfit_core::internals::study::profile::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 
-/// The band is as wide as the spread of the motions of refitted devices; the worst case over the
-/// extreme devices, which are at the ends of the same ellipse, is a little narrower than the band
-/// where the motion depends on both numbers, and never wider.
+/// The band is as wide as the spread of the responses of refitted systems; the worst case over the
+/// extreme systems, which are at the ends of the same ellipse, is a little narrower than the band
+/// where the response depends on both numbers, and never wider.
 #[test]
 fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     let problem = regular(3);
@@ -103,7 +103,7 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     assert!(name.contains("parameter") && distance > 0.0);
 }
 
-/// On the paper's data the extreme devices at its misfit move alike from nearly the same state, and
+/// On the paper's data the extreme systems at its misfit move alike from nearly the same state, and
 /// apart from another one.
 #[test]
 fn devices_that_fit_alike_predict_apart() {
@@ -125,7 +125,7 @@ fn devices_that_fit_alike_predict_apart() {
         programs: 15,
         ..MisfitLimit::of(0.0114)
     };
-    // What free motion shows: c/m and k/m, pushed apart.
+    // What free response shows: c/m and k/m, pushed apart.
     let targets: Vec<Target> = [1, 2]
         .iter()
         .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))

@@ -33,7 +33,7 @@ pub fn nodal(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
     }
 }
 
-/// Constants: sought from the value where it is `Some`, else known to be the number beside it.
+/// Constants: estimated from the value where it is `Some`, else known to be the number beside it.
 pub fn constants(
     nodes: usize,
     starts: [Option<f64>; 3],
@@ -52,7 +52,7 @@ pub fn constants(
     .collect()
 }
 
-/// Readings of `truth` at every `stride`-th node with noise of the seed.
+/// Samples of `truth` at every `stride`-th node with noise of the seed.
 pub fn samples(
     system: &System,
     truth: &NodalCoefficients,
@@ -71,7 +71,7 @@ pub fn samples(
     crate::common::synthetic::with_noise(&every, sigma, seed)
 }
 
-/// Readings from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
+/// Samples from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
 pub fn problem(
     system: System,
     list: Vec<CoefficientFunction>,
@@ -121,7 +121,7 @@ pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> ScalarParameter {
     }
 }
 
-/// Initial displacement and velocity and the offset of the sensor are sought, the device is known:
+/// Initial displacement and velocity and the offset of the sensor are estimated, the system is known:
 /// the predictions are linear in all three.
 pub fn linear(seed: u64) -> Problem {
     let system = system(10.0, 201);

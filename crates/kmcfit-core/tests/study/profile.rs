@@ -119,7 +119,7 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
     }
 }
 
-/// Free motion shows k/m and c/m: of m, c and k together no number is seen.
+/// Free response shows k/m and c/m: of m, c and k together no number is seen.
 #[test]
 fn the_mass_of_a_free_motion_is_flat() {
     let system = system(10.0, 101);
@@ -142,7 +142,7 @@ fn the_mass_of_a_free_motion_is_flat() {
     assert!(found.sentence().contains("not seen"));
 }
 
-/// The noise of the readings leaves room for no damping at all: below it ends at its own bound.
+/// The noise of the samples leaves room for no damping at all: below it ends at its own bound.
 #[test]
 fn a_damping_near_its_bound_is_one_sided() {
     let system = system(10.0, 101);
@@ -158,8 +158,8 @@ fn a_damping_near_its_bound_is_one_sided() {
     assert!(found.sentence().contains("at most"));
 }
 
-/// The same free motion, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
-/// worse, though the readings do not see the mass.
+/// The same free response, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
+/// worse, though the samples do not see the mass.
 #[test]
 fn a_rise_that_another_bound_makes_is_called_so() {
     let system = system(10.0, 101);

@@ -10,7 +10,7 @@ use crate::functions::Basis;
 const DEPENDENT: f64 = 1e-10;
 /// A row that follows from others must have the right-hand side that follows, relative to its size.
 const CONSISTENT: f64 = 1e-8;
-/// Up to so many parameters dependent rows are sought out; one value per node has none.
+/// Up to so many parameters dependent rows are estimated out; one value per node has none.
 const MOST_PARAMETERS: usize = 400;
 
 pub(super) fn build(

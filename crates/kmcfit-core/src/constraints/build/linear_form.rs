@@ -82,7 +82,7 @@ pub(super) fn group(
             span,
         } = row;
         if limits[0] > limits[1] {
-            // Two readings of one equality differ by rounding, or they contradict each other.
+            // Two samples of one equality differ by rounding, or they contradict each other.
             if limits[0] - limits[1] > TOLERANCE * finite(limits) {
                 return Err(broken(span[0]));
             }

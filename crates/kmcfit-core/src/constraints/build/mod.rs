@@ -4,7 +4,7 @@
 //! ends of all pieces and so holds **at all times**: `nodal`, `constant`, `piecewise-constant` and
 //! `piecewise-linear` functions, lines, parabolas' slopes, and the curvature of cubic splines. Values
 //! and slopes of other polynomials and of splines are held at every node, where the equation of
-//! motion looks at them; **between nodes nothing is promised** about those.
+//! response looks at them; **between nodes nothing is promised** about those.
 //!
 //! A row that is about a single parameter (a value at a knot) stays one, so that clipping is exact.
 
@@ -135,7 +135,7 @@ pub enum Constraint {
     /// The stored energy never grows: `c - m'/2 >= 0` and `k' <= 0`. In every cell `c` at both ends
     /// is at least half the slope of `m` there; a `piecewise-constant` mass must not jump up.
     Passive,
-    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the device at rest
+    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the system at rest
     /// stays in a band, in Hz.
     Frequency {
         /// Lowest frequency, Hz.
@@ -158,7 +158,7 @@ pub enum Constraint {
 /// Why a statement cannot become rows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ConstraintError {
-    /// The device has no such function.
+    /// The system has no such function.
     Absent(CoefficientKind),
     /// All functions that it is about are fixed.
     Fixed(Vec<CoefficientKind>),
@@ -206,7 +206,7 @@ impl Constraint {
         self.build_for(grid, functions, 0)
     }
 
-    /// [`Constraint::build`] about the functions of device `device` of
+    /// [`Constraint::build`] about the functions of system `system` of
     /// [`Parameterization::assemblies`].
     ///
     /// # Errors

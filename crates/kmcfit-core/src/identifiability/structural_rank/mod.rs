@@ -1,16 +1,16 @@
-//! What records can show at most, from the problem alone: no motion is computed.
+//! What records can show at most, from the problem alone: no response is computed.
 //!
-//! **Rows.** A reading gives one equation. Where every term is linear in the motion (damping and
-//! stiffness), the motion is linear in `(y(0), v(0), f, b'')`: of the readings of one kind at one time only as
+//! **Rows.** A sample gives one equation. Where every term is linear in the response (damping and
+//! stiffness), the response is linear in `(y(0), v(0), f, b'')`: of the samples of one kind at one time only as
 //! many are independent as the records' inputs up to that time. So a third free record adds nothing, and
 //! neither does a forced one before its force sets in.
 //!
-//! **Silent nodes.** With one value per node and one reading per step, a step of the midpoint rule
+//! **Silent nodes.** With one value per node and one sample per step, a step of the midpoint rule
 //! without a force, and without one half a step before, moves states of two dimensions: it adds at most
 //! two equations.
 //!
-//! **Columns.** A parameter that acts after the last reading is not seen, and neither is the common
-//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the motion unchanged where no force acts. For functions
+//! **Columns.** A parameter that acts after the last sample is not seen, and neither is the common
+//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the response unchanged where no force acts. For functions
 //! that are closed under multiplication by `s(t)` that is one direction per node (or cell) without a
 //! force and without a known function that is not zero, for others the constant factor, if there
 //! is neither anywhere.
@@ -46,11 +46,11 @@ pub enum Symmetry {
 /// What can be seen at most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructuralRank {
-    /// Upper bound of the number of directions that the readings see.
+    /// Upper bound of the number of directions that the samples see.
     pub seen_at_most: usize,
     /// Number of parameters.
     pub of: usize,
-    /// Independent equations of the readings.
+    /// Independent equations of the samples.
     pub equations: usize,
     /// The gauge that is left by records, functions, penalties and equality constraints together.
     pub symmetry: Symmetry,

@@ -1,4 +1,4 @@
-//! Rows: the independent equations of the readings.
+//! Rows: the independent equations of the samples.
 
 use super::super::components::force_of;
 use super::columns::last_acting;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Two inputs are independent if this share of one is left beside the others.
 const INDEPENDENT: f64 = 1e-9;
 
-/// Readings of one kind at one place.
+/// Samples of one kind at one place.
 type SampleKey = (usize, ChannelKind, usize, u64);
 
 /// The number of independent equations, and what is to be said of them.
@@ -22,7 +22,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     for (e, experiment) in problem.experiments.iter().enumerate() {
         for channel in &experiment.channels {
             if !superposes(problem, experiment, channel) {
-                // A reading of a known initial state says nothing of the parameters.
+                // A sample of a known initial state says nothing of the parameters.
                 let known = experiment.initial_parameters == [None; 2]
                     && channel.sensor().indices() == [None; 3]
                     && channel.filter().is_empty();
@@ -77,7 +77,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     (total, combinations.into_iter().collect())
 }
 
-/// Whether a channel's readings are linear in the record's inputs, with no numbers sought besides.
+/// Whether a channel's samples are linear in the record's inputs, with no numbers estimated besides.
 fn superposes(
     problem: &Problem,
     experiment: &Experiment,
@@ -159,7 +159,7 @@ impl Inputs {
         }
     }
 
-    /// Independent inputs that act on a reading.
+    /// Independent inputs that act on a sample.
     fn rank(&self, kind: ChannelKind, place: TimePoint, last: usize) -> usize {
         let stage = |step: Option<usize>, s: usize| match step {
             Some(step) => self.after[step.min(self.after.len() - 1)][s],

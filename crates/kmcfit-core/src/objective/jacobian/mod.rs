@@ -16,7 +16,7 @@ use sensitivity_layout::Moving;
 use std::ops::Range;
 
 impl Problem {
-    /// The change of every prediction (rows: readings of all channels of all experiments, in order)
+    /// The change of every prediction (rows: samples of all channels of all experiments, in order)
     /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
@@ -64,7 +64,7 @@ impl Problem {
     }
 
     /// Whether the pieces of [`Problem::each_piece`] are all there is to the Jacobian: nothing of a sensor is
-    /// sought, and no channel is filtered.
+    /// estimated, and no channel is filtered.
     pub(crate) fn comes_in_pieces(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
@@ -102,7 +102,7 @@ impl Problem {
         (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
-    /// [`Problem::each_piece`] for the readings in some steps of the only record, which begin with a tile, and how
+    /// [`Problem::each_piece`] for the samples in some steps of the only record, which begin with a tile, and how
     /// displacement and velocity at their end answer to each place. Later steps than the first do not know how the
     /// state that they set out from answers: that state has two places of its own, behind the others.
     pub(crate) fn each_piece_of_part(
@@ -116,7 +116,7 @@ impl Problem {
         sweep(self, experiment, view, order, 0, steps, &mut take)
     }
 
-    /// What the sensors that are sought add to a Jacobian, and what the filters make of it.
+    /// What the sensors that are estimated add to a Jacobian, and what the filters make of it.
     fn add_sensors(&self, evaluation: &Evaluation, jacobian: &mut DMatrix<f64>) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
@@ -129,7 +129,7 @@ impl Problem {
     }
 }
 
-/// Goes through some steps of the motion of one experiment, whose first reading has the row `row`: how displacement and
+/// Goes through some steps of the response of one experiment, whose first sample has the row `row`: how displacement and
 /// velocity at the end answer to each place.
 fn sweep(
     problem: &Problem,
@@ -230,7 +230,7 @@ mod tests {
 
     const NODES: usize = 70;
 
-    /// Two records of two devices that differ in their stiffness, the second over the first `nodes` nodes of the grid,
+    /// Two records of two systems that differ in their stiffness, the second over the first `nodes` nodes of the grid,
     /// each with a displacement at every third node and `count` accelerations from the first node on.
     fn problem(with_knots: bool, nodes: usize, count: usize) -> Problem {
         let grid = Grid::new(0.0, 7.0, NODES).expect("a grid");

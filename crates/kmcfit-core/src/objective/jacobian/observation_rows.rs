@@ -1,4 +1,4 @@
-//! The tangents of one channel's readings, tile by tile.
+//! The tangents of one channel's samples, tile by tile.
 
 use crate::objective::SimulatedRecord;
 use crate::record::Channel;
@@ -10,32 +10,32 @@ use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
 use crate::system::FUNCTIONS;
 use std::ops::Range;
 
-/// Takes the tangents of one channel's readings, tile by tile.
+/// Takes the tangents of one channel's samples, tile by tile.
 pub(super) struct JacobianRows<'a> {
     channel: &'a Channel,
     view: SimulatedRecord<'a>,
-    /// Reading to go on with.
+    /// Sample to go on with.
     next: usize,
     gain: f64,
     kind: ObservationKind,
     batch: SampleBatch,
 }
 
-/// How a channel's readings answer to the states.
+/// How a channel's samples answer to the states.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ObservationKind {
     /// Displacements, each at a node.
     Displacements,
-    /// Accelerations, reading `i` on node `i`.
+    /// Accelerations, sample `i` on node `i`.
     Accelerations,
     /// Anything.
     Any,
 }
 
-/// Up to eight readings, a reading after the other.
+/// Up to eight samples, a sample after the other.
 struct SampleBatch {
     count: usize,
-    /// Each reading's node or, for any reading, the left node of its step, from the start of the tile.
+    /// Each sample's node or, for any sample, the left node of its step, from the start of the tile.
     nodes: [usize; LANES],
     states: [[f64; 4]; LANES],
     functions: [[[f64; FUNCTIONS]; 2]; LANES],
@@ -62,7 +62,7 @@ impl SampleBatch {
 }
 
 impl<'a> JacobianRows<'a> {
-    /// From reading `next` on.
+    /// From sample `next` on.
     pub fn new(channel: &'a Channel, view: SimulatedRecord<'a>, next: usize) -> Self {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
@@ -79,7 +79,7 @@ impl<'a> JacobianRows<'a> {
         }
     }
 
-    /// Takes the readings in the steps `steps`, over which the tangents have just gone, until the `piece` is
+    /// Takes the samples in the steps `steps`, over which the tangents have just gone, until the `piece` is
     /// full: whether there may be more.
     pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut RowBlock) -> bool {
         simd::run(Read {
@@ -91,13 +91,13 @@ impl<'a> JacobianRows<'a> {
         piece.is_full()
     }
 
-    /// Takes at most so many next readings within the steps `steps`: how many they are and where they stand.
+    /// Takes at most so many next samples within the steps `steps`: how many they are and where they stand.
     #[inline(always)]
     fn batch<A: Arithmetic>(&mut self, arithmetic: A, steps: &Range<usize>, most: usize) {
         let batch = &mut self.batch;
         let most = most.min(LANES).min(self.channel.len() - self.next);
         if self.channel.is_on_every_node() && self.kind != ObservationKind::Any {
-            // The last node of the motion belongs to its last step.
+            // The last node of the response belongs to its last step.
             let last = steps.end + 1 == self.view.response.nodes();
             let end = steps.end + usize::from(last);
             batch.count = most.min(end.saturating_sub(self.next));
@@ -128,7 +128,7 @@ impl<'a> JacobianRows<'a> {
     }
 }
 
-/// The readings of a channel within a tile.
+/// The samples of a channel within a tile.
 struct Read<'a, 'c> {
     reader: &'a mut JacobianRows<'c>,
     tangents: &'a Tangents,
@@ -159,7 +159,7 @@ impl Kernel for Read<'_, '_> {
     }
 }
 
-/// The answers of up to eight readings to all directions.
+/// The answers of up to eight samples to all directions.
 struct BatchSensitivity<'a> {
     tangents: &'a Tangents,
     batch: &'a SampleBatch,
@@ -180,7 +180,7 @@ impl BatchSensitivity<'_> {
         for (g, first) in (0..places).step_by(LANES).enumerate() {
             let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
-                // Of lanes without a reading nobody wants to know.
+                // Of lanes without a sample nobody wants to know.
                 match self.kind {
                     ObservationKind::Displacements => {
                         let states = self.tangents.states(g);
@@ -256,7 +256,7 @@ impl BatchSensitivity<'_> {
         answer
     }
 
-    /// The answer of reading `l` to the directions of a group, before the gain.
+    /// The answer of sample `l` to the directions of a group, before the gain.
     #[inline(always)]
     fn at_step<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
         let SampleBatch {

@@ -5,12 +5,12 @@ use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
 
-/// The functions of an experiment's device that have parameters, and where these stand.
+/// The functions of an experiment's system that have parameters, and where these stand.
 pub(super) struct Moving<'a> {
     parts: Vec<FunctionLayout<'a>>,
     slots: Vec<Slot>,
     groups: usize,
-    /// Initial states that are sought: which, and their places.
+    /// Initial states that are estimated: which, and their places.
     seeds: Vec<(usize, usize)>,
     /// How many places there are.
     places: usize,

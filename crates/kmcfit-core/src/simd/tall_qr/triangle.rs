@@ -1,7 +1,7 @@
 //! The triangular factor of a tall matrix, by Householder reflections of some rows at a time.
 //!
 //! The rows are taken in pieces that stay in the processor's nearest memory; each is reflected into the
-//! triangle of all rows before it. A parameter that the first readings do not see stays out of the way
+//! triangle of all rows before it. A parameter that the first samples do not see stays out of the way
 //! until it is seen: the columns are taken in the order in which they begin.
 
 use super::{BlockColumn, HIGH, LANES, PIECE, Row, RowBlock};

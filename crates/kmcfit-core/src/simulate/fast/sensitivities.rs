@@ -3,7 +3,7 @@
 //! Each equals [`tangent`](crate::simulate::reference::tangent()) to 40 machine precisions of the largest value for each
 //! step.
 //! The linearised steps, which the directions share, are computed once, in eight steps at a time. The
-//! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
+//! response is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
 //! are ever in memory as a whole.
 
 use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
@@ -18,7 +18,7 @@ pub(crate) const TILE: usize = 64;
 /// Nodes of a tile: its last node is the first of the next.
 pub(crate) const TILE_NODES: usize = TILE + 1;
 
-/// A function of the device that changes along directions of a group.
+/// A function of the system that changes along directions of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     /// Group of directions.

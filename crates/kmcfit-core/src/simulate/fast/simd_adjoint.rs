@@ -1,4 +1,4 @@
-//! The discrete adjoint with its steps linearised eight at a time: the motion is known, so only two
+//! The discrete adjoint with its steps linearised eight at a time: the response is known, so only two
 //! products of a step wait for the step after it.
 
 use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
@@ -22,7 +22,7 @@ pub(crate) fn gradient(
     SystemTangent { nodal, initial }
 }
 
-/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
+/// Goes back through a response: the gradient with respect to the initial state. That with respect to the functions is
 /// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
 pub(crate) fn back(
     equation: EquationOfMotion,

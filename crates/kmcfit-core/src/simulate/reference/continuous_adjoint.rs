@@ -24,7 +24,7 @@ use std::borrow::Cow;
 /// `dJ/dy(0) = C z - (m z)'` at the beginning.
 ///
 /// # Panics
-/// If the response, the measurements or a function of the device end before the grid does.
+/// If the response, the measurements or a function of the system end before the grid does.
 pub fn continuous_adjoint(
     system: &System,
     nodal: &NodalCoefficients,

@@ -10,7 +10,7 @@ use crate::system::{
 /// to the initial state, in the Euclidean inner product of the nodal values.
 ///
 /// `source` holds the derivative of the cost with respect to displacement and velocity at every
-/// node; `trajectory` must be the response of `device` under `excitation`. The result is the transpose of
+/// node; `trajectory` must be the response of `system` under `excitation`. The result is the transpose of
 /// [`tangent`](super::tangent()) applied to `source`, to machine precision.
 ///
 /// Per stage, backwards, with `k̄` the multiplier of the stage's increment:

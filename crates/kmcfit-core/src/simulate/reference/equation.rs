@@ -2,7 +2,7 @@
 
 use crate::system::{Excitation, NodalCoefficients, StagePosition, System, Tableau, Term};
 
-/// The equation of motion of one device in one experiment.
+/// The equation of motion of one system in one experiment.
 #[derive(Clone, Copy)]
 pub(crate) struct EquationOfMotion<'a> {
     pub terms: &'a [Term],
@@ -27,7 +27,7 @@ pub(crate) struct Partials {
 
 impl<'a> EquationOfMotion<'a> {
     /// # Panics
-    /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
+    /// If `system` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
     pub fn new(
         system: &'a System,
         nodal: &'a NodalCoefficients,

@@ -5,14 +5,14 @@ use crate::simulate::Trajectory;
 use crate::simulate::error::{SimulationError, require_finite, require_positive_mass};
 use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, Tableau};
 
-/// The response of `device` from `initial` under `excitation` (`None` is free motion), over the whole grid:
+/// The response of `system` from `initial` under `excitation` (`None` is free response), over the whole grid:
 /// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, step by step in the paper's order of operations.
 ///
 /// # Errors
 /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
 ///
 /// # Panics
-/// If `device` or `excitation` does not fit the grid and the terms.
+/// If `system` or `excitation` does not fit the grid and the terms.
 pub fn forward(
     system: &System,
     nodal: &NodalCoefficients,

@@ -53,7 +53,7 @@ impl Observation {
     }
 }
 
-/// The observation of `kind` at `place` of the response `states` of `device`.
+/// The observation of `kind` at `place` of the response `states` of `system`.
 ///
 /// `around` is the force and the base's acceleration at that very time; `excitation` is that of
 /// the whole response. An acceleration is that of `y`, relative to the base.

@@ -7,7 +7,7 @@ use crate::system::{
 };
 
 /// Directional derivative of [`forward`](super::forward()) at `trajectory` (which must be the response of
-/// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
+/// `system` under `excitation`) along `direction`: the change of displacement and velocity per unit
 /// step, exact for the discrete response.
 pub fn tangent(
     system: &System,

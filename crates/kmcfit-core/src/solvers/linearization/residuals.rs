@@ -1,11 +1,11 @@
-//! Weighted residuals of the readings.
+//! Weighted residuals of the samples.
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Channel;
 use std::ops::Range;
 
-/// How the residuals of the readings of all channels are weighed.
+/// How the residuals of the samples of all channels are weighed.
 pub(super) struct Residuals {
     /// `sqrt(w)`.
     pub roots: Vec<f64>,
@@ -35,7 +35,7 @@ impl Residuals {
         self.weighted.clear();
     }
 
-    /// Adds some readings of a channel.
+    /// Adds some samples of a channel.
     pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
         let Self { roots, weighted } = self;
         let first = roots.len();
@@ -65,7 +65,7 @@ mod tests {
     use crate::record::Weighting;
     use crate::system::Grid;
 
-    /// The squares of the weighted residuals are the cost, in which the readings at both ends count half; some readings
+    /// The squares of the weighted residuals are the cost, in which the samples at both ends count half; some samples
     /// at a time are the same.
     #[test]
     fn weighted_residuals() {

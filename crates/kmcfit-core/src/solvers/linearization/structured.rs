@@ -25,9 +25,9 @@ pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian
 /// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
 /// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
 ///
-/// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
+/// Residuals: `sqrt(w) (r + delta z)` for the samples. Equalities: every step, linearised,
 /// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
-/// vanish where the states are a motion. `steps` are those of [`steps`].
+/// vanish where the states are a response. `steps` are those of [`steps`].
 pub fn subproblem(
     problem: &Problem,
     evaluation: &Evaluation,

@@ -20,7 +20,7 @@ fn fitted(problem: &Problem) -> Fit {
 }
 
 /// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
-/// every one and velocities between them; its velocity at the start is sought as well. The stiffness has so many knots,
+/// every one and velocities between them; its velocity at the start is estimated as well. The stiffness has so many knots,
 /// or is a constant.
 fn long_problem(knots: Option<u32>) -> Problem {
     let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
@@ -107,7 +107,7 @@ fn halves_of_a_long_record() {
 }
 
 /// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
-/// adjoint, and the linearised readings ask for no further step.
+/// adjoint, and the linearised samples ask for no further step.
 #[test]
 fn after_short_steps_the_jacobian_stays() {
     let mut problem = long_problem(None);

@@ -11,14 +11,14 @@ const GROWTH: f64 = 4.0;
 
 /// What a line search sees of a trial point.
 pub(super) trait LineFunction {
-    /// Cost at step `a`; `None` if there is no motion at this point.
+    /// Cost at step `a`; `None` if there is no response at this point.
     fn cost(&mut self, a: f64) -> Option<f64>;
     /// Slope at the step last asked for by [`LineFunction::cost`].
     fn slope(&mut self) -> f64;
 }
 
 /// Finds a step that satisfies the weak Wolfe conditions, from the first trial `a`; `cost` and
-/// `slope < 0` belong to step 0. Where no motion exists the step is too long. Returns the last step
+/// `slope < 0` belong to step 0. Where no response exists the step is too long. Returns the last step
 /// that lowered the cost enough, which is the last one whose slope was asked for; `None` if there
 /// was none.
 ///

@@ -1,9 +1,9 @@
-//! A start from states and parameters together: the motion near the readings and the functions are
+//! A start from states and parameters together: the response near the samples and the functions are
 //! corrected at once, and the equation of motion holds only in the end.
 //!
-//! A motion that runs through the record cannot slip by a period, because it begins at the readings
-//! and not at a device. So this start knows no local minima of a wrong period however long the
-//! record is. The steps are linear in the functions: if the motion is right, one of them finds the
+//! A response that runs through the record cannot slip by a period, because it begins at the samples
+//! and not at a system. So this start knows no local minima of a wrong period however long the
+//! record is. The steps are linear in the functions: if the response is right, one of them finds the
 //! functions from anywhere.
 
 use crate::constraints::TOLERANCE;
@@ -20,18 +20,18 @@ use crate::system::State;
 /// Most corrections of the parameters.
 const ROUNDS: usize = 16;
 /// In so many of these at most, and until no function changes by more than [`NEAR`] of its size, the
-/// motion is that of the readings again, as the sensors are known by then: the functions may still be
-/// far off, and a motion that follows them would be led away.
+/// response is that of the samples again, as the sensors are known by then: the functions may still be
+/// far off, and a response that follows them would be led away.
 const ANCHORED: usize = 8;
 const NEAR: f64 = 1e-3;
 /// Corrections end when no function changes by more than this share of its size: the fit that follows
 /// needs a start, not an optimum.
 const SETTLED: f64 = 1e-6;
-/// A pull towards the last parameters, relative to the misfit of no motion at all: it decides what the
-/// readings leave open.
+/// A pull towards the last parameters, relative to the misfit of no response at all: it decides what the
+/// samples leave open.
 const PULL: f64 = 1e-9;
 
-/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a motion.
+/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a response.
 /// Ends early where `interrupted` says so.
 pub(in crate::solvers) fn collocation_start(
     problem: &Problem,
@@ -80,7 +80,7 @@ pub(in crate::solvers) fn collocation_start(
     best.map(|(_, theta)| theta)
 }
 
-/// The motion of each experiment near its readings; that of the parameters where there are too few.
+/// The response of each experiment near its samples; that of the parameters where there are too few.
 fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     let scalars = problem.scalars(theta);
     let mut own = None;
@@ -126,7 +126,7 @@ fn begin(initial: State, response: &mut Trajectory) {
     response.velocity[0] = initial.velocity;
 }
 
-/// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
+/// Fills `evaluation` with the system at `theta`, the response `states` and what the channels see of it.
 fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
     problem.set_parameters(theta, evaluation);
     evaluation.trajectories.clone_from_slice(states);
@@ -145,7 +145,7 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
     evaluation.predictions = each.collect();
 }
 
-/// Whether every device has a mass that an equation of motion can be solved for.
+/// Whether every system has a mass that an equation of motion can be solved for.
 fn has_mass(evaluation: &Evaluation) -> bool {
     let mut nodal_sets = std::iter::once(&evaluation.nodal).chain(&evaluation.own_nodal);
     nodal_sets.all(|nodal| nodal.mass.iter().all(|m| *m > 0.0))

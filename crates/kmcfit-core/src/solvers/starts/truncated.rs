@@ -19,10 +19,10 @@ use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
 use std::time::Duration;
 
-/// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
+/// Steps of the beginning, the more if there are too few samples in the fewer: powers of two, so that its grid has
 /// the same step to the last bit.
 const STEPS: [usize; 2] = [1 << 11, 1 << 12];
-/// How many readings there must be for each parameter.
+/// How many samples there must be for each parameter.
 const READINGS: usize = 20;
 /// Most iterations on the beginning.
 const ITERATIONS: u64 = 20;
@@ -30,7 +30,7 @@ const ITERATIONS: u64 = 20;
 const TOLERANCE: f64 = 1e-6;
 
 /// The number of steps of a truncated start; `None` unless they are long, all functions constants, and
-/// there are readings enough in it.
+/// there are samples enough in it.
 pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
     let is_constant = |f: &CoefficientFunction| {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()

@@ -20,19 +20,19 @@ use std::f64::consts::PI;
 const CORNER: f64 = 0.5;
 /// Rounds in which the dominant frequency is found.
 const ROUNDS: usize = 3;
-/// Fewest readings.
+/// Fewest samples.
 const FEWEST: usize = 8;
 
-/// The band of a motion.
+/// The band of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassBand {
     /// Dominant frequency: root-mean-square velocity over root-mean-square displacement, rad/s.
     pub frequency: f64,
-    /// Spacing of the readings, s.
+    /// Spacing of the samples, s.
     spacing: f64,
 }
 
-/// A series and its integrals through the band's filter, at all readings but the first and the last.
+/// A series and its integrals through the band's filter, at all samples but the first and the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBand {
     /// Integrated twice.
@@ -44,7 +44,7 @@ pub struct InBand {
 }
 
 impl PassBand {
-    /// The band of a motion with these accelerations, `spacing` seconds apart; `None` if they are too
+    /// The band of a response with these accelerations, `spacing` seconds apart; `None` if they are too
     /// few or show no oscillation.
     ///
     /// The search begins with the zero crossings of the acceleration itself.

@@ -1,4 +1,4 @@
-//! Refits of both models to simulated readings, by their linearisation.
+//! Refits of both models to simulated samples, by their linearisation.
 
 use super::reduced::ConstantModel;
 use crate::identifiability::Factorisation;
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct LinearisedModels {
     /// Orthonormal columns that span what each model can do: constant, varying.
     spans: [DMatrix<f64>; 2],
-    /// Root weight times sigma of each reading.
+    /// Root weight times sigma of each sample.
     noise: Vec<f64>,
     /// What penalties and priors ask for.
     asked: Vec<f64>,
@@ -57,7 +57,7 @@ impl LinearisedModels {
         }
     }
 
-    /// Least costs of both models for simulated readings `index`.
+    /// Least costs of both models for simulated samples `index`.
     pub fn costs(&self, seed: u64, index: usize) -> [f64; 2] {
         let mut random = stream(seed, index);
         let unit = normal(&mut random, self.noise.len());

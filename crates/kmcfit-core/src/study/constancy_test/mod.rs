@@ -5,11 +5,11 @@
 //!
 //! ```text
 //! LR = J(constant) - J(varying)                     with sigma
-//!    = n ln(J(constant) / J(varying))               without, n readings
+//!    = n ln(J(constant) / J(varying))               without, n samples
 //! ```
 //!
 //! on whole costs, penalties and priors included. Its distribution when the function is constant is
-//! not a chi-square once there are penalties, so it is simulated: readings of the constant model
+//! not a chi-square once there are penalties, so it is simulated: samples of the constant model
 //! with seeded normal noise, both models refitted to their linearisation at the constant optimum,
 //! penalties and priors included, inequality constraints left out: bounds that hold the varying model
 //! alone make the test err towards constant, one that holds the constant itself towards varying. The
@@ -57,7 +57,7 @@ pub struct ConstancyTest {
 }
 
 impl ConstancyTest {
-    /// Whether the readings say that it varies.
+    /// Whether the samples say that it varies.
     pub fn varies(&self) -> bool {
         self.p_value <= self.level
     }
@@ -111,7 +111,7 @@ impl Default for ConstancySettings {
 /// The verdict on every function that could vary, from `optimum`, where the problem was fitted.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum, or a constant in its place, has no motion.
+/// A [`SimulationError`] if the optimum, or a constant in its place, has no response.
 pub fn constancy_tests(
     problem: &Problem,
     optimum: &[f64],

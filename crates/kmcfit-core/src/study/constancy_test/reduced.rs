@@ -192,7 +192,7 @@ mod tests {
     }
 
     /// With one function constant the problem is the whole one where that function is constant: of every function the
-    /// motion, the penalties, the soft rows and the constraints.
+    /// response, the penalties, the soft rows and the constraints.
     #[test]
     fn the_reduced_problem_is_the_whole_one_at_constants() {
         let whole = whole();

@@ -26,7 +26,7 @@ const CORRECTIONS: usize = 6;
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.2;
 
-/// The misfit of the readings plus the priors.
+/// The misfit of the samples plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     let scalars = problem.functions.scalars().iter();
     let priors = scalars
@@ -165,7 +165,7 @@ impl Search<'_> {
         evaluation.misfit - squares
     }
 
-    /// Parameters as units by their sizes, states by those of the motions.
+    /// Parameters as units by their sizes, states by those of the responses.
     fn units(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Vec<f64> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {

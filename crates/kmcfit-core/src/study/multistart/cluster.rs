@@ -25,7 +25,7 @@ pub struct Cluster {
 
 impl Waterfall {
     /// Clusters by rising cost: a run belongs to the first cluster whose best member is no further
-    /// than `tolerance`, in ratios and motions both. Only converged runs are told apart; the others
+    /// than `tolerance`, in ratios and responses both. Only converged runs are told apart; the others
     /// have not reached an optimum.
     pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();

@@ -2,8 +2,8 @@
 //!
 //! Starts are a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, *Technometrics* 21 (1979)
 //! 239-245): each range is cut into as many parts as there are starts, and every part is used once.
-//! Optima are told apart by what free motion can show, the ratios of the functions to the mass, and by
-//! their motions, not by their costs: two different devices may fit alike, and one device may be
+//! Optima are told apart by what free response can show, the ratios of the functions to the mass, and by
+//! their responses, not by their costs: two different systems may fit alike, and one system may be
 //! reached to different accuracy.
 
 mod cluster;
@@ -78,7 +78,7 @@ pub struct Multistart {
 pub struct StartRun {
     /// Its start, within the constraints.
     pub start: Vec<f64>,
-    /// Where it led; `None` if the start has no motion, or the constraints no point.
+    /// Where it led; `None` if the start has no response, or the constraints no point.
     pub found: Option<LocalOptimum>,
     /// How it ended, or why there is nothing.
     pub status: Status,
@@ -91,7 +91,7 @@ pub struct StartRun {
 pub struct LocalOptimum {
     /// Parameters.
     pub parameters: Vec<f64>,
-    /// Cost, devices and motions.
+    /// Cost, systems and responses.
     pub evaluation: Evaluation,
     /// Iterations.
     pub iterations: usize,

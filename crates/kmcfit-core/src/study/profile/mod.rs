@@ -4,12 +4,12 @@
 //! constraints. With `J` a chi-square, the values with
 //!
 //! ```text
-//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n readings)
+//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n samples)
 //! ```
 //!
 //! are a confidence interval, 95 % for the quantile 3.841 of chi-square with one degree of freedom.
 //! `J` is the whole cost, penalties and priors included: with penalties the interval is that of the
-//! penalised problem. A profile that never rises is a number that the readings do not see.
+//! penalised problem. A profile that never rises is a number that the samples do not see.
 //!
 //! Sources: S. S. Wilks, *Annals of Mathematical Statistics* 9 (1938) 60-62; A. Raue et al.,
 //! "Structural and practical identifiability analysis of partially observed dynamical models by
@@ -59,7 +59,7 @@ pub enum Interval {
     Identified,
     /// One end is found.
     OneSided,
-    /// None is: the readings do not see it.
+    /// None is: the samples do not see it.
     Flat,
 }
 
@@ -76,7 +76,7 @@ pub enum End {
     Far,
     /// The steps ran out.
     Steps,
-    /// No motion, or no fit, further out.
+    /// No response, or no fit, further out.
     Failed(String),
 }
 
@@ -160,10 +160,10 @@ impl Profile {
 /// It walks outwards from the optimum, each fit (Gauss–Newton under the constraints) from its
 /// neighbours, until the cost has risen by the quantile or a bound, a limit or the number of steps is
 /// met; the ends are then found by a secant method on the root of the rise, which is a straight line
-/// where the motion is linear in the parameters.
+/// where the response is linear in the parameters.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no response.
 pub fn profile(
     problem: &Problem,
     optimum: &[f64],

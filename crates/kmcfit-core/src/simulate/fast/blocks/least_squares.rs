@@ -1,9 +1,9 @@
-//! Cost and gradient in one go, for readings of the displacement at every node.
+//! Cost and gradient in one go, for samples of the displacement at every node.
 //!
 //! A block's share of the cost is a quadratic function of the state at its start. A first pass, in which no
 //! tile waits for another, finds for every block its map and the derivative of that function; from these
 //! follow the states between the blocks and, from the end back, the adjoint states there. A second pass, in
-//! which again no tile waits for another, computes motion, adjoint and gradient tile by tile and writes
+//! which again no tile waits for another, computes response, adjoint and gradient tile by tile and writes
 //! nothing down but the gradient. Long records are shared by two threads; what a tile gives
 //! does not depend on who computes it.
 

@@ -1,9 +1,9 @@
-//! Linear free motion in eight blocks at once.
+//! Linear free response in eight blocks at once.
 //!
 //! A step of the midpoint rule is a linear map of the state as long as the terms are linear. So the
 //! record can be cut into blocks that do not wait for each other: a first pass finds the map of
 //! each block, from these the states between blocks follow one after the other, and a second
-//! pass computes the motion in all blocks at once. The adjoint is done the same way from the end. One
+//! pass computes the response in all blocks at once. The adjoint is done the same way from the end. One
 //! step after the other, each waits for the one before; in eight lanes the processor has always
 //! something to do.
 //!
@@ -31,7 +31,7 @@ use workspace::{Workspace, with_workspace};
 /// A mass outside this range meets its own square near the ends of the range of numbers.
 const MASSES: std::ops::Range<f64> = 1e-150..1e150;
 
-/// A device with damping and stiffness alone, and the step `h` (s).
+/// A system with damping and stiffness alone, and the step `h` (s).
 #[derive(Clone, Copy)]
 pub(crate) struct LinearSystem<'a> {
     mass: &'a [f64],
@@ -63,7 +63,7 @@ impl<'a> LinearSystem<'a> {
         simd::run(MassRange(mass)).then_some(nodal)
     }
 
-    /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner
+    /// The cost `sum_i w_i (y_i - reading_i)^2` of one sample a node with the weights of the inner
     /// nodes and of both ends, and its gradient: with respect to the functions into `gradient`,
     /// with respect to the initial state returned.
     pub fn least_squares(
@@ -127,7 +127,7 @@ impl<'a> LinearSystem<'a> {
         *x = [y + source[0], w + source[1]];
     }
 
-    /// The motion from `initial`, over as many nodes as `trajectory` has. Where it, or a block's map,
+    /// The response from `initial`, over as many nodes as `trajectory` has. Where it, or a block's map,
     /// leaves the finite numbers, the last state is not finite.
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {

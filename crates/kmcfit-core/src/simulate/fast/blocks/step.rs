@@ -1,4 +1,4 @@
-//! One step of the midpoint rule for a linear device in free motion.
+//! One step of the midpoint rule for a linear system in free response.
 //!
 //! Time is counted in steps `h` here, so that the velocity is `w = h v`, in m, and a step is
 //!
@@ -132,7 +132,7 @@ impl<T: StepNumber> StepRates<T> {
     }
 
     /// What a step gives to the gradient with respect to `m/h`, `c` and `h k`: at its left node, and
-    /// half of what it gives at mid-step. `adjoint` belongs to the right node, `motion` to the
+    /// half of what it gives at mid-step. `adjoint` belongs to the right node, `response` to the
     /// left.
     #[inline(always)]
     pub fn shares(&self, [y, w]: [T; 2], adjoint: [T; 2], of: Constants<T>) -> ([T; 3], [T; 3]) {

@@ -148,7 +148,7 @@ fn squares_are_motion_and_gradient_in_one() {
     }
 }
 
-/// A motion and what follows from it, with one arithmetic.
+/// A response and what follows from it, with one arithmetic.
 struct Whole<'a>(&'a System, &'a NodalCoefficients);
 
 impl simd::Kernel for Whole<'_> {
@@ -216,7 +216,7 @@ fn all_arithmetics_give_the_same_bits() {
     }
 }
 
-/// Masses at the ends of the range of numbers, and motions that leave it, go one step after the other
+/// Masses at the ends of the range of numbers, and responses that leave it, go one step after the other
 /// and end as they do there.
 #[test]
 fn what_blocks_cannot_do_is_done_step_by_step() {
@@ -245,7 +245,7 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
     assert_eq!(found.unwrap_err(), expected);
 }
 
-/// A record that ends before the grid does: the device must have mass on all of it.
+/// A record that ends before the grid does: the system must have mass on all of it.
 #[test]
 fn mass_is_required_behind_the_end_of_a_record() {
     let nodes = 500;
@@ -258,9 +258,9 @@ fn mass_is_required_behind_the_end_of_a_record() {
     assert_eq!(found, expected);
 }
 
-/// Where the motion meets the readings, the derivative of a block's cost is the difference of two numbers
-/// that are nearly the same. What it loses is less than the motion's own rounding takes from the residuals:
-/// the gradients of two motions that differ by rounding differ more.
+/// Where the response meets the samples, the derivative of a block's cost is the difference of two numbers
+/// that are nearly the same. What it loses is less than the response's own rounding takes from the residuals:
+/// the gradients of two responses that differ by rounding differ more.
 #[test]
 fn squares_lose_nothing_near_the_readings() {
     let nodes = 2000;

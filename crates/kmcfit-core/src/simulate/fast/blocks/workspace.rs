@@ -167,7 +167,7 @@ impl Workspace {
         maps
     }
 
-    /// The charts of all blocks, from the functions and from readings in place of the source. With `KEEP`
+    /// The charts of all blocks, from the functions and from samples in place of the source. With `KEEP`
     /// the rates of all steps are kept as well.
     #[inline(always)]
     pub fn survey<A: Arithmetic, const KEEP: bool>(
@@ -239,7 +239,7 @@ impl Workspace {
         }
     }
 
-    /// The motion in all blocks from their starts.
+    /// The response in all blocks from their starts.
     #[inline(always)]
     pub fn replay<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize, starts: &Ends) {
         let of = Constants::new(h).in_lanes(arithmetic);
@@ -254,7 +254,7 @@ impl Workspace {
         }
     }
 
-    /// From readings in place of the source: their residuals `r = y - reading`, the source
+    /// From samples in place of the source: their residuals `r = y - sample`, the source
     /// `factor r`, and the sum of the squares `r^2` in every lane.
     #[inline(always)]
     pub fn compare<A: Arithmetic>(&mut self, arithmetic: A, length: usize, factor: f64) -> Row {

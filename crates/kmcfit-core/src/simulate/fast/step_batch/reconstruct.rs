@@ -1,4 +1,4 @@
-//! The motion of one device, made again from eight of its states.
+//! The response of one system, made again from eight of its states.
 
 use super::part;
 use super::rows::{Steps, Values};
@@ -6,9 +6,9 @@ use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 use crate::simulate::Trajectory;
 use crate::system::{NodalCoefficients, State};
 
-/// The motion of `device` from the displacements and velocities where its eight parts begin, by divisions alone.
+/// The response of `system` from the displacements and velocities where its eight parts begin, by divisions alone.
 ///
-/// Whether it is the motion that one step after the other gives from `initial`, to the last bit: the first part begins there, and
+/// Whether it is the response that one step after the other gives from `initial`, to the last bit: the first part begins there, and
 /// each ends where the next begins.
 /// Otherwise what is in `trajectory` is of no use.
 pub(crate) fn reconstruct(
@@ -33,7 +33,7 @@ pub(crate) fn reconstruct(
     joins(&ends[0], &states[0]) && joins(&ends[1], &states[1])
 }
 
-/// A motion from its states at the beginning of its eight parts, a lane each; gives those at their ends.
+/// A response from its states at the beginning of its eight parts, a lane each; gives those at their ends.
 struct Replay<'a> {
     /// Mass, damping, stiffness at the nodes.
     functions: [&'a [f64]; 3],

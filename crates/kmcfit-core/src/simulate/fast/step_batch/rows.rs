@@ -1,4 +1,4 @@
-//! BatchRows of devices, one a lane, and the steps that they take.
+//! BatchRows of systems, one a lane, and the steps that they take.
 
 use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
@@ -12,7 +12,7 @@ pub(super) struct BatchRows<'a, const R: usize> {
     pub costs: &'a mut [Row; R],
 }
 
-/// Mass, damping and stiffness of a row of devices.
+/// Mass, damping and stiffness of a row of systems.
 #[derive(Clone, Copy)]
 pub(super) struct Values<A: Arithmetic>(pub [Eight<A>; 3]);
 
@@ -78,7 +78,7 @@ impl<A: Arithmetic> Steps<A> {
     }
 }
 
-/// A row of devices on their way.
+/// A row of systems on their way.
 #[derive(Clone, Copy)]
 struct BatchCoefficients<A: Arithmetic> {
     arithmetic: A,
@@ -125,7 +125,7 @@ impl<A: Arithmetic> BatchCoefficients<A> {
         let splat = |x| Eight::splat(self.arithmetic, x);
         let [y, v] = self.state;
         let residual = y - splat(last_sample);
-        // Zero, and not a number where the motion is not finite.
+        // Zero, and not a number where the response is not finite.
         let nothing = splat(0.0) * y + splat(0.0) * v;
         (self.sum + splat(0.5) * (residual * residual) + nothing).row()
     }

@@ -38,7 +38,7 @@ fn nodal_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
     }
 }
 
-/// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
+/// One by one, by the forward solve and the trapezoid rule: the response and its cost.
 fn by_itself(ray: &SearchRay, length: f64) -> Option<(Trajectory, f64)> {
     let nodes = ray.samples.len();
     let system = System {

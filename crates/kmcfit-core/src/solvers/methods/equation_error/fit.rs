@@ -21,19 +21,19 @@ use crate::system::NodalCoefficients;
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.
 const FAR: f64 = 1e4;
 const AGAIN: usize = 3;
-/// Relative rounding of a term of the equation of motion: of derivatives of smoothed readings, and of parameters that are known to
+/// Relative rounding of a term of the equation of motion: of derivatives of smoothed samples, and of parameters that are known to
 /// the accuracy of a factorisation.
 const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
-/// Minimises over the readings of all experiments
+/// Minimises over the samples of all experiments
 ///
 /// ```text
 /// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
 /// ```
 ///
-/// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
-/// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
-/// the equation of motion says of the readings there. Scalars keep their values at the start.
+/// with `y`, `y'`, `y''` from the samples ([`Measurements`]) and every sample of the same weight.
+/// Nothing is simulated: the trajectories of the fit are the measured responses, the predictions what
+/// the equation of motion says of the samples there. Scalars keep their values at the start.
 pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationRecord)) -> Fit {
     let clock = Instant::now();
     let mut timings = Timings::default();
@@ -126,7 +126,7 @@ fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     }
 }
 
-/// The end of a fit whose readings tell no motion: the start, without a cost.
+/// The end of a fit whose samples tell no response: the start, without a cost.
 fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
     evaluation.nodal = problem.functions.nodal(start);
@@ -307,7 +307,7 @@ impl<'a> Cost<'a> {
         Iterate::new(theta, evaluation, gradient)
     }
 
-    /// The measured motions, and what the model says of the readings there.
+    /// The measured responses, and what the model says of the samples there.
     fn report_responses(&self, evaluation: &mut Evaluation) {
         let problem = self.problem;
         for (e, measured) in self.measurements.experiments.iter().enumerate() {

@@ -12,7 +12,7 @@ use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
-/// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
+/// response: there the filter's transients, which begin as large as the response and fall to a tenth in
 /// a period, are the largest errors there are. Without a known drive the unknown one is larger.
 const SETTLING: f64 = 2.0;
 /// Most of a record that may be left out at either end.
@@ -21,7 +21,7 @@ const MOST_LEFT_OUT: usize = 4;
 /// The state of an experiment at some times, and what drives it there.
 pub(super) struct Measured {
     pub places: Vec<TimePoint>,
-    /// Index of the first time among the readings of the channel, where it is one channel's.
+    /// Index of the first time among the samples of the channel, where it is one channel's.
     first: usize,
     /// Displacement, m.
     pub y: Vec<f64>,
@@ -80,7 +80,7 @@ impl Measured {
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
 
-    /// From accelerations alone: motion, force and base through the same filter.
+    /// From accelerations alone: response, force and base through the same filter.
     fn in_band(
         experiment: &Experiment,
         channel: &Channel,
@@ -124,7 +124,7 @@ impl Measured {
         })
     }
 
-    /// At the nodes at which a motion is known.
+    /// At the nodes at which a response is known.
     pub fn at_nodes(problem: &Problem, experiment: &Experiment, kinematics: &Kinematics) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
@@ -152,7 +152,7 @@ impl Measured {
         }
     }
 
-    /// What function `f` of a device multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
+    /// What function `f` of a system multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
@@ -160,7 +160,7 @@ impl Measured {
         }
     }
 
-    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
+    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a system at all times, N.
     pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
         let error = |(i, place): (usize, &TimePoint)| {
             let forces = nodal.functions().enumerate();
@@ -178,7 +178,7 @@ impl Measured {
         self.weight * errors.iter().map(|e| e * e).sum::<f64>()
     }
 
-    /// The motion on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
+    /// The response on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
     /// where nothing was measured.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
         let mut response = Trajectory::zeros(nodes);
@@ -220,11 +220,11 @@ impl Measured {
         (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
     }
 
-    /// What the model says of the readings at this state.
+    /// What the model says of the samples at this state.
     ///
     /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
-    /// the filter took from the reading, so that model less reading is minus the equation's error
-    /// over the mass; the readings at the ends, which are left out, stand for themselves.
+    /// the filter took from the sample, so that model less sample is minus the equation's error
+    /// over the mass; the samples at the ends, which are left out, stand for themselves.
     pub fn predict(&self, problem: &Problem, channel: &Channel, view: SimulatedRecord) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
@@ -259,21 +259,21 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
 
-/// The motions of all experiments as their readings tell them.
+/// The responses of all experiments as their samples tell them.
 ///
-/// From one channel of equally spaced accelerations the motion is integrated in a band around its
+/// From one channel of equally spaced accelerations the response is integrated in a band around its
 /// dominant frequency, and force and base pass the same filter. From any other channels a smooth
 /// curve through all of them is differentiated, as for the start from the data.
 pub struct Measurements {
-    /// `None` for an experiment without readings.
+    /// `None` for an experiment without samples.
     pub(super) experiments: Vec<Option<Measured>>,
 }
 
 impl Measurements {
-    /// From the readings of a problem, with the scalars at their start.
+    /// From the samples of a problem, with the scalars at their start.
     ///
     /// # Errors
-    /// The first experiment whose readings do not tell a motion.
+    /// The first experiment whose samples do not tell a response.
     pub fn of(problem: &Problem) -> Result<Self, UnsupportedRecord> {
         Self::with_scalars(problem, problem.scalars(&problem.start()))
     }
@@ -300,7 +300,7 @@ impl Measurements {
     }
 
     /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
-    /// only forces proportional to the motion do without.
+    /// only forces proportional to the response do without.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
         let terms = problem.system.terms.iter();
         if terms.clone().all(|term| term.is_linear()) {
@@ -320,7 +320,7 @@ impl Measurements {
     }
 
     /// The weight of a penalty on derivative `order` of function `index` of the list with which the
-    /// smoother's time constant is one dominant period T where the motion has its mean amplitude:
+    /// smoother's time constant is one dominant period T where the response has its mean amplitude:
     /// `mean(phi^2) T^(2 order)`, summed over the experiments that have the function. T is the mean
     /// of theirs.
     ///
@@ -366,7 +366,7 @@ impl Measurements {
             .collect()
     }
 
-    /// The experiments that have function `index` of the list, and which of their device it is.
+    /// The experiments that have function `index` of the list, and which of their system it is.
     fn with_function<'a>(
         &'a self,
         problem: &'a Problem,
@@ -383,7 +383,7 @@ impl Measurements {
     }
 }
 
-/// The mass of the first device that has function `index` of the list.
+/// The mass of the first system that has function `index` of the list.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
     let mut nodal_sets = functions.coefficient_sets().iter();
     let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
@@ -391,7 +391,7 @@ fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
 }
 
 impl Measured {
-    /// Mean of the squared response of function `f` of the device.
+    /// Mean of the squared response of function `f` of the system.
     fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
         let n = self.places.len();
         let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
@@ -410,7 +410,7 @@ mod tests {
         Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
     }
 
-    /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
+    /// Samples at some nodes and between some, of the response that `state` tells: `y`, `y'`, `y''`.
     fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
         let between = |step| TimePoint {
             step,
@@ -435,7 +435,7 @@ mod tests {
         }
     }
 
-    /// The largest distance of a motion from what `state` tells of displacement and velocity.
+    /// The largest distance of a response from what `state` tells of displacement and velocity.
     fn distance(
         response: &Trajectory,
         nodes: impl Iterator<Item = usize>,

@@ -1,9 +1,9 @@
-//! The equation error: smoothed readings put into the equation of motion.
+//! The equation error: smoothed samples put into the equation of motion.
 //!
-//! With `y`, `y'`, `y''` from the readings, `m y'' + c y' + k y - f` is linear in the parameters, so
+//! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so
 //! penalties and constraints make it one convex problem. It needs no start and knows no local minima
 //! of a wrong period; noise biases it. It is a start ([`equation_error`]) for a fit that removes the
-//! bias, and a method of its own ([`fit`]) for records that no motion from known states and forces
+//! bias, and a method of its own ([`fit`]) for records that no response from known states and forces
 //! explains.
 
 mod fit;
@@ -58,7 +58,7 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     from_kinematics(problem, start, &kinematics)
 }
 
-/// [`equation_error`] with the motion of each experiment.
+/// [`equation_error`] with the response of each experiment.
 pub(in crate::solvers) fn from_kinematics(
     problem: &Problem,
     start: &[f64],
@@ -184,7 +184,7 @@ fn minimise(
     }
 }
 
-/// Root of the weight of a squared error of the equation, so that it counts as the readings would.
+/// Root of the weight of a squared error of the equation, so that it counts as the samples would.
 fn root_weight(
     problem: &Problem,
     experiment: &Experiment,
@@ -201,7 +201,7 @@ fn root_weight(
     kinematics.weight.sqrt() / force_scale
 }
 
-/// The device of an experiment for the parameters `theta`.
+/// The system of an experiment for the parameters `theta`.
 fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
     let mut nodal = problem.functions.empty_nodal();
     problem
@@ -241,7 +241,7 @@ fn add_rows(
 }
 
 /// The constraints, and where nothing fixes the common scale of all functions, the mean of the mass
-/// at its start: without it the equation is solved by no device at all.
+/// at its start: without it the equation is solved by no system at all.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
     if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
@@ -291,7 +291,7 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     })
 }
 
-/// `start` with the initial states that are sought taken from the motions, where these begin.
+/// `start` with the initial states that are estimated taken from the responses, where these begin.
 pub(in crate::solvers) fn with_initial_states(
     problem: &Problem,
     start: &[f64],

@@ -37,7 +37,7 @@ const NO_DECREASE: f64 = 1e-30;
 
 /// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
 const NEARBY: f64 = 1e-2;
-/// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
+/// ... and the decrease is as predicted to this share: where a response remembers long, its phase makes the Jacobian another
 /// one sooner. A step with the old one leaves about that share of the error, which one with its own would square.
 const AS_PREDICTED: f64 = 0.1;
 

@@ -42,7 +42,7 @@ fn least_decrease(problem: &Problem, cost: f64) -> f64 {
 }
 
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
-/// less than the rounding of the cost, or moves less than rounding moves the motion.
+/// less than the rounding of the cost, or moves less than rounding moves the response.
 pub(super) fn at_minimum(
     problem: &Problem,
     point: &Iterate,
@@ -167,7 +167,7 @@ fn model_cost(
     near + problem.regularisation(parameters) + misfit
 }
 
-/// The cost of the readings with every prediction replaced by its linearisation, and every loss by
+/// The cost of the samples with every prediction replaced by its linearisation, and every loss by
 /// the squares that stand for it.
 fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
     let changes = problem.predictions_tangent(evaluation, delta);

@@ -71,7 +71,7 @@ impl BatchedTrials {
     }
 }
 
-/// Device, motion and predictions at `parameters`, from states of the motion; whether it has one.
+/// System, response and predictions at `parameters`, from states of the response; whether it has one.
 fn move_to(
     problem: &Problem,
     parameters: &[f64],
@@ -90,7 +90,7 @@ fn move_to(
     true
 }
 
-/// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
+/// The trials' systems as a ray, on the paper's own problem: one free record seen at every node, one
 /// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
 /// any other.
 pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {

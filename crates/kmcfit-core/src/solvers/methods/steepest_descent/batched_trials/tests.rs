@@ -86,7 +86,7 @@ fn steps_are_the_best_of_all_trials() {
     }
 }
 
-/// States that are not those of the motion lead to the motion all the same.
+/// States that are not those of the response lead to the response all the same.
 #[test]
 fn a_motion_does_not_depend_on_its_states() {
     let problem = problem();
