@@ -414,7 +414,7 @@ fn limits() {
       expected: a finite number, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(with("max: {data: x.csv, column: m_kg}"), @"
-    m.yaml:5:46: functions.mass.max.data: x.csv: there is no such file
+    m.yaml:5:46: functions.mass.max.data: x.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
       hint: did you mean `m.csv`?
     ");

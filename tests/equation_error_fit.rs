@@ -575,7 +575,7 @@ fn model_files() {
             parts.penalties[0].weight = 2.0;
         })
         .unwrap();
-    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the readings, with y, y' and y'' from the readings and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
+    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the record, without a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
     assert_snapshot!(said(&model(period, "{method: gauss-newton}")), @"
@@ -616,7 +616,7 @@ fn model_files() {
     let text = model(number, "{method: equation-error}");
     assert_snapshot!(read(&text, f64::cos, 5).map(|_| ()).unwrap_err(), @"
     m.yaml:3:5: experiments[0]: the method `equation-error` cannot tell the motion from these readings
-      found: there are too few readings
+      found: too few samples
       expected: readings from which displacement, velocity and acceleration follow
     ");
     assert_snapshot!(read(&text, |_| 0.0, 401).map(|_| ()).unwrap_err(), @"

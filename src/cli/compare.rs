@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compare models and finished runs: one table, overlaid figures, one page.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit compare constant.yaml spline.yaml runs/earlier")]
 pub struct Arguments {
     /// Model files (YAML), which are fitted, and folders of finished runs.
     #[arg(required = true, value_name = "MODEL|RUN")]

@@ -28,6 +28,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Analyse what the records determine: profiles, extremes, equivalent systems, next experiments.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit study model.yaml --threads 4")]
 pub struct Arguments {
     /// Model file or sequence (YAML), or the folder of a finished run, whose model is fitted again.
     model: PathBuf,

@@ -33,7 +33,7 @@ pub(super) fn build(
         _ if !measured => {
             return Err(file
                 .error_at("grid", "the number of nodes is missing")
-                .expected("`nodes`, since there are no readings to take it from"));
+                .expected("`nodes`, because there is no record"));
         }
         Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         None => match node_per_reading(records) {
@@ -42,15 +42,13 @@ pub(super) fn build(
         },
     };
     if nodes < Grid::FEWEST_NODES {
-        return Err(
-            about_nodes(file, purpose, "this number of nodes cannot be used")
-                .found(nodes)
-                .expected(format!("{} or more", Grid::FEWEST_NODES)),
-        );
+        return Err(about_nodes(file, purpose, "invalid number of nodes")
+            .found(nodes)
+            .expected(format!("{} or more", Grid::FEWEST_NODES)));
     }
     fits_into_memory(file, purpose, nodes)?;
     Grid::new(start, duration, nodes).ok_or_else(|| {
-        file.error_at("grid", "the times make no grid")
+        file.error_at("grid", "invalid time axis")
             .found(format!("{nodes} nodes over {duration} s"))
             .expected("a positive duration whose steps are not zero")
     })
@@ -119,8 +117,8 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
     let measured = || records.iter().flatten().filter(|r| !r.channels.is_empty());
     let Some(first) = measured().next() else {
         let duration = asked.ok_or_else(|| {
-            file.error_at("grid", "the length of the motion is missing")
-                .expected("`duration` in s, since there are no readings to take it from")
+            file.error_at("grid", "the duration is missing")
+                .expected("`duration` in s, because there is no record")
         })?;
         return Ok((0.0, duration.0));
     };
@@ -133,7 +131,10 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
         && (asked.0 - duration).abs() > first.spacing() * 1e-6
     {
         return Err(file
-            .error_at("grid.duration", "the duration is not that of the readings")
+            .error_at(
+                "grid.duration",
+                "the duration differs from that of the records",
+            )
             .found(asked.0)
             .expected(format!("{duration} (or leave it out)")));
     }

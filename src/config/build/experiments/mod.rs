@@ -99,7 +99,7 @@ pub(super) fn read(
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
         return Err(file
-            .error_at("experiments", "every experiment is held out of the fit")
+            .error_at("experiments", "every experiment is a validation record")
             .found("`validation: true` in all of them")
             .expected("at least one experiment without"));
     }
