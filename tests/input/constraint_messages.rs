@@ -444,12 +444,12 @@ fn shapes_and_ranges() {
 #[test]
 fn values_at_times() {
     assert_snapshot!(message("[{function: mass, at: 0}]"), @"
-    m.yaml:11:36: constraints[0].at: `at` needs `value` beside it
+    m.yaml:11:36: constraints[0].at: `at` requires `value`
       found: `at` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
     assert_snapshot!(message("[{function: mass, value: 1}]"), @"
-    m.yaml:11:39: constraints[0].value: `value` needs `at` beside it
+    m.yaml:11:39: constraints[0].value: `value` requires `at`
       found: `value` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");

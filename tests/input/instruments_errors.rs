@@ -112,7 +112,7 @@ fn formats() {
     ");
     assert_snapshot!(told(TableFormat { skip: Some(9), ..any }), @"
     t.csv: the file is empty
-      found: nothing after the 9 lines that are skipped
+      found: nothing after 9 skipped lines
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(told(TableFormat { delimiter: Some('x'), ..any }), @"
