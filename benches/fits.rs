@@ -66,7 +66,7 @@ fn fits(criterion: &mut Criterion) {
 }
 
 /// What the program does before a fit.
-fn reading(criterion: &mut Criterion) {
+fn sample(criterion: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/knots.yaml");
     criterion.bench_function("read and build a model", |b| {
         b.iter(|| {
@@ -88,5 +88,5 @@ fn start_up(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, fits, reading, start_up);
+criterion_group!(benches, fits, sample, start_up);
 criterion_main!(benches);

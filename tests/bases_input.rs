@@ -48,7 +48,7 @@ fn basis(mass: &str) -> Basis {
 /// The mass at the nodes at the start.
 fn start(mass: &str) -> Vec<f64> {
     let functions = functions(mass);
-    functions.device(&functions.start()).mass
+    functions.nodal(&functions.start()).mass
 }
 
 #[track_caller]

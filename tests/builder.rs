@@ -5,7 +5,7 @@ use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
-use kmcfit_core::internals::constraints::{Shape, Statement};
+use kmcfit_core::internals::constraints::{Constraint, Shape};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
@@ -74,16 +74,16 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
     let built = Builder::new([mass, damping, stiffness])
         .record(paper_record())
         .method(Method::Midpoint)
-        .constrain(Statement::Value {
+        .constrain(Constraint::Value {
             of: CoefficientKind::Stiffness,
             at: 0.0,
             value: 1.0,
         })
-        .constrain(Statement::Shape {
+        .constrain(Constraint::Shape {
             of,
             shape: Shape::NonIncreasing,
         })
-        .penalize(Statement::Mean { of, value: 0.75 }, 10.0)
+        .penalize(Constraint::Mean { of, value: 0.75 }, 10.0)
         .build()
         .unwrap();
     same_way(&built, &written);
@@ -287,21 +287,21 @@ fn what_cannot_be_meant_is_refused() {
             "functions.mass.width: only Coulomb friction has a width",
         ),
         (
-            mass(one().min(2.0)).constrain(Statement::Mean { of, value: 1.0 }),
+            mass(one().min(2.0)).constrain(Constraint::Mean { of, value: 1.0 }),
             "constraints: these constraints contradict each other",
         ),
         (
-            mass(one()).penalize(Statement::Mean { of, value: 1.0 }, 0.0),
+            mass(one()).penalize(Constraint::Mean { of, value: 1.0 }, 0.0),
             "constraints[0].soft: the weight of a soft constraint must be positive\n  found: 0",
         ),
         (
-            mass(one()).penalize(Statement::DampingRatio { max: 0.1 }, 1.0),
+            mass(one()).penalize(Constraint::DampingRatio { max: 0.1 }, 1.0),
             "constraints[0].soft: a cap on the damping ratio cannot be soft",
         ),
         (
             Builder::new([CoefficientSpec::fixed(1.0), one(), one()])
                 .record(record())
-                .constrain(Statement::Mean { of, value: 1.0 }),
+                .constrain(Constraint::Mean { of, value: 1.0 }),
             "constraints[0]: mass is fixed, so it cannot be constrained",
         ),
         (

@@ -165,11 +165,11 @@ fn ended(path: &std::path::Path, text: &str, here: &str) -> String {
     let best = &found.best.evaluation;
     assert!(best.cost.is_finite(), "{here}");
     assert!(
-        best.device.functions().flatten().all(|p| p.is_finite()),
+        best.nodal.functions().flatten().all(|p| p.is_finite()),
         "{here}"
     );
     // An equation error whose minimum has no mass says so.
-    let has_mass = best.device.mass.iter().all(|m| *m > 0.0);
+    let has_mass = best.nodal.mass.iter().all(|m| *m > 0.0);
     let is_infeasible = found.outcome.status == Status::Infeasible;
     assert!(has_mass || is_infeasible, "{here}");
     if found.outcome.status != Status::Failed && !text.contains("equation-error") {

@@ -85,9 +85,9 @@ fn readings(
     let motion = system.forward(device, REST, excitation).unwrap();
     let view = SimulatedRecord {
         system,
-        device,
+        nodal: device,
         excitation,
-        motion: &motion,
+        response: &motion,
         scalars: &[],
     };
     let silent = channel(kind, grid, vec![0.0; grid.nodes()]);
@@ -168,7 +168,7 @@ fn slow_stiffness_under_an_unknown_force() {
         let found = run(&problem);
         let outcome = &found.outcome;
         assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
-        let found = &found.best.evaluation.device.coefficients[1];
+        let found = &found.best.evaluation.nodal.coefficients[1];
         let inner = NODES / 30..NODES - NODES / 30;
         let errors: Vec<f64> = inner
             .map(|i| (found[i] / k[i]).max(0.0).sqrt() - 1.0)
@@ -304,7 +304,7 @@ fit: {{method: equation-error}}
     for i in 0..nodes {
         let envelope = (acceleration[i] - mean).hypot(w * motion.velocity[i]);
         if times[i] > 0.8 && times[i] < 11.5 && envelope > 0.02 {
-            let k = evaluation.device.coefficients[1][i];
+            let k = evaluation.nodal.coefficients[1][i];
             errors.push(k.max(0.0).sqrt() / TAU - reference[i]);
         }
     }
@@ -562,7 +562,7 @@ fn model_files() {
     let weight = built.problem.penalties[0].weight;
     assert!((weight / (0.5 * TAU * TAU) - 1.0).abs() < 0.1, "{weight}");
     let found = run(&built.problem);
-    let k = &found.best.evaluation.device.coefficients[1];
+    let k = &found.best.evaluation.nodal.coefficients[1];
     assert!(k.iter().all(|k| (k - 1.0).abs() < 1e-2), "{k:?}");
     let solver = built.settings.solver;
     assert_eq!(

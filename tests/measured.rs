@@ -100,7 +100,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     };
     let rms = rms_degrees(&model, &run);
     assert!(rms <= 0.026, "{rms}");
-    let device = &run.best.evaluation.device;
+    let device = &run.best.evaluation.nodal;
     let [linear, _, _, quadratic] = [0, 1, 2, 3].map(|j| device.coefficients[j][0]);
     let inertia = device.mass[0];
     assert!((inertia / 135.75 - 1.0).abs() <= 0.01, "{inertia}");
@@ -128,7 +128,7 @@ fn the_roll_decay_with_damping_over_time() {
         let rms = rms_degrees(&model, &run);
         assert!(rms <= 0.026, "{knots} knots: {rms}");
         let grid = &model.problem.system.grid;
-        let damping = &run.best.evaluation.device.coefficients[0];
+        let damping = &run.best.evaluation.nodal.coefficients[0];
         let at = |t: f64| damping[(t / grid.step()).round() as usize];
         assert!((at(10.0) - 4.8).abs() <= 0.3, "{knots} knots: {}", at(10.0));
         assert!(

@@ -89,7 +89,7 @@ const KNOWN: &str = "{fixed: 1.5}";
 
 /// The largest relative error of the constants that are fitted.
 fn error(run: &Fit) -> f64 {
-    let device = &run.best.evaluation.device;
+    let device = &run.best.evaluation.nodal;
     let found = [
         device.mass[0],
         device.coefficients[0][0],
@@ -129,7 +129,7 @@ fn a_window_of_a_file_without_names() {
     let ignored = &model.notes[0][0].ignored;
     assert_eq!(ignored[0], (1000, "outside the window".to_owned()));
     assert_eq!(ignored[1], (1, "missing".to_owned()));
-    assert_eq!(model.problem.reading_count(), 800);
+    assert_eq!(model.problem.sample_count(), 800);
 }
 
 /// A tone far above the motion that would be folded into it.
@@ -148,7 +148,7 @@ fn decimation_and_band() {
     let decimated = format!("{plain}\n    decimate: 10");
     let (model, run) = fitted(&text, &decimated, KNOWN);
     assert!(error(&run) < 5e-3, "{}", error(&run));
-    assert_eq!(model.problem.reading_count(), 401);
+    assert_eq!(model.problem.sample_count(), 401);
     // The band filters the model alike, edges included, and leaves of the hum only what its sudden
     // beginning and end have in the band.
     let band = format!("{plain}\n    band: {{max: 20.0}}");

@@ -14,7 +14,7 @@ static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Provides the functions of the host.
 pub fn provide_host() {
-    host::provide(Host {
+    host::set_host(Host {
         clock: || START.elapsed(),
         has_memory: |bytes| memory::check(bytes).is_ok(),
         may_start_thread: || faults::check(Operation::Spawn),

@@ -15,7 +15,7 @@ use console::Term;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
-    choose_weight_watched, fit_with_noise_watched, without_motion,
+    choose_weight_watched, fit_with_noise_watched, no_response,
 };
 use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
@@ -266,7 +266,7 @@ pub(super) fn search(
         (Some(as_fitted), path, fit)
     });
     let result = result.or_else(|breakdown| {
-        let fit = without_motion(problem, &model.given_start, settings, breakdown)?;
+        let fit = no_response(problem, &model.given_start, settings, breakdown)?;
         Ok((None, None, fit))
     });
     result
@@ -275,7 +275,7 @@ pub(super) fn search(
 
 /// Predictions of the model file; a failed one has its reason.
 fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
-    let device = &found.best.evaluation.device;
+    let device = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {
         let motions = predict(system, device, model.truth.as_ref(), &[*state]);

@@ -3,7 +3,7 @@
 use super::{Failure, OK, print, unwritable};
 use crate::error::InputError;
 use crate::report::{
-    CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
+    CsvTable, PredictedResponse, Run, figures, json, predict, prediction_table, render,
 };
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::system::State;
@@ -81,13 +81,13 @@ fn state(text: &str) -> Result<State, InputError> {
 fn write(
     folder: &OutputFolder,
     times: &[f64],
-    motions: &[PredictedMotion],
+    motions: &[PredictedResponse],
     unit: &str,
 ) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
     for (i, motion) in motions.iter().enumerate() {
         let header = format!("y_{unit}_{}", i + 1);
-        table = table.column(header, motion.motion.displacement.clone());
+        table = table.column(header, motion.response.displacement.clone());
         if let Some(truth) = &motion.truth {
             table = table.column(
                 format!("true_y_{unit}_{}", i + 1),

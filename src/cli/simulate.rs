@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         check_place(out, &file)?;
     }
     let experiment = chosen(arguments, &problem.experiments)?;
-    if experiment.sought != [None; 2] {
+    if experiment.initial_parameters != [None; 2] {
         return Err(file
             .error_at(
                 "experiments",
@@ -68,11 +68,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             .expected("an experiment with an initial state in numbers")
             .into());
     }
-    let mut device = problem.functions.empty_device();
+    let mut device = problem.functions.empty_nodal();
     let start = problem.start();
     problem
         .functions
-        .device_into(&start, experiment.device, &mut device);
+        .nodal_into(&start, experiment.coefficient_set, &mut device);
     let motion = problem
         .system
         .forward(&device, experiment.initial, experiment.excitation.as_ref())

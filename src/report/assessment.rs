@@ -7,7 +7,9 @@ use super::known::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{FunctionSummary, function_summaries};
-use kmcfit_core::internals::identifiability::{Judgement, Verdict, count};
+use kmcfit_core::internals::identifiability::{
+    Classification, FunctionClassification, structural_rank,
+};
 use std::collections::BTreeMap;
 
 impl FittedModel<'_> {
@@ -26,7 +28,7 @@ impl FittedModel<'_> {
             summary.warnings.push(Finding::new("equation_error", text));
             return summary;
         };
-        let count = count(problem);
+        let count = structural_rank(problem);
         summary.rank_bound = count.seen_at_most;
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
@@ -35,7 +37,8 @@ impl FittedModel<'_> {
         }
         let judgements = &assessment.judgements;
         // Constraints and penalties may determine what the records do not.
-        let all_identified = !judgements.is_empty() && !judgements.iter().any(Judgement::is_open);
+        let all_identified =
+            !judgements.is_empty() && !judgements.iter().any(FunctionClassification::is_open);
         if count.seen_at_most < count.of && !all_identified {
             let finding = Finding::new("rank_bound", count.headline());
             let finding = finding.with("rank_bound", count.seen_at_most);
@@ -49,7 +52,7 @@ impl FittedModel<'_> {
             add(finding.is_warning(), findings::rank(finding));
         }
         for judgement in judgements {
-            if judgement.verdict != Verdict::Fixed {
+            if judgement.verdict != Classification::Fixed {
                 add(judgement.is_open(), findings::classification(judgement));
             }
         }

@@ -147,7 +147,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn ratios_figure(&self) -> Figure {
-        let found = Ratios::of(&self.fit.best.evaluation.device);
+        let found = Ratios::of(&self.fit.best.evaluation.nodal);
         let truth = self.model.truth.as_ref().map(Ratios::of);
         let times = self.model.problem.system.grid.times();
         let bands = self

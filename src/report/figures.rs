@@ -5,7 +5,7 @@ use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
-use kmcfit_core::internals::study::PredictedMotion;
+use kmcfit_core::internals::study::PredictedResponse;
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
@@ -289,7 +289,7 @@ pub fn ratios(
 
 /// The motion from other initial states, one panel each, and the true one where known; times in s,
 /// displacements in m.
-pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
+pub fn predictions(t: &[f64], motions: &[PredictedResponse]) -> Figure {
     Figure::new(
         "predictions",
         "Predictions",
@@ -300,7 +300,7 @@ pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
         let (y, v) = (state.displacement, state.velocity);
         Panel::of_time("displacement y", "m")
             .title(format!("from y = {y} m, v = {v} m/s"))
-            .mark(found("predicted", t, &predicted.motion.displacement))
+            .mark(found("predicted", t, &predicted.response.displacement))
             .marks(predicted.truth.as_ref().map(|m| truth(t, &m.displacement)))
     }))
 }

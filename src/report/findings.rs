@@ -2,7 +2,9 @@
 
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{FitWarning, Unidentified};
-use kmcfit_core::internals::identifiability::{Judgement, RankFinding, Verdict};
+use kmcfit_core::internals::identifiability::{
+    Classification, FunctionClassification, RankFinding,
+};
 use kmcfit_core::internals::study::multistart;
 
 /// A finding on the structural rank.
@@ -13,15 +15,15 @@ pub fn rank(finding: &RankFinding) -> Finding {
 
 /// The classification of a function or ratio, with the half-width of its band relative to its scale, the identified
 /// ratio, or the spans of time on which it is identified, s.
-pub fn classification(judgement: &Judgement) -> Finding {
+pub fn classification(judgement: &FunctionClassification) -> Finding {
     let verdict = &judgement.verdict;
     let finding = Finding::new(verdict.name().replace('-', "_"), &*judgement.sentence);
     let finding = finding.with("function", &judgement.name);
     match verdict {
-        Verdict::Identified { relative } => finding.with("relative_half_width", relative),
-        Verdict::OnlyRatio(ratio) => finding.with("ratio", ratio),
-        Verdict::PartlyIdentified(spans) => finding.with("spans", spans),
-        Verdict::NotIdentified | Verdict::Fixed => finding,
+        Classification::Identified { relative } => finding.with("relative_half_width", relative),
+        Classification::OnlyRatio(ratio) => finding.with("ratio", ratio),
+        Classification::PartlyIdentified(spans) => finding.with("spans", spans),
+        Classification::NotIdentified | Classification::Fixed => finding,
     }
 }
 
@@ -89,8 +91,8 @@ pub fn warning(warning: &FitWarning) -> Finding {
 }
 
 /// A finding of fits from so many starting points.
-pub fn of_starts(finding: &multistart::Finding, starts: usize) -> Finding {
-    use multistart::Finding as Starts;
+pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
+    use multistart::MultistartFinding as Starts;
     match finding {
         Starts::Nowhere => {
             let text = format!("no fit from the {starts} starting points reached a minimum");

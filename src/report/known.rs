@@ -7,7 +7,7 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
-use kmcfit_core::internals::solvers::{Fit, Solver, predict_held_out};
+use kmcfit_core::internals::solvers::{Fit, Solver, predict_validation};
 use nalgebra::DMatrix;
 
 /// Assessment of a fit, computed once for all its documents.
@@ -61,7 +61,7 @@ impl ValidationRecord {
     fn of(model: &Model, fit: &Fit, out: &HoldOut) -> Self {
         Self {
             out: out.clone(),
-            found: predict_held_out(
+            found: predict_validation(
                 &model.problem,
                 &fit.best.evaluation,
                 &out.experiment,

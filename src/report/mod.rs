@@ -46,7 +46,7 @@ pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use finished::Run;
-pub use kmcfit_core::internals::study::{PredictedMotion, predict};
+pub use kmcfit_core::internals::study::{PredictedResponse, predict};
 pub use known::Known;
 pub(crate) use page::shell_quoted;
 pub use run::{FittedModel, fit_claim, json};

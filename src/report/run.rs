@@ -163,7 +163,7 @@ impl FittedModel<'_> {
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.parameters(),
-            terms: (problem.functions.assembly(0).iter().skip(1))
+            terms: (problem.functions.coefficient_set(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
             friction_width: problem.system.terms.iter().find_map(|t| match t {
@@ -258,7 +258,7 @@ impl FittedModel<'_> {
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
-                    readings: experiment.reading_count(),
+                    readings: experiment.sample_count(),
                     rms_residual: channels
                         .first()
                         .map_or(f64::NAN, |first| factor * first.rms_residual),

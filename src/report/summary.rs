@@ -7,7 +7,7 @@ use crate::finding::Finding;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::diagnostics::NORMAL_975;
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::VerdictKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
@@ -126,11 +126,11 @@ fn estimate((name, f): (&str, &FunctionSummary)) -> String {
     if f.negligible {
         return format!("{symbol} = 0 {unit}");
     }
-    if f.verdict == Some(VerdictKind::NotIdentified) {
+    if f.verdict == Some(ClassificationKind::NotIdentified) {
         return format!("{symbol}: not identifiable");
     }
     let fixed = match f.verdict {
-        Some(VerdictKind::Fixed) => " (fixed)",
+        Some(ClassificationKind::Fixed) => " (fixed)",
         _ => "",
     };
     if let (Some(error), true) = (f.standard_error, f.min == f.max) {
@@ -139,7 +139,7 @@ fn estimate((name, f): (&str, &FunctionSummary)) -> String {
         return format!("{symbol} = {value} {unit} (95 % CI {low} to {high})");
     }
     let (range, span) = match f.identified_range {
-        Some(range) if f.verdict == Some(VerdictKind::PartlyIdentified) => {
+        Some(range) if f.verdict == Some(ClassificationKind::PartlyIdentified) => {
             (range, " where identified")
         }
         _ => ([f.min, f.max], " over the record"),
@@ -224,7 +224,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         write!(
             text,
             "chi-square per degree of freedom {reduced:.4} ({} samples, {} parameters)",
-            statistics.readings, statistics.parameters
+            statistics.samples, statistics.parameters
         )?;
         match (statistics.aic, statistics.bic) {
             (Some(aic), Some(bic)) => writeln!(text, ", AIC {aic:.2}, BIC {bic:.2}")?,
@@ -235,7 +235,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         Some(half) => writeln!(
             text,
             "step-size check: halving the step changes the response by at most {} % of its peak",
-            significant(100.0 * half.change_per_reading, 2)
+            significant(100.0 * half.change_per_sample, 2)
         ),
         None if !document.is_simulated() => Ok(()),
         None => writeln!(text, "step-size check: no response with half the step"),
@@ -335,7 +335,7 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        let is_identifiable = function.verdict != Some(VerdictKind::NotIdentified);
+        let is_identifiable = function.verdict != Some(ClassificationKind::NotIdentified);
         match function.standard_error.filter(|_| !function.negligible) {
             _ if !is_identifiable => write!(text, "  not identifiable")?,
             Some(error) => write!(text, "  s.e. {error:.2e}")?,

@@ -29,7 +29,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn functions_table(&self) -> CsvTable {
-        let device = &self.fit.best.evaluation.device;
+        let device = &self.fit.best.evaluation.nodal;
         let times = self.model.problem.system.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
         for (function, values) in self.named_functions() {

@@ -126,7 +126,9 @@ fn what_to_try_next_helps() {
         let pattern = first.quantities["pattern"].clone();
         let pattern: ResidualPattern = serde_json::from_value(pattern).expect("a pattern");
         let is_named = match pattern {
-            ResidualPattern::Outliers { readings, .. } => readings == 3 && cure.contains("huber"),
+            ResidualPattern::Outliers {
+                samples: readings, ..
+            } => readings == 3 && cure.contains("huber"),
             ResidualPattern::Offset => !cure.contains("drift"),
             ResidualPattern::Drift => cure.contains("drift"),
             ResidualPattern::Tone { .. } => false,

@@ -413,7 +413,7 @@ pub fn fit_journal(bytes: &[u8]) -> Verdict {
         Ok(mut journal) => {
             let found = fitted(model, &mut journal);
             assert!(found.best.evaluation.cost.is_finite());
-            assert!(found.best.evaluation.device.mass.iter().all(|m| *m > 0.0));
+            assert!(found.best.evaluation.nodal.mass.iter().all(|m| *m > 0.0));
             Verdict::Accepted
         }
     }

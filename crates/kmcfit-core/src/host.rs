@@ -20,7 +20,7 @@ pub struct Host {
 static HOST: OnceLock<Host> = OnceLock::new();
 
 /// Provides the functions of the host, for the rest of the process; later calls change nothing.
-pub fn provide(host: Host) {
+pub fn set_host(host: Host) {
     let _ = HOST.set(host);
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn may_start_thread() -> io::Result<()> {
 pub(crate) fn provide_clock() {
     static START: std::sync::LazyLock<std::time::Instant> =
         std::sync::LazyLock::new(std::time::Instant::now);
-    provide(Host {
+    set_host(Host {
         clock: || START.elapsed(),
         has_memory: |_| true,
         may_start_thread: || Ok(()),

@@ -1,7 +1,7 @@
 //! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
-use crate::functions::{CoefficientKind, Parameterization, Penalty, Variation};
+use crate::functions::{CoefficientKind, Parameterization, Penalty, TotalVariation};
 use crate::record::{Channel, Experiment, Weighting};
 use crate::rows::Rows;
 use crate::system::System;
@@ -23,7 +23,7 @@ pub struct ProblemParts {
     /// Penalties on roughness.
     pub penalties: Vec<Penalty>,
     /// Penalties on total variation.
-    pub variations: Vec<Variation>,
+    pub variations: Vec<TotalVariation>,
     /// Constraints on the functions.
     pub constraints: Constraints,
     /// Constraints that may be violated at a penalty.
@@ -91,7 +91,7 @@ impl ProblemParts {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let terms = self.system.terms.len();
-        for found in self.functions.assemblies().iter().map(Vec::len) {
+        for found in self.functions.coefficient_sets().iter().map(Vec::len) {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
             }
@@ -137,14 +137,14 @@ impl ProblemParts {
     fn mismatch(&self, record: &Experiment) -> Option<&'static str> {
         let scalars = self.functions.scalars().len();
         let sensors = record.channels.iter().flat_map(|c| c.sensor().indices());
-        let mut indices = sensors.chain(record.sought).flatten();
+        let mut indices = sensors.chain(record.initial_parameters).flatten();
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         match () {
             () if !(2..=self.system.grid.nodes()).contains(&record.nodes) => {
                 Some("fewer than two nodes, or more than the grid has")
             }
-            () if record.device >= self.functions.assemblies().len() => {
+            () if record.coefficient_set >= self.functions.coefficient_sets().len() => {
                 Some("a set of functions that is not there")
             }
             () if indices.any(|i| i >= scalars) => Some("a nuisance parameter that is not there"),
@@ -215,7 +215,7 @@ impl Problem {
     ///
     /// # Errors
     /// As [`Problem::penalize`].
-    pub fn penalize_variation(&mut self, variation: Variation) -> Result<(), ProblemError> {
+    pub fn penalize_variation(&mut self, variation: TotalVariation) -> Result<(), ProblemError> {
         self.check_penalty(variation.function, &variation.rows)?;
         self.0.variations.push(variation);
         Ok(())
@@ -238,7 +238,7 @@ impl Problem {
     /// If `theta` has another number of parameters.
     pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
         let functions = &self.functions;
-        let mut shared = functions.assembly(0).iter();
+        let mut shared = functions.coefficient_set(0).iter();
         let index = *shared.find(|&&f| functions.get(f).quantity == kind)?;
         let mut values = vec![0.0; functions.nodes()];
         let range = functions.ranges()[index].clone();
@@ -269,18 +269,18 @@ impl Problem {
         self.experiments.iter().flat_map(|e| &e.channels)
     }
 
-    /// Number of readings of all experiments.
-    pub fn reading_count(&self) -> usize {
+    /// Number of samples of all experiments.
+    pub fn sample_count(&self) -> usize {
         self.channels().map(Channel::len).sum()
     }
 
-    /// The misfit of no motion at all: what there is to explain.
+    /// The misfit of no response at all: what there is to explain.
     pub fn zero_response_misfit(&self) -> f64 {
         let silence = |c: &Channel| c.cost(&vec![0.0; c.len()]);
         self.channels().map(silence).sum()
     }
 
-    /// The same problem with only the first part of the readings, `share` of the time of each
+    /// The same problem with only the first part of the samples, `share` of the time of each
     /// record.
     #[must_use]
     pub fn truncated(&self, share: f64) -> Self {
@@ -297,7 +297,7 @@ impl Problem {
         part
     }
 
-    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading of the
+    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one sample of the
     /// displacement per node, over the whole grid.
     pub fn supports_continuous(&self) -> bool {
         let nodes = self.system.grid.nodes();

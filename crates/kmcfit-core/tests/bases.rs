@@ -532,8 +532,8 @@ fn coefficient_functions_of_every_basis() {
         })
         .collect();
     let functions = Parameterization::new(list, 41, grid.step()).unwrap();
-    let device = functions.device(&functions.start());
-    for values in device.functions() {
+    let nodal = functions.nodal(&functions.start());
+    for values in nodal.functions() {
         assert_close(values, &[2.0; 41], 1e-15, "start");
     }
     let nodal = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 41]);

@@ -4,7 +4,7 @@
 mod common;
 
 use common::properties::properties;
-use common::{add_physics, errors, paper_device, paper_problem};
+use common::{add_physics, errors, paper_problem, paper_system};
 use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::qp::Subproblem;
@@ -183,7 +183,7 @@ fn tens_of_thousands_of_values_take_no_more_work_than_thousands() {
         // The bound on the damping is touched everywhere and pushed nowhere: no program is needed.
         assert_eq!(found.counts.qp, 0, "{nodes}");
         assert!(found.history.len() <= 3, "{nodes}: {}", found.history.len());
-        let errors = errors(&found.best.evaluation.device, &paper_device(nodes));
+        let errors = errors(&found.best.evaluation.nodal, &paper_system(nodes));
         assert!(errors.iter().all(|e| *e < 1e-11), "{nodes}: {errors:?}");
     }
 }

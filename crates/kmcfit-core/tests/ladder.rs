@@ -13,13 +13,13 @@ use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
 };
 
-/// Nodes from one reading to the next.
+/// Nodes from one sample to the next.
 const STRIDE: usize = 20;
 const READINGS: usize = 121;
 const STIFFNESS: f64 = 101.0;
 
-/// 40 periods with three readings each, and only the stiffness to be found. Differences of so few
-/// readings take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
+/// 40 periods with three samples each, and only the stiffness to be found. Differences of so few
+/// samples take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
 /// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
 fn problem() -> Problem {
     let nodes = STRIDE * (READINGS - 1) + 1;
@@ -32,10 +32,10 @@ fn problem() -> Problem {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
-    let observed: Vec<f64> = motion.displacement.into_iter().step_by(STRIDE).collect();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let observed: Vec<f64> = response.displacement.into_iter().step_by(STRIDE).collect();
     let step = system.grid.step();
-    // Known to be free of noise: so few readings look like noise to a rule that does not know.
+    // Known to be free of noise: so few samples look like noise to a rule that does not know.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
@@ -81,7 +81,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     assert!(costs[2] < 1e-12 * silence, "{costs:?} {silence}");
     assert_eq!(found.best.evaluation.cost, costs[2]);
     assert_eq!(found.outcome.status, Status::Converged);
-    // Rounding of the motion, 2400 steps, over its sensitivity.
+    // Rounding of the response, 2400 steps, over its sensitivity.
     let error = (found.best.parameters[0] / STIFFNESS - 1.0).abs();
     assert!(error < 1e-8, "{error}");
     // Every search takes a gradient at its start and one after each iteration; those of the three parts
@@ -118,7 +118,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![truth[0]; nodes],
         coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
     };
@@ -134,8 +134,8 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         displacement: 0.0,
         velocity: 0.0,
     };
-    let motion = system.forward(&device, rest, Some(&excitation)).unwrap();
-    let observed = motion.displacement.into_iter().step_by(4).collect();
+    let response = system.forward(&nodal, rest, Some(&excitation)).unwrap();
+    let observed = response.displacement.into_iter().step_by(4).collect();
     let weighting = Weighting::Sigma(1e-4);
     let channel = Channel::displacement_at_nodes(observed, 4, weighting, &system.grid);
     let experiment = Experiment::free("two sines", rest, nodes)
@@ -204,7 +204,7 @@ fn a_silent_beginning_says_nothing() {
     }
 }
 
-/// Parts of a record have no reading at every node of the grid, which the continuous gradient needs: the fits of parts have
+/// Parts of a record have no sample at every node of the grid, which the continuous gradient needs: the fits of parts have
 /// the discrete one.
 #[test]
 fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {

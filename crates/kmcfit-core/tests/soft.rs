@@ -16,7 +16,7 @@ const NODES: usize = 201;
 fn problem() -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let grid = system.grid;
-    let observed = common::noisy(&system, &common::paper_device(NODES), 0.05, 5);
+    let observed = common::noisy(&system, &common::paper_system(NODES), 0.05, 5);
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 6),
     };

@@ -335,7 +335,7 @@ fn function(
     key: &str,
     quantity: FunctionName,
 ) -> Result<usize, InputError> {
-    let main = problem.functions.assembly(0);
+    let main = problem.functions.coefficient_set(0);
     let of = |f: &&usize| problem.functions.get(**f).quantity == quantity;
     let (key, name) = (format!("{key}.function"), quantity.name());
     match main.iter().find(of) {

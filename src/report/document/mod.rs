@@ -12,7 +12,7 @@ use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
-pub use kmcfit_core::internals::study::Prediction;
+pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

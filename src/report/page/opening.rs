@@ -8,7 +8,7 @@ use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::identifiability::VerdictKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
@@ -94,7 +94,7 @@ fn estimates(document: &ResultDocument) -> String {
     }
     let known = |x: Option<f64>| x.map_or(String::new(), number);
     let row = |(name, f): &(&str, &FunctionSummary)| {
-        let is_identifiable = f.verdict != Some(VerdictKind::NotIdentified);
+        let is_identifiable = f.verdict != Some(ClassificationKind::NotIdentified);
         let [low, high] = match (is_identifiable, f.negligible) {
             (false, _) => [String::new(), String::new()],
             (true, true) => [number(0.0), number(0.0)],
@@ -116,13 +116,13 @@ fn estimates(document: &ResultDocument) -> String {
 }
 
 /// A classification as an entry of the table.
-fn verdict_in_words(verdict: Option<VerdictKind>) -> &'static str {
+fn verdict_in_words(verdict: Option<ClassificationKind>) -> &'static str {
     match verdict {
-        Some(VerdictKind::Identified) => "yes",
-        Some(VerdictKind::OnlyRatio) => "ratio only",
-        Some(VerdictKind::PartlyIdentified) => "partly",
-        Some(VerdictKind::NotIdentified) => "no",
-        Some(VerdictKind::Fixed) => "fixed",
+        Some(ClassificationKind::Identified) => "yes",
+        Some(ClassificationKind::OnlyRatio) => "ratio only",
+        Some(ClassificationKind::PartlyIdentified) => "partly",
+        Some(ClassificationKind::NotIdentified) => "no",
+        Some(ClassificationKind::Fixed) => "fixed",
         None => "",
     }
 }

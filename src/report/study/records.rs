@@ -9,15 +9,19 @@ use kmcfit_core::internals::diagnostics::{chi_square_one, normal_half_width};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
     self, Band, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, anchors,
-    rank_experiments, residual_spread, verdicts,
+    classify_functions, rank_experiments, residual_spread,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::study::bootstrap::{NoRefits, Noise, NumberInterval, intervals};
+use kmcfit_core::internals::study::bootstrap::{
+    NoRefits, NumberInterval, ReplicateNoise, intervals,
+};
+use kmcfit_core::internals::study::constancy_test::{
+    ConstancySettings, ConstancyTest, constancy_tests,
+};
+use kmcfit_core::internals::study::extremes::{Extreme, ExtremeStatus, MisfitLimit, envelopes};
 use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
 use kmcfit_core::internals::study::profile::{Interval, ProfileSettings};
-use kmcfit_core::internals::study::pull_apart::{Ended, Extreme, Level, envelopes};
-use kmcfit_core::internals::study::variation::{Asking, Varies, variation};
 use kmcfit_core::internals::study::{
     Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
 };
@@ -32,7 +36,7 @@ const DRAWS: usize = 10_000;
 
 /// Findings on the structural rank of a problem, the rank bound first.
 pub fn structural_rank(problem: &Problem) -> Vec<Finding> {
-    let count = identifiability::count(problem);
+    let count = identifiability::structural_rank(problem);
     let bound = Finding::new("rank_bound", count.headline());
     let bound = bound.with("rank_bound", count.seen_at_most);
     let bound = bound.with("parameters", count.of);
@@ -96,7 +100,7 @@ pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -
     let factor = normal_half_width(plan.confidence);
     let plausibility = Plausibility::at(problem, evaluation);
     let judged = match plausibility.errors_hold {
-        true => verdicts(problem, evaluation, &bands),
+        true => classify_functions(problem, evaluation, &bands),
         false => Vec::new(),
     };
     let mut notes = bands.notes.clone();
@@ -202,7 +206,7 @@ pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfileR
 /// Candidate experiments, the most informative first.
 pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
     let spread = residual_spread(at.problem, at.evaluation);
-    let described = list.iter().map(|c| identifiability::Candidate {
+    let described = list.iter().map(|c| identifiability::CandidateExperiment {
         name: c.name.clone(),
         initial: c.experiment.initial,
         excitation: c.experiment.excitation.clone(),
@@ -239,14 +243,14 @@ pub fn equivalent(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentSystemReco
     };
     let choices: Vec<Choice> = asked.iter().map(choice).collect();
     let record = |found: EquivalentSystem| {
-        let mut coefficients = found.device.coefficients.into_iter();
+        let mut coefficients = found.nodal.coefficients.into_iter();
         EquivalentSystemRecord {
             name: found.name,
             times: at.problem.system.grid.times(),
-            mass: found.device.mass,
+            mass: found.nodal.mass,
             damping: coefficients.next().unwrap_or_default(),
             stiffness: coefficients.next().unwrap_or_default(),
-            response_error: found.motion_error,
+            response_error: found.response_error,
         }
     };
     let found = equivalent_systems(at.problem, at.evaluation, &choices);
@@ -269,7 +273,7 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
     let waterfall = multistart::multistart(problem, &how);
     let tolerance = multistart::Distance {
         ratios: plan.merge_tolerance,
-        motions: plan.merge_tolerance,
+        responses: plan.merge_tolerance,
     };
     let clusters = waterfall.clusters(problem, tolerance);
     let findings = waterfall.findings(problem, at.theta, &clusters);
@@ -297,14 +301,15 @@ pub fn constancy_test(
     plan: &StudyPlan,
     threads: usize,
 ) -> Result<Vec<ConstancyRecord>, String> {
-    let asking = Asking {
+    let asking = ConstancySettings {
         level: 1.0 - plan.confidence,
         seed: plan.seed,
         threads,
-        ..Asking::default()
+        ..ConstancySettings::default()
     };
-    let found = variation(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
-    let record = |v: Varies| ConstancyRecord {
+    let found =
+        constancy_tests(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
+    let record = |v: ConstancyTest| ConstancyRecord {
         text: v.sentence(),
         p_value: v.p_value,
         name: v.function,
@@ -322,8 +327,8 @@ pub fn refits(
     threads: usize,
 ) -> Result<Vec<BootstrapRecord>, String> {
     let noise = match plan.residual_noise {
-        true => Noise::Residual,
-        false => Noise::Parametric,
+        true => ReplicateNoise::Residual,
+        false => ReplicateNoise::Parametric,
     };
     let profiled = plan.profiles.iter().filter_map(|t| linear(at.problem, t));
     let how = (noise, plan.replicates, plan.seed);
@@ -359,7 +364,7 @@ pub fn extremes(
     threads: usize,
 ) -> (Vec<ExtremesRecord>, Vec<PredictionRecord>) {
     let plan = &model.study;
-    let level = Level::at(
+    let level = MisfitLimit::at(
         at.problem,
         at.theta,
         at.evaluation,
@@ -390,12 +395,12 @@ pub fn extremes(
 }
 
 /// End of the search for an extreme.
-fn status(ended: Ended) -> ExtremeSearch {
+fn status(ended: ExtremeStatus) -> ExtremeSearch {
     match ended {
-        Ended::Settled => ExtremeSearch::Converged,
-        Ended::Reach => ExtremeSearch::RangeLimit,
-        Ended::Stuck => ExtremeSearch::Stalled,
-        Ended::Programs => ExtremeSearch::IterationLimit,
+        ExtremeStatus::Converged => ExtremeSearch::Converged,
+        ExtremeStatus::SearchLimit => ExtremeSearch::RangeLimit,
+        ExtremeStatus::NoFeasibleStep => ExtremeSearch::Stalled,
+        ExtremeStatus::ProgramLimit => ExtremeSearch::IterationLimit,
     }
 }
 
@@ -403,19 +408,23 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
     let covariance = at.problem.covariance(at.evaluation);
     let free = model.predictions.iter().map(|state| {
         let (y, v) = (state.displacement, state.velocity);
-        prediction::Run::free(format!("from y = {y} m, v = {v} m/s"), *state)
+        prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), *state)
     });
-    let candidates = model.study.candidates.iter().map(|c| prediction::Run {
-        excitation: c.experiment.excitation.clone(),
-        ..prediction::Run::free(format!("`{}`", c.name), c.experiment.initial)
-    });
+    let candidates = model
+        .study
+        .candidates
+        .iter()
+        .map(|c| prediction::PredictionCase {
+            excitation: c.experiment.excitation.clone(),
+            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.experiment.initial)
+        });
     let each = free.chain(candidates).filter_map(|run| {
         let covariance = covariance.as_ref();
         let found = prediction::predict(at.problem, at.theta, &run, covariance, extremes).ok()?;
         Some(PredictionRecord {
             name: found.name,
             times: found.times,
-            displacement: found.motion.displacement,
+            displacement: found.response.displacement,
             band: found.band,
             envelope: found.worst,
             furthest: (found.furthest)

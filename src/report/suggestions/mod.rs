@@ -183,8 +183,8 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
         false => half.change_per_residual,
     };
     // A step-size error of a tenth of the residuals is acceptable.
-    let times = (half.change_per_reading / COARSE).max(10.0 * beside_residuals);
-    if half.change_per_reading <= COARSE && beside_residuals <= 1.0 {
+    let times = (half.change_per_sample / COARSE).max(10.0 * beside_residuals);
+    if half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
     let stepper = match document.model.stepper == Method::Midpoint.name() {

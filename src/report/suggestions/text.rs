@@ -150,7 +150,10 @@ fn write_pattern(
     pattern: &ResidualPattern,
 ) -> fmt::Result {
     match pattern {
-        ResidualPattern::Outliers { readings, first } => {
+        ResidualPattern::Outliers {
+            samples: readings,
+            first,
+        } => {
             match readings {
                 1 => write!(f, "{channel}: one outlier, at {first} s")?,
                 _ => write!(f, "{channel}: {readings} outliers, the first at {first} s")?,

@@ -5,10 +5,10 @@ use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 use serde::{Deserialize, Serialize};
 
-/// Residuals below this share of the largest reading are rounding.
+/// Residuals below this share of the largest sample are rounding.
 const ROUNDING: f64 = 1e-6;
 /// Half of the energy of a tone lies within this share of its frequency, which is further than that other share from
-/// that of the readings.
+/// that of the samples.
 const NARROW: f64 = 0.15;
 const APART: f64 = 0.25;
 /// A multiple of a frequency is met to within this share.
@@ -24,7 +24,7 @@ pub enum ResidualPattern {
     #[serde(rename = "far-off")]
     Outliers {
         /// Number of outliers.
-        readings: usize,
+        samples: usize,
         /// Time of the first, s.
         first: f64,
     },
@@ -55,7 +55,7 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     let far = far_off(&residuals);
     if let (Some(first), Loss::Squares) = (far.first(), channel.loss()) {
         return Some(ResidualPattern::Outliers {
-            readings: far.len(),
+            samples: far.len(),
             first: channel.times()[*first],
         });
     }
@@ -67,14 +67,14 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     }
 }
 
-/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the readings', nor
+/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the samples', nor
 /// a multiple of it, which is the nonlinearity's. Without a sigma nothing says that residuals are more than what a descent
 /// has left.
 fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
     channel.weighting().sigma(0)?;
     let spacing = even_spacing(channel.times())?;
-    let [own, readings] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
-    let (own, beside) = (own?, readings?.dominant());
+    let [own, samples] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
+    let (own, beside) = (own?, samples?.dominant());
     let [low, high] = own.band(HALF);
     let frequency = own.dominant();
     let is_narrow = high - low <= NARROW * frequency.max(own.resolution());

@@ -3,7 +3,7 @@
 use super::{FitAssessment, constant_probability, standard_error};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{VerdictKind, is_rounding, is_unhindered};
+use crate::identifiability::{ClassificationKind, is_rounding, is_unhindered};
 use crate::problem::Problem;
 use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
-    /// SI unit: that of a motion along a line, unless it is changed.
+    /// SI unit: that of a response along a line, unless it is changed.
     #[serde(default)]
     pub unit: String,
     /// Smallest value at a node.
@@ -31,16 +31,16 @@ pub struct FunctionSummary {
     /// What is known of it: `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`; for models of few free values
     /// whose errors can be believed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<VerdictKind>,
+    pub verdict: Option<ClassificationKind>,
     /// Its smallest and largest value at the nodes where it is known, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_range: Option<[f64; 2]>,
     /// For a constant its standard error from the linearised fit, without constraints, penalties and
-    /// priors, where the readings determine all parameters.
+    /// priors, where the samples determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
     /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
-    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
+    /// that converged, with residuals that may be noise, where the samples determine all parameters and nothing else has a say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub constant_p_value: Option<f64>,
     /// Largest distance from the truth at a node, where the truth is known.

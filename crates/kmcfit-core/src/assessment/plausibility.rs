@@ -14,18 +14,18 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
-/// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
-/// the stepper, and not the device.
+/// Half the step may change the model's samples by this share of the largest one; if by more, what was fitted is
+/// the stepper, and not the system.
 const STEPPER: f64 = 0.1;
-/// A fit is absurd that misses all channels by more than twice what their readings vary, per cent.
+/// A fit is absurd that misses all channels by more than twice what their samples vary, per cent.
 const ABSURD: f64 = -100.0;
-/// Below this share of the readings the fit does not explain the record, per cent.
+/// Below this share of the samples the fit does not explain the record, per cent.
 pub const POOR: f64 = 90.0;
 /// Residuals may be this many times sigma before nothing is made of sigma any more.
 pub const BEYOND_SIGMA: f64 = 3.0;
 /// The probability of such residuals under white noise below which they are certainly none.
 const CERTAIN: f64 = 1e-6;
-/// What such a fit leaves is the rounding of the readings, per cent.
+/// What such a fit leaves is the rounding of the samples, per cent.
 pub const EXACT: f64 = 99.99;
 /// Noise would do if it had this chance.
 const CHANCE: f64 = 1e-3;
@@ -33,9 +33,9 @@ const CHANCE: f64 = 1e-3;
 const NEGATIVE: f64 = 1e-3;
 /// A force is ignored that is smaller than this share of mass times acceleration.
 const IGNORED: f64 = 1e-3;
-/// Two and a half readings a period: from there on the frequency is near to that of its first alias.
+/// Two and a half samples a period: from there on the frequency is near to that of its first alias.
 const PERIODS_PER_READING: f64 = 0.4;
-/// Equally spaced readings are no further from their places than this part of the spacing.
+/// Equally spaced samples are no further from their places than this part of the spacing.
 const EVEN: f64 = 0.01;
 
 /// Why an optimum identifies no system.
@@ -50,11 +50,11 @@ pub enum Unidentified {
         #[serde(skip)]
         error: SimulationError,
     },
-    /// Half the step changes the response by more than a tenth of the largest reading.
+    /// Half the step changes the response by more than a tenth of the largest sample.
     StepDependent,
-    /// All channels are missed by more than twice what their readings vary.
+    /// All channels are missed by more than twice what their samples vary.
     Unrelated,
-    /// Noise of the size of the readings would be matched as well.
+    /// Noise of the size of the samples would be matched as well.
     Noise,
 }
 
@@ -76,9 +76,9 @@ pub enum FitWarning {
     PoorFit,
     /// The residuals are not white: standard errors are too small.
     Coloured,
-    /// Systems of other frequencies match equally spaced readings as well: standard errors are not known.
+    /// Systems of other frequencies match equally spaced samples as well: standard errors are not known.
     Aliased {
-        /// Readings in a period.
+        /// Samples in a period.
         per_period: f64,
         /// Natural frequency found, Hz.
         frequency: f64,
@@ -110,7 +110,7 @@ pub struct Plausibility {
 
 impl Plausibility {
     /// Of the optimum `evaluation` with its step-size check and statistics; `tells_errors` where standard errors are
-    /// reported also for readings without a sigma.
+    /// reported also for samples without a sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
@@ -137,7 +137,7 @@ impl Plausibility {
         }
     }
 
-    /// Of the optimum `evaluation`, with standard errors reported for all readings.
+    /// Of the optimum `evaluation`, with standard errors reported for all samples.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let step_check = step_check(problem, evaluation);
         let statistics = statistics(problem, evaluation);
@@ -151,7 +151,7 @@ impl Plausibility {
     }
 }
 
-/// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the readings, too.
+/// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the samples, too.
 fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
     for (channel, predicted) in problem.predicted(evaluation) {
@@ -173,7 +173,7 @@ fn meaningless(
 ) -> Option<Unidentified> {
     match step_check {
         Err(error) => return Some(Unidentified::NoResponseOnHalfStep { error: *error }),
-        Ok(Some(half)) if half.change_per_reading > STEPPER => {
+        Ok(Some(half)) if half.change_per_sample > STEPPER => {
             return Some(Unidentified::StepDependent);
         }
         Ok(_) => {}
@@ -186,11 +186,11 @@ fn meaningless(
     absurd.then_some(Unidentified::Unrelated)
 }
 
-/// Whether a fit with as many parameters would match white noise as well, by the ratio of likelihoods of the device and of
+/// Whether a fit with as many parameters would match white noise as well, by the ratio of likelihoods of the system and of
 /// a constant for each channel; a search among many frequencies has as many chances. Outliers tell nothing of either.
 fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
     let predictions = evaluation.predictions.iter().flatten();
-    let (mut gain, mut readings) = (0.0, 0);
+    let (mut gain, mut samples) = (0.0, 0);
     for (channel, predicted) in problem.channels().zip(predictions) {
         let n = channel.len() as f64;
         let mean = channel.observed().iter().sum::<f64>() / n;
@@ -201,21 +201,21 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
             return false;
         }
         gain += n * (constant / left).ln();
-        readings += channel.len();
+        samples += channel.len();
     }
-    // As many parameters as readings match anything: no ratio tells noise from a device then.
+    // As many parameters as samples match anything: no ratio tells noise from a system then.
     let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
         return false;
     };
-    if problem.parameters() >= readings {
+    if problem.parameters() >= samples {
         return false;
     }
-    let frequencies = readings as f64 / 2.0;
+    let frequencies = samples as f64 / 2.0;
     gain.is_finite() && frequencies * law.sf(gain.max(0.0)) > CHANCE
 }
 
-/// What is said where half the step changes the model's readings by more than what is left of them: then the steps decide
-/// what is found, and not the readings.
+/// What is said where half the step changes the model's samples by more than what is left of them: then the steps decide
+/// what is found, and not the samples.
 fn coarse(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -225,13 +225,13 @@ fn coarse(
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
-    // Readings that were made with these steps are matched to their rounding.
+    // Samples that were made with these steps are matched to their rounding.
     let is_exact = fits.all(|fit| fit > EXACT);
     let times = half.change_per_residual;
     (times > 1.0 && !is_exact).then_some(FitWarning::CoarseSteps { times })
 }
 
-/// What is said of optima that are hardly devices.
+/// What is said of optima that are hardly systems.
 fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
     let sizes = problem.natural_scales(evaluation);
@@ -242,9 +242,9 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     ];
     let values = problem
         .functions
-        .assembly(0)
+        .coefficient_set(0)
         .iter()
-        .zip(evaluation.device.functions());
+        .zip(evaluation.nodal.functions());
     for (&f, values) in values {
         let function = problem.functions.get(f);
         let mut sorted = values.to_vec();
@@ -257,7 +257,7 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         }
     }
     let step = problem.system.grid.step();
-    for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
+    for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
         let force = experiment
             .excitation
             .as_ref()
@@ -265,8 +265,8 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let Some(force) = force.filter(|force| !force.is_zero()) else {
             continue;
         };
-        let mass = &evaluation.device_of(experiment.device).mass;
-        let inertia = motion.velocity.windows(2).zip(mass);
+        let mass = &evaluation.nodal_of(experiment.coefficient_set).mass;
+        let inertia = response.velocity.windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
             warnings.push(FitWarning::NegligibleForce {
@@ -277,16 +277,16 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     warnings
 }
 
-/// What is said where the residuals are larger than the readings' sigma allows: the errors of all functions are then
+/// What is said where the residuals are larger than the samples' sigma allows: the errors of all functions are then
 /// too small. `None` where they are not, or nobody gave a sigma.
 fn unexplained(statistics: &FitStatistics) -> Option<FitWarning> {
     let times = statistics.reduced_chi_square?.sqrt();
     (times > BEYOND_SIGMA).then_some(FitWarning::BeyondSigma { times })
 }
 
-/// What is said of a device that swings so fast that its readings are those of other devices as well; `None` where they
-/// are not. Readings of one kind on a raster, of a free motion of frequency `f`, are those of one of `1/spacing - f`;
-/// times off the raster, a force, or a second kind of reading tell them apart.
+/// What is said of a system that swings so fast that its samples are those of other systems as well; `None` where they
+/// are not. Samples of one kind on a raster, of a free response of frequency `f`, are those of one of `1/spacing - f`;
+/// times off the raster, a force, or a second kind of sample tell them apart.
 fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     let mut channels = problem.channels();
     let first = channels.next()?;
@@ -302,8 +302,8 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
         return None;
     }
     let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
-    let device = &evaluation.device;
-    let pairs = device.mass.iter().zip(&device.coefficients[place]);
+    let nodal = &evaluation.nodal;
+    let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
     let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     squares.sort_by(f64::total_cmp);
     // That of most times: at the ends of a record k/m may be anything.
@@ -314,7 +314,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     })
 }
 
-/// The shortest distance of readings, if all distances are multiples of it, s.
+/// The shortest distance of samples, if all distances are multiples of it, s.
 fn raster(channel: &Channel) -> Option<f64> {
     let times = channel.times();
     let distances = times.windows(2).map(|pair| pair[1] - pair[0]);

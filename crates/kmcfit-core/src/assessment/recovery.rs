@@ -35,12 +35,12 @@ pub struct TruthErrors {
 }
 
 impl TruthErrors {
-    /// The distances of `device` from `truth`, on the same grid.
-    pub fn of(device: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
-        let (found, real) = (Ratios::of(device), Ratios::of(truth));
+    /// The distances of `system` from `truth`, on the same grid.
+    pub fn of(nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
+        let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
         let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);
-        let mass = largest_error(&device.mass, &truth.mass);
+        let mass = largest_error(&nodal.mass, &truth.mass);
         let stiffness_scale = largest(&real.k_over_m);
         let critical = 2.0 * stiffness_scale.sqrt();
         let undamped = largest(&real.c_over_m) < RECOVERED * critical;
@@ -51,8 +51,8 @@ impl TruthErrors {
         let relative = |error: f64, scale: f64| if error == 0.0 { 0.0 } else { error / scale };
         Self {
             mass,
-            damping: largest_error(&device.coefficients[0], &truth.coefficients[0]),
-            stiffness: largest_error(&device.coefficients[1], &truth.coefficients[1]),
+            damping: largest_error(&nodal.coefficients[0], &truth.coefficients[0]),
+            stiffness: largest_error(&nodal.coefficients[1], &truth.coefficients[1]),
             k_over_m,
             c_over_m,
             mass_relative: relative(mass, largest(&truth.mass)),
@@ -104,7 +104,7 @@ pub struct Roughness {
 
 impl Roughness {
     /// The roughness of a system on a grid with this step, s.
-    pub fn of(device: &NodalCoefficients, step: f64) -> Self {
+    pub fn of(nodal: &NodalCoefficients, step: f64) -> Self {
         let slope = |f: &[f64]| -> f64 {
             let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
             squares.sum::<f64>() * step
@@ -114,9 +114,9 @@ impl Roughness {
             f.windows(3).map(second).sum::<f64>() * step
         };
         Self {
-            mass: curvature(&device.mass),
-            damping: slope(&device.coefficients[0]),
-            stiffness: slope(&device.coefficients[1]),
+            mass: curvature(&nodal.mass),
+            damping: slope(&nodal.coefficients[0]),
+            stiffness: slope(&nodal.coefficients[1]),
         }
     }
 }
@@ -153,7 +153,7 @@ fn interpolate(f: &[f64], place: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn device(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
+    fn nodal(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
         let constant = |value| vec![value; mass.len()];
         NodalCoefficients {
             mass: mass.to_vec(),
@@ -168,15 +168,15 @@ mod tests {
         let mass: Vec<f64> = (0..=1000)
             .map(|i| 1.0 + (i as f64 * step).powi(2))
             .collect();
-        let found = Roughness::of(&device(&mass, 0.3, 1.0), step);
+        let found = Roughness::of(&nodal(&mass, 0.3, 1.0), step);
         assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
         assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
     }
 
     #[test]
     fn a_common_factor_is_the_same_device() {
-        let truth = device(&[1.0, 0.5, 0.8], 0.1, 1.0);
-        let doubled = device(&[2.0, 1.0, 1.6], 0.2, 2.0);
+        let truth = nodal(&[1.0, 0.5, 0.8], 0.1, 1.0);
+        let doubled = nodal(&[2.0, 1.0, 1.6], 0.2, 2.0);
         let errors = TruthErrors::of(&doubled, &truth);
         assert!(errors.within(RECOVERED) && !errors.undamped);
         assert_eq!(errors.mass_relative, 1.0);
@@ -184,8 +184,8 @@ mod tests {
 
     #[test]
     fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&device(&[1.0, 1.0], 0.02, 1.0), &truth);
+        let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
         assert!(errors.undamped);
         assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
         assert!(!errors.within(RECOVERED));
@@ -193,8 +193,8 @@ mod tests {
 
     #[test]
     fn a_device_without_mass_is_no_true_device() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&device(&[1.0, 0.0], 0.0, 1.0), &truth);
+        let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
         assert!(!errors.within(RECOVERED));
     }
 }

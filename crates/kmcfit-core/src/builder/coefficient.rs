@@ -54,7 +54,7 @@ pub enum PenaltySpec {
 
 /// Known, or estimated in a basis.
 #[derive(Debug, Clone, PartialEq)]
-enum Form {
+enum CoefficientForm {
     Fixed(TimeHistory),
     Estimated(BasisSpec, Start),
 }
@@ -63,7 +63,7 @@ enum Form {
 /// basis. The counterpart of one entry of `functions` in a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientSpec {
-    form: Form,
+    form: CoefficientForm,
     pub(super) min: Option<TimeHistory>,
     pub(super) max: Option<TimeHistory>,
     pub(super) penalties: Vec<PenaltySpec>,
@@ -71,7 +71,7 @@ pub struct CoefficientSpec {
 }
 
 impl CoefficientSpec {
-    fn new(form: Form) -> Self {
+    fn new(form: CoefficientForm) -> Self {
         Self {
             form,
             min: None,
@@ -83,7 +83,7 @@ impl CoefficientSpec {
 
     /// Known values.
     pub fn known(values: TimeHistory) -> Self {
-        Self::new(Form::Fixed(values))
+        Self::new(CoefficientForm::Fixed(values))
     }
 
     /// Known, and the same at all times.
@@ -99,7 +99,7 @@ impl CoefficientSpec {
 
     /// Estimated in a basis.
     pub fn estimated(basis: BasisSpec, start: Start) -> Self {
-        Self::new(Form::Estimated(basis, start))
+        Self::new(CoefficientForm::Estimated(basis, start))
     }
 
     /// One estimated value for all times.
@@ -193,7 +193,7 @@ impl CoefficientSpec {
 
     /// Whether it is estimated.
     pub(super) fn is_estimated(&self) -> bool {
-        matches!(self.form, Form::Estimated(..))
+        matches!(self.form, CoefficientForm::Estimated(..))
     }
 
     /// The function on a grid; errors are about keys below `key`.
@@ -206,12 +206,12 @@ impl CoefficientSpec {
         self.check(key, grid)?;
         let nodes = grid.nodes();
         let (key, function) = match &self.form {
-            Form::Fixed(values) => {
+            CoefficientForm::Fixed(values) => {
                 let key = format!("{key}.fixed");
                 let values = values_at_nodes(values, &key, nodes)?;
                 (key, CoefficientFunction::fixed(kind, values))
             }
-            Form::Estimated(basis, start) => {
+            CoefficientForm::Estimated(basis, start) => {
                 let basis = basis.on(key, grid)?;
                 let key = format!("{key}.start");
                 let start = parameters(&key, &basis, start, grid)?;

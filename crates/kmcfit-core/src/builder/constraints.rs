@@ -1,23 +1,23 @@
 //! Constraints of a builder: rows of its statements, and a start inside them.
 
-use super::assembly::Slot;
 use super::coefficient::uncrossed;
+use super::coefficient_sets::FunctionEntry;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
-use crate::constraints::{Constraints, Impossible, Shape, Statement, TOLERANCE, TimeHistory};
+use crate::constraints::{Constraint, ConstraintError, Constraints, Shape, TOLERANCE, TimeHistory};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
 use crate::solvers::StartProjection;
 
 /// A statement that must hold, or whose violation is penalised.
 #[derive(Debug, Clone)]
-pub(super) struct Constraint {
+pub(super) struct ConstraintSpec {
     /// Key that states it.
     pub key: String,
-    pub statement: Statement,
+    pub statement: Constraint,
     /// Weight of its violation in J; it must hold without.
     pub soft: Option<f64>,
     /// Index of the set of coefficient functions that it is about.
-    pub assembly: usize,
+    pub coefficient_set: usize,
 }
 
 /// The name of a group of rows, and the key that states it.
@@ -28,14 +28,14 @@ pub(super) struct RowKey {
 }
 
 /// The constraints of the bounds of a function.
-pub(super) fn of_bounds(slot: &Slot, assembly: usize) -> Vec<Constraint> {
-    let (of, key) = (slot.kind, slot.key.as_str());
-    let (min, max) = (slot.spec.min.clone(), slot.spec.max.clone());
-    let constraint = |name: &str, min, max| Constraint {
+pub(super) fn of_bounds(entry: &FunctionEntry, coefficient_set: usize) -> Vec<ConstraintSpec> {
+    let (of, key) = (entry.kind, entry.key.as_str());
+    let (min, max) = (entry.spec.min.clone(), entry.spec.max.clone());
+    let constraint = |name: &str, min, max| ConstraintSpec {
         key: format!("{key}.{name}"),
-        statement: Statement::Bounds { of, min, max },
+        statement: Constraint::Bounds { of, min, max },
         soft: None,
-        assembly,
+        coefficient_set,
     };
     match (min, max) {
         (None, None) => Vec::new(),
@@ -53,7 +53,7 @@ impl Builder {
     /// Adds the rows of a constraint to the problem.
     pub(super) fn add(
         &self,
-        constraint: &Constraint,
+        constraint: &ConstraintSpec,
         problem: &mut Problem,
         keys: &mut Vec<RowKey>,
         notices: &mut Vec<BuildNotice>,
@@ -61,11 +61,11 @@ impl Builder {
         let key = &constraint.key;
         let grid = problem.system.grid;
         constraint.check()?;
-        if let Statement::Bounds { min, max, .. } = &constraint.statement {
+        if let Constraint::Bounds { min, max, .. } = &constraint.statement {
             uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
         }
         let statement = &constraint.statement;
-        let rows = statement.build_for(&grid, &problem.functions, constraint.assembly);
+        let rows = statement.build_for(&grid, &problem.functions, constraint.coefficient_set);
         let mut rows = rows.map_err(|why| impossible(key, why))?;
         if rows.is_empty() {
             notices.push(BuildNotice::AlwaysHolds { key: key.clone() });
@@ -84,18 +84,18 @@ impl Builder {
     /// A notice where a constraint cannot be felt by free records. Without a force, `(m, c, k)` and `s(t) (m, c, k)` have the same
     /// response for every positive `s(t)`. Passivity and a monotone mass or stiffness do not survive that change: unless something
     /// else holds `s(t)`, they can be met by choosing it and say nothing about the system.
-    fn unfelt(&self, constraint: &Constraint, problem: &Problem) -> Option<BuildNotice> {
+    fn unfelt(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
         let what = match &constraint.statement {
-            Statement::Passive => "passivity",
-            Statement::Shape {
+            Constraint::Passive => "passivity",
+            Constraint::Shape {
                 of: CoefficientKind::Mass,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone mass",
-            Statement::Shape {
+            Constraint::Shape {
                 of: CoefficientKind::Stiffness,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone stiffness",
-            Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
+            Constraint::Slope { of, min, max } if one_way(*min, *max) => match of {
                 CoefficientKind::Mass => "a slope of the mass in one direction",
                 CoefficientKind::Stiffness => "a slope of the stiffness in one direction",
                 _ => return None,
@@ -117,10 +117,12 @@ impl Builder {
             TimeHistory::Constant(value) => *value > 0.0,
             TimeHistory::Nodal { .. } => true,
         };
-        let slots = self.slots();
-        let own = slots.iter().map(|slot| (&slot.spec.min, &slot.spec.max));
+        let entries = self.entries();
+        let own = entries
+            .iter()
+            .map(|entry| (&entry.spec.min, &entry.spec.max));
         let listed = self.constraints.iter().filter_map(|c| match &c.statement {
-            Statement::Bounds { min, max, .. } => Some((min, max)),
+            Constraint::Bounds { min, max, .. } => Some((min, max)),
             _ => None,
         });
         let all: Vec<_> = own.chain(listed).collect();
@@ -130,7 +132,7 @@ impl Builder {
     }
 }
 
-impl Constraint {
+impl ConstraintSpec {
     /// Refuses a weight that is none, and a constraint that leaves no mass: the equation of motion divides by it.
     fn check(&self) -> Result<(), BuildError> {
         if let Some(weight) = self.soft {
@@ -142,7 +144,7 @@ impl Constraint {
                     .expected("a number greater than 0"));
             }
             return match self.statement {
-                Statement::DampingRatio { .. } => Err(BuildError::new(
+                Constraint::DampingRatio { .. } => Err(BuildError::new(
                     key,
                     "a cap on the damping ratio cannot be soft",
                 )
@@ -152,21 +154,21 @@ impl Constraint {
             };
         }
         let held = match &self.statement {
-            Statement::Bounds {
+            Constraint::Bounds {
                 of: CoefficientKind::Mass,
                 max: Some(max),
                 ..
             } => max.least(),
-            Statement::Value {
+            Constraint::Value {
                 of: CoefficientKind::Mass,
                 value,
                 ..
             }
-            | Statement::Mean {
+            | Constraint::Mean {
                 of: CoefficientKind::Mass,
                 value,
             }
-            | Statement::Integral {
+            | Constraint::Integral {
                 of: CoefficientKind::Mass,
                 value,
             } => *value,
@@ -201,12 +203,12 @@ fn names(constraints: &Constraints) -> impl Iterator<Item = &String> {
     rows.chain(constraints.cones.iter().map(|group| &group.name))
 }
 
-fn impossible(key: &str, why: Impossible) -> BuildError {
+fn impossible(key: &str, why: ConstraintError) -> BuildError {
     match why {
-        Impossible::Absent(kind) => {
-            BuildError::new(key, format!("the device has no {}", kind.name()))
+        ConstraintError::Absent(kind) => {
+            BuildError::new(key, format!("the system has no {}", kind.name()))
         }
-        Impossible::Fixed(list) => {
+        ConstraintError::Fixed(list) => {
             let names = listed(list.iter().map(|kind| kind.name()));
             let problem = match list.len() {
                 1 => format!("{names} is fixed, so it cannot be constrained"),
@@ -216,7 +218,7 @@ fn impossible(key: &str, why: Impossible) -> BuildError {
                 .found("a constraint on fixed functions only")
                 .expected("`basis` and `start` instead of `fixed`, or no such constraint")
         }
-        Impossible::Broken { name, time } => {
+        ConstraintError::Broken { name, time } => {
             BuildError::new(key, "no fit can satisfy this constraint")
                 .found(format!("`{name}` is broken at {time} s by what is given"))
                 .expected("functions with more freedom, or another constraint")

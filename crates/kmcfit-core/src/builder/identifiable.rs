@@ -24,7 +24,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     if let Some(place) = problem.experiments.iter().position(free_and_open) {
         let name = &problem.experiments[place].name;
         let problem = format!(
-            "the gain and the initial state of {name} cannot both be estimated: a larger motion seen by a weaker sensor looks \
+            "the gain and the initial state of {name} cannot both be estimated: a larger response measured by a weaker sensor looks \
              the same"
         );
         return Err(BuildError::new("experiments", problem)
@@ -40,7 +40,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     match all && scale_is_open(problem) {
         true => Err(BuildError::new(
             "experiments",
-            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier device seen by a \
+            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier system measured by a \
              stronger sensor looks the same",
         )
         .found("no known gain, no fixed function and no value that holds the scale")
@@ -62,7 +62,7 @@ fn gains_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
 
 fn starts_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
     let rest = [e.initial.displacement, e.initial.velocity];
-    (0..2).all(|q| match e.sought[q] {
+    (0..2).all(|q| match e.initial_parameters[q] {
         Some(index) => open(Some(index)),
         None => rest[q] == 0.0,
     })
@@ -91,7 +91,7 @@ fn check_offsets(
     let shifted = |e: &Experiment| {
         let sees =
             |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());
-        open(e.sought[0]) && e.channels.iter().all(sees)
+        open(e.initial_parameters[0]) && e.channels.iter().all(sees)
     };
     if !(estimated && problem.experiments.iter().all(shifted)) {
         return Ok(());

@@ -29,9 +29,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod assembly;
 mod basis;
 mod coefficient;
+mod coefficient_sets;
 mod constraints;
 mod error;
 mod identifiable;
@@ -49,13 +49,13 @@ pub use notice::BuildNotice;
 pub use penalties::WeightSearch;
 pub use record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
 
-use crate::constraints::Statement;
+use crate::constraints::Constraint;
 use crate::functions::{CoefficientKind, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::solvers::Solver;
 use crate::system::{Grid, Method};
-use constraints::{Constraint, RowKey, move_start};
+use constraints::{ConstraintSpec, RowKey, move_start};
 
 /// Specification of a problem.
 #[derive(Debug, Clone)]
@@ -67,7 +67,7 @@ pub struct Builder {
     method: Method,
     solver: Solver,
     simulation: bool,
-    constraints: Vec<Constraint>,
+    constraints: Vec<ConstraintSpec>,
 }
 
 /// A problem that was built, before its start is moved into the constraints.
@@ -199,26 +199,26 @@ impl Builder {
 
     /// A constraint on the coefficient functions.
     #[must_use]
-    pub fn constrain(self, statement: Statement) -> Self {
+    pub fn constrain(self, statement: Constraint) -> Self {
         let key = format!("constraints[{}]", self.constraints.len());
         self.constraint(key, statement, None)
     }
 
     /// A soft constraint: its violation costs `weight * mean over its rows of the squared excess`.
     #[must_use]
-    pub fn penalize(self, statement: Statement, weight: f64) -> Self {
+    pub fn penalize(self, statement: Constraint, weight: f64) -> Self {
         let key = format!("constraints[{}]", self.constraints.len());
         self.constraint(key, statement, Some(weight))
     }
 
     /// A constraint that the model states at `key`; soft with a weight.
     #[must_use]
-    pub fn constraint(mut self, key: String, statement: Statement, soft: Option<f64>) -> Self {
-        self.constraints.push(Constraint {
+    pub fn constraint(mut self, key: String, statement: Constraint, soft: Option<f64>) -> Self {
+        self.constraints.push(ConstraintSpec {
             key,
             statement,
             soft,
-            assembly: 0,
+            coefficient_set: 0,
         });
         self
     }
@@ -241,7 +241,7 @@ impl Builder {
             }
             Some(i) => {
                 let key = format!("experiments[{i}]");
-                return Err(BuildError::new(key, "this experiment has no readings")
+                return Err(BuildError::new(key, "this experiment has no samples")
                     .found(format!("no channel of {}", self.records[i].name))
                     .expected("samples of displacement, velocity or acceleration"));
             }

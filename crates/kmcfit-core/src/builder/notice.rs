@@ -51,7 +51,7 @@ impl fmt::Display for BuildNotice {
             }
             Self::Unfelt { key, what } => write!(
                 f,
-                "{key}: {what} says nothing about the device here. Without a force the motion shows only k/m and c/m, and any \
+                "{key}: {what} says nothing about the system here. Without a force the response shows only k/m and c/m, and any \
                  s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them"
             ),
             Self::NoRoughness { key, basis } => write!(

@@ -3,7 +3,7 @@
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
-use crate::functions::{Basis, Penalty, Variation};
+use crate::functions::{Basis, Penalty, TotalVariation};
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::solvers::{Measurements, WeightRule};
@@ -26,12 +26,12 @@ impl Builder {
         notices: &mut Vec<BuildNotice>,
     ) -> Result<Option<WeightSearch>, BuildError> {
         let mut search: Option<WeightSearch> = None;
-        for (j, slot) in self.slots().iter().enumerate() {
+        for (j, entry) in self.entries().iter().enumerate() {
             let Some(basis) = problem.functions.get(j).basis.clone() else {
                 continue;
             };
-            for (i, spec) in slot.spec.penalties.iter().enumerate() {
-                let key = format!("{}.penalty[{i}]", slot.key);
+            for (i, spec) in entry.spec.penalties.iter().enumerate() {
+                let key = format!("{}.penalty[{i}]", entry.key);
                 let (order, weight, reference) = match spec {
                     PenaltySpec::Tikhonov {
                         order,
@@ -132,7 +132,7 @@ impl Builder {
         match without {
             Some((i, _)) if rule == WeightRule::Discrepancy => Err(BuildError::new(
                 key,
-                "the rule `discrepancy` needs the noise of the readings",
+                "the rule `discrepancy` needs the noise of the samples",
             )
             .found(format!("no `sigma` in experiments[{i}]"))
             .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),
@@ -157,7 +157,7 @@ fn penalize_variation(
         return Ok(());
     }
     let rows = basis.changes(&problem.system.grid);
-    let added = problem.penalize_variation(Variation {
+    let added = problem.penalize_variation(TotalVariation {
         function,
         weight,
         rows,

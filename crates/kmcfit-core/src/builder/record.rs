@@ -317,7 +317,7 @@ impl Record {
             Some(channel) if !(alone && channel.kind == ChannelKind::Displacement) => {
                 let name = channel.kind.name();
                 let problem = match alone {
-                    true => format!("readings of the {name} need a sigma"),
+                    true => format!("samples of the {name} need a sigma"),
                     false => "several channels need a sigma each, to be added up".to_owned(),
                 };
                 Err(BuildError::new(key, problem)

@@ -1,15 +1,15 @@
 //! Autocorrelation of residuals.
 
-/// Number of lags that are looked at in a sequence of `count` readings: a tenth of them, at most 50.
+/// Number of lags that are looked at in a sequence of `count` samples: a tenth of them, at most 50.
 ///
 /// The Ljung-Box statistic of more lags has a heavier tail than chi-square: at a quarter of 200
-/// readings it calls white noise coloured 8.5 times in a hundred instead of five; with this rule 4
-/// to 7 times, for 20 to 3000 readings (10,000 simulated sequences each).
+/// samples it calls white noise coloured 8.5 times in a hundred instead of five; with this rule 4
+/// to 7 times, for 20 to 3000 samples (10,000 simulated sequences each).
 pub fn default_lags(count: usize) -> usize {
     (count / READINGS_PER_LAG).min(MOST_LAGS)
 }
 
-/// Readings for each lag that [`default_lags`] gives.
+/// Samples for each lag that [`default_lags`] gives.
 const READINGS_PER_LAG: usize = 10;
 /// The most lags that [`default_lags`] gives: what a figure shows well.
 const MOST_LAGS: usize = 50;
@@ -167,7 +167,7 @@ mod tests {
         let outside: usize = (0..100)
             .map(|seed| {
                 let mut values = white(seed, 2000);
-                // A third of the readings are missing where the noise itself, and so chance, says.
+                // A third of the samples are missing where the noise itself, and so chance, says.
                 let missing = white(seed + 1000, 2000);
                 for (x, gap) in values.iter_mut().zip(missing) {
                     if gap > 0.43 {

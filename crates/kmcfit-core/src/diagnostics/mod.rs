@@ -22,4 +22,6 @@ pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, rms};
 pub use residuals::{spread, without_line};
-pub use whiteness::{FEWEST_READINGS, Reason, SIGNIFICANCE, Verdict, Whiteness, whiteness};
+pub use whiteness::{
+    FEWEST_READINGS, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
+};

@@ -1,11 +1,11 @@
 //! Patterns of residuals beside noise: outliers, an offset, a drift.
 
-/// Readings are far off beyond so many robust standard deviations: of white noise one in a billion is.
+/// Samples are far off beyond so many robust standard deviations: of white noise one in a billion is.
 const FAR: f64 = 6.0;
 /// From the median of absolute values to the standard deviation of normal numbers.
 const OF_MEDIAN: f64 = 1.482_602_218_505_602;
-/// Readings far off are more than the tail of a pattern if they hold this share of all squares, and are at most
-/// this share of all readings.
+/// Samples far off are more than the tail of a pattern if they hold this share of all squares, and are at most
+/// this share of all samples.
 const SQUARES: f64 = 0.5;
 const AT_MOST: f64 = 0.05;
 /// Most that follow one another.
@@ -48,7 +48,7 @@ pub fn far_off(residuals: &[f64]) -> Vec<usize> {
     let held: f64 = far.iter().map(|i| square(residuals[*i])).sum();
     let all: f64 = residuals.iter().map(|r| square(*r)).sum();
     let few = far.len() as f64 <= AT_MOST * residuals.len() as f64;
-    // More in a row are a part of a motion.
+    // More in a row are a part of a response.
     let alone = (far.windows(TOGETHER + 1)).all(|run| run[TOGETHER] - run[0] > TOGETHER);
     match held >= SQUARES * all && few && alone {
         true => far,
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::diagnostics::noise::white;
 
-    /// Neither white noise nor a motion that was missed is a matter of single readings.
+    /// Neither white noise nor a response that was missed is a matter of single samples.
     #[test]
     fn nothing_is_far_off_in_noise_and_in_a_pattern() {
         for seed in 1..20 {
@@ -123,7 +123,7 @@ mod tests {
             residuals[i] = 60.0;
         }
         assert_eq!(far_off(&residuals), [0, 90, 91, 199]);
-        // One in ten is no outlier, but the way these readings are.
+        // One in ten is no outlier, but the way these samples are.
         for i in (0..200).step_by(10) {
             residuals[i] = 60.0;
         }

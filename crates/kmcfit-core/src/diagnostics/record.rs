@@ -2,12 +2,12 @@
 
 use super::{Whiteness, autocorrelation, default_lags, fit_percent, rms, whiteness};
 
-/// How far a reading may be from its place on an equally spaced grid, in steps.
+/// How far a sample may be from its place on an equally spaced grid, in steps.
 const OFF_GRID: f64 = 0.05;
-/// A grid with gaps may have this many places for each reading.
+/// A grid with gaps may have this many places for each sample.
 const PLACES_PER_READING: usize = 10;
 
-/// The readings of one channel and the model's values for them, in step with one another.
+/// The samples of one channel and the model's values for them, in step with one another.
 #[derive(Debug, Clone, Copy)]
 pub struct ResidualRecord<'a> {
     /// Times (s), increasing.
@@ -15,9 +15,9 @@ pub struct ResidualRecord<'a> {
     /// Residuals as they enter the cost: observed less model, divided by sigma where one is given.
     /// One that is not finite is missing.
     pub residuals: &'a [f64],
-    /// Readings, in their unit.
+    /// Samples, in their unit.
     pub observed: &'a [f64],
-    /// The model's values at the readings, in the same unit.
+    /// The model's values at the samples, in the same unit.
     pub model: &'a [f64],
 }
 
@@ -26,7 +26,7 @@ pub struct ResidualRecord<'a> {
 pub struct ResidualDiagnostics {
     /// Number of residuals that are not missing.
     pub count: usize,
-    /// Root mean square of observed less model, in the unit of the readings.
+    /// Root mean square of observed less model, in the unit of the samples.
     pub rms: f64,
     /// [`fit_percent`] (%).
     pub fit_percent: f64,
@@ -47,7 +47,7 @@ impl ResidualDiagnostics {
     /// spaced sequence, so is its residual. Times that are not equally spaced have no lags: residuals
     /// are then taken in order, one mean spacing apart.
     ///
-    /// Only as many readings are used as the shortest of the four slices has.
+    /// Only as many samples are used as the shortest of the four slices has.
     pub fn new(record: &ResidualRecord) -> Self {
         let ResidualRecord {
             times,
@@ -121,7 +121,7 @@ fn median_spacing(times: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostics::Verdict;
+    use crate::diagnostics::WhitenessResult;
     use crate::diagnostics::noise::white;
 
     fn diagnostics(times: &[f64], noise: &[f64]) -> ResidualDiagnostics {
@@ -153,12 +153,12 @@ mod tests {
         assert!((found.step - 0.02).abs() < 1e-12);
         assert_eq!(found.autocorrelation.len(), 51);
         assert!((found.band - 0.062).abs() < 1e-4);
-        assert_eq!(found.whiteness.verdict, Verdict::White);
+        assert_eq!(found.whiteness.verdict, WhitenessResult::White);
     }
 
     #[test]
     fn gaps_in_the_times_are_gaps_in_the_sequence() {
-        // White noise of which every third and fourth reading of five is missing, and a residual
+        // White noise of which every third and fourth sample of five is missing, and a residual
         // that is alike at a distance of five steps.
         let shocks = white(7, 3000);
         let noise: Vec<f64> = (5..3000).map(|i| shocks[i] + shocks[i - 5]).collect();

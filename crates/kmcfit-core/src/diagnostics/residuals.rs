@@ -1,7 +1,7 @@
 //! The size of residuals, in one number.
 //!
-//! Readings and model values come in pairs; a pair with a value that is not finite is a missing
-//! reading and is left out, and so are values beyond the end of the shorter slice.
+//! Samples and model values come in pairs; a pair with a value that is not finite is a missing
+//! sample and is left out, and so are values beyond the end of the shorter slice.
 
 /// The NRMSE fit, in per cent:
 ///
@@ -10,8 +10,8 @@
 /// ```
 ///
 /// with Euclidean norms. 100 is a perfect model, 0 is as good as a flat line at the mean, a negative
-/// number is worse than that. No units. Readings that are all the same give 100 if the model has
-/// them exactly and minus infinity if not; no readings give NaN.
+/// number is worse than that. No units. Samples that are all the same give 100 if the model has
+/// them exactly and minus infinity if not; no samples give NaN.
 ///
 /// Source: MathWorks, *System Identification Toolbox*, `compare` and `goodnessOfFit` (NRMSE).
 pub fn fit_percent(observed: &[f64], model: &[f64]) -> f64 {

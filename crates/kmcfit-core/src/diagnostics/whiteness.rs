@@ -1,4 +1,4 @@
-//! Whether residuals are white: what a right model leaves of readings with independent errors.
+//! Whether residuals are white: what a right model leaves of samples with independent errors.
 
 use super::Autocorrelation;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -6,32 +6,32 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Residuals whose probability under whiteness is below this are called correlated: one white
 /// sequence in twenty is, wrongly.
 pub const SIGNIFICANCE: f64 = 0.05;
-/// With fewer readings nothing is said.
+/// With fewer samples nothing is said.
 pub const FEWEST_READINGS: usize = 20;
 
 /// The outcome of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Verdict {
+pub enum WhitenessResult {
     /// Nothing speaks against whiteness.
     White,
     /// Neighbours are alike: every lag up to this time, in the unit of the step, is outside the
     /// band. Residuals that oscillate cross zero after a quarter of their period.
     CorrelatedOver(f64),
-    /// Neighbours are not alike, but readings this far apart, in the unit of the step, are, more
+    /// Neighbours are not alike, but samples this far apart, in the unit of the step, are, more
     /// than at any other lag.
     CorrelatedAt(f64),
     /// Nothing can be said, for this reason.
-    Untested(Reason),
+    Untested(UntestedReason),
 }
 
 /// Why residuals were not tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reason {
+pub enum UntestedReason {
     /// Fewer than [`FEWEST_READINGS`].
     FewReadings,
-    /// No more lags with a pair of readings than fitted parameters of the noise.
+    /// No more lags with a pair of samples than fitted parameters of the noise.
     FewLags,
-    /// All are zero: the model goes through every reading.
+    /// All are zero: the model goes through every sample.
     NoResiduals,
 }
 
@@ -47,7 +47,7 @@ pub struct Whiteness {
     /// Share of the lags from 1 on that are outside their band; of white noise it is 0.05 or so.
     pub share_outside: f64,
     /// What follows.
-    pub verdict: Verdict,
+    pub verdict: WhitenessResult,
 }
 
 /// The test of Ljung and Box on all lags from 1 on of an autocorrelation, where lag 1 is `step`
@@ -76,11 +76,11 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
     let outside = (lags.iter()).filter(|lag| autocorrelation.is_outside(**lag));
     let share_outside = outside.count() as f64 / lags.len().max(1) as f64;
     let reason = if autocorrelation.count < FEWEST_READINGS {
-        Some(Reason::FewReadings)
+        Some(UntestedReason::FewReadings)
     } else if !autocorrelation.varies() {
-        Some(Reason::NoResiduals)
+        Some(UntestedReason::NoResiduals)
     } else {
-        (lags.len() <= fitted).then_some(Reason::FewLags)
+        (lags.len() <= fitted).then_some(UntestedReason::FewLags)
     };
     if let Some(reason) = reason {
         return Whiteness {
@@ -88,7 +88,7 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
             degrees_of_freedom: 0,
             p_value: 1.0,
             share_outside,
-            verdict: Verdict::Untested(reason),
+            verdict: WhitenessResult::Untested(reason),
         };
     }
     let statistic = ljung_box(autocorrelation, &lags);
@@ -102,7 +102,7 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
         verdict: if p_value < SIGNIFICANCE {
             correlated(autocorrelation, &lags, step)
         } else {
-            Verdict::White
+            WhitenessResult::White
         },
     }
 }
@@ -123,15 +123,15 @@ fn probability_above(statistic: f64, degrees_of_freedom: usize) -> f64 {
 }
 
 /// How far the correlation reaches.
-fn correlated(autocorrelation: &Autocorrelation, lags: &[usize], step: f64) -> Verdict {
+fn correlated(autocorrelation: &Autocorrelation, lags: &[usize], step: f64) -> WhitenessResult {
     let leading = (1..=autocorrelation.lags()).take_while(|lag| autocorrelation.is_outside(*lag));
     let reach = leading.count();
     if reach > 0 {
-        return Verdict::CorrelatedOver(reach as f64 * step);
+        return WhitenessResult::CorrelatedOver(reach as f64 * step);
     }
     let size = |lag: &usize| autocorrelation.values[*lag].abs();
     let most = (lags.iter().copied()).max_by(|a, b| size(a).total_cmp(&size(b)));
-    Verdict::CorrelatedAt(most.unwrap_or(0) as f64 * step)
+    WhitenessResult::CorrelatedAt(most.unwrap_or(0) as f64 * step)
 }
 
 #[cfg(test)]
@@ -235,7 +235,10 @@ mod tests {
         assert_eq!([none.degrees_of_freedom, one.degrees_of_freedom], [10, 9]);
         assert!(one.p_value < none.p_value);
         let all = whiteness(&r, 1.0, 10);
-        assert_eq!(all.verdict, Verdict::Untested(Reason::FewLags));
+        assert_eq!(
+            all.verdict,
+            WhitenessResult::Untested(UntestedReason::FewLags)
+        );
     }
 
     #[test]
@@ -255,14 +258,14 @@ mod tests {
             whiteness(&r, 0.5, 0).verdict
         };
         // The band is 0.098.
-        assert_eq!(found(&[1.0, 0.05, -0.05, 0.0]), Verdict::White);
+        assert_eq!(found(&[1.0, 0.05, -0.05, 0.0]), WhitenessResult::White);
         assert_eq!(
             found(&[1.0, 0.6, -0.3, 0.0, 0.2]),
-            Verdict::CorrelatedOver(1.0)
+            WhitenessResult::CorrelatedOver(1.0)
         );
         assert_eq!(
             found(&[1.0, 0.05, 0.2, -0.4, 0.1]),
-            Verdict::CorrelatedAt(1.5)
+            WhitenessResult::CorrelatedAt(1.5)
         );
     }
 }

@@ -1,6 +1,6 @@
 //! The test of whiteness in a sentence.
 
-use super::{FEWEST_READINGS, Reason, Verdict, Whiteness};
+use super::{FEWEST_READINGS, UntestedReason, Whiteness, WhitenessResult};
 use std::fmt;
 
 /// A probability below this is printed as a bound.
@@ -10,12 +10,12 @@ impl fmt::Display for Whiteness {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let p = Probability(self.p_value);
         let over = match self.verdict {
-            Verdict::White => return write!(f, "the residuals look white ({p})"),
-            Verdict::Untested(reason) => {
+            WhitenessResult::White => return write!(f, "the residuals look white ({p})"),
+            WhitenessResult::Untested(reason) => {
                 return write!(f, "the residuals were not tested: {reason}");
             }
-            Verdict::CorrelatedOver(time) => format!("over {} s", short(time)),
-            Verdict::CorrelatedAt(time) => format!("at a distance of {} s", short(time)),
+            WhitenessResult::CorrelatedOver(time) => format!("over {} s", short(time)),
+            WhitenessResult::CorrelatedAt(time) => format!("at a distance of {} s", short(time)),
         };
         write!(
             f,
@@ -25,12 +25,16 @@ impl fmt::Display for Whiteness {
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for UntestedReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Reason::FewReadings => write!(f, "there are fewer than {FEWEST_READINGS} readings"),
-            Reason::FewLags => write!(f, "there are too few lags for the parameters of the noise"),
-            Reason::NoResiduals => write!(f, "the model goes through every reading"),
+            UntestedReason::FewReadings => {
+                write!(f, "there are fewer than {FEWEST_READINGS} samples")
+            }
+            UntestedReason::FewLags => {
+                write!(f, "there are too few lags for the parameters of the noise")
+            }
+            UntestedReason::NoResiduals => write!(f, "the model goes through every sample"),
         }
     }
 }
@@ -75,7 +79,7 @@ mod tests {
             degrees_of_freedom: 10,
             p_value: 0.4263,
             share_outside: 0.0,
-            verdict: Verdict::White,
+            verdict: WhitenessResult::White,
         };
         assert_eq!(white.to_string(), "the residuals look white (p = 0.43)");
         let sine: Vec<f64> = (0..600).map(|i| (f64::from(i) * 0.4).sin()).collect();
@@ -87,7 +91,7 @@ mod tests {
         );
         let at = Whiteness {
             p_value: 0.012,
-            verdict: Verdict::CorrelatedAt(1.5),
+            verdict: WhitenessResult::CorrelatedAt(1.5),
             ..white
         };
         assert_eq!(
@@ -102,11 +106,11 @@ mod tests {
         let say = |values: &[f64]| test(values).to_string();
         assert_eq!(
             say(&[1.0; 19]),
-            "the residuals were not tested: there are fewer than 20 readings"
+            "the residuals were not tested: there are fewer than 20 samples"
         );
         assert_eq!(
             say(&[0.0; 40]),
-            "the residuals were not tested: the model goes through every reading"
+            "the residuals were not tested: the model goes through every sample"
         );
     }
 

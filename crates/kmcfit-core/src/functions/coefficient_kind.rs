@@ -90,12 +90,12 @@ impl CoefficientKind {
         NAMES[self as usize][2]
     }
 
-    /// Column header with the unit of motion along a line.
+    /// Column header with the unit of response along a line.
     pub fn column(self) -> &'static str {
         NAMES[self as usize][3]
     }
 
-    /// SI unit where the motion is a rotation: displacement in rad, force a moment.
+    /// SI unit where the response is a rotation: displacement in rad, force a moment.
     pub fn angular_unit(self) -> &'static str {
         NAMES[self as usize][4]
     }

@@ -12,7 +12,7 @@ mod parameterization;
 mod penalty;
 mod ratios;
 mod scalar;
-mod variation;
+mod total_variation;
 
 pub use basis::Basis;
 pub use coefficient_kind::CoefficientKind;
@@ -21,8 +21,8 @@ pub use gram::Gram;
 pub use parameterization::Parameterization;
 pub use penalty::Penalty;
 pub use ratios::Ratios;
-pub use scalar::{Prior, ScalarParameter, Value};
-pub use variation::Variation;
+pub use scalar::{Prior, ScalarParameter, ScalarValue};
+pub use total_variation::TotalVariation;
 
 use crate::system::Grid;
 
@@ -31,9 +31,9 @@ use crate::system::Grid;
 pub struct CoefficientFunction {
     /// Which function this is.
     pub quantity: CoefficientKind,
-    /// The experiment that has it for itself; `None` if it belongs to the main device.
+    /// The experiment that has it for itself; `None` if it belongs to the shared coefficient set.
     pub owner: Option<String>,
-    /// The space that the function is sought in; `None` if it is fixed.
+    /// The space that the function is estimated in; `None` if it is fixed.
     pub basis: Option<Basis>,
     /// How parameters become values at the nodes.
     pub design: Design,

@@ -9,15 +9,15 @@ use std::ops::Range;
 /// The functions to be found and the scalars beside them. Their parameters stand one after the other
 /// in one vector `theta`, functions first.
 ///
-/// The first functions make up the main device: mass, then one per force term. Further ones belong
-/// to single experiments and replace one of the main device there: each device is a list of
+/// The first functions make up the shared coefficient set: mass, then one per force term. Further ones belong
+/// to single experiments and replace one of the shared coefficient set there: each system is a list of
 /// functions ([`Parameterization::assembly`]).
 #[derive(Debug, Clone)]
 pub struct Parameterization {
     list: Vec<CoefficientFunction>,
     ranges: Vec<Range<usize>>,
     grams: Vec<Gram>,
-    devices: Vec<Vec<usize>>,
+    coefficient_sets: Vec<Vec<usize>>,
     scalars: Vec<ScalarParameter>,
     nodes: usize,
     step: f64,
@@ -31,32 +31,38 @@ pub struct Parameterization {
 
 impl Parameterization {
     /// Collects `list` (mass first) on `nodes` nodes of step `step` (s), as the functions of one
-    /// device; `None` if some basis is linearly dependent on the grid or the list is empty.
+    /// system; `None` if some basis is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
         let main = (0..list.len()).collect();
-        Self::with_devices(list, vec![main], nodes, step)
+        Self::with_coefficient_sets(list, vec![main], nodes, step)
     }
 
-    /// [`Parameterization::new`] with several devices: each is a list of indices into `list`, mass first.
+    /// [`Parameterization::new`] with several systems: each is a list of indices into `list`, mass first.
     ///
     /// # Panics
-    /// If there is no device, or one names a function that is not there, or one twice.
-    pub fn with_devices(
+    /// If there is no system, or one names a function that is not there, or one twice.
+    pub fn with_coefficient_sets(
         list: Vec<CoefficientFunction>,
-        devices: Vec<Vec<usize>>,
+        coefficient_sets: Vec<Vec<usize>>,
         nodes: usize,
         step: f64,
     ) -> Option<Self> {
-        assert!(!devices.is_empty(), "at least the main device");
         assert!(
-            devices.iter().flatten().all(|f| *f < list.len()),
-            "devices of the functions in the list"
+            !coefficient_sets.is_empty(),
+            "at least the main coefficient set"
         );
-        let is_once = |device: &Vec<usize>| {
-            let first = |f: &usize| device.iter().position(|g| g == f);
-            device.iter().enumerate().all(|(i, f)| first(f) == Some(i))
+        assert!(
+            coefficient_sets.iter().flatten().all(|f| *f < list.len()),
+            "coefficient sets with functions of the list"
+        );
+        let is_once = |nodal: &Vec<usize>| {
+            let first = |f: &usize| nodal.iter().position(|g| g == f);
+            nodal.iter().enumerate().all(|(i, f)| first(f) == Some(i))
         };
-        assert!(devices.iter().all(is_once), "each function once a device");
+        assert!(
+            coefficient_sets.iter().all(is_once),
+            "each function once a coefficient set"
+        );
         let weights = trapezoid_weights(nodes, step);
         let grams: Option<Vec<Gram>> = list
             .iter()
@@ -85,7 +91,7 @@ impl Parameterization {
             list,
             ranges,
             grams: grams?,
-            devices,
+            coefficient_sets,
             scalars: Vec::new(),
             nodes,
             step,
@@ -110,14 +116,14 @@ impl Parameterization {
         first..first + self.scalars.len()
     }
 
-    /// The functions that make up each device, mass first; the main device is the first.
-    pub fn assemblies(&self) -> &[Vec<usize>] {
-        &self.devices
+    /// The functions that make up each system, mass first; the shared coefficient set is the first.
+    pub fn coefficient_sets(&self) -> &[Vec<usize>] {
+        &self.coefficient_sets
     }
 
-    /// The functions that make up device `device`, mass first.
-    pub fn assembly(&self, device: usize) -> &[usize] {
-        &self.devices[device]
+    /// The functions that make up system `system`, mass first.
+    pub fn coefficient_set(&self, set: usize) -> &[usize] {
+        &self.coefficient_sets[set]
     }
 
     /// Function `index` of the list.
@@ -136,7 +142,7 @@ impl Parameterization {
         &self.grams[index]
     }
 
-    /// The functions: those of the main device, mass first, then those of single experiments.
+    /// The functions: those of the shared coefficient set, mass first, then those of single experiments.
     pub fn iter(&self) -> impl Iterator<Item = &CoefficientFunction> {
         self.list.iter()
     }
@@ -220,21 +226,24 @@ impl Parameterization {
         }
     }
 
-    /// A device of the right shape, all zero.
-    pub fn empty_device(&self) -> NodalCoefficients {
-        NodalCoefficients::zeros(self.nodes, self.devices[0].len() - 1)
+    /// A system of the right shape, all zero.
+    pub fn empty_nodal(&self) -> NodalCoefficients {
+        NodalCoefficients::zeros(self.nodes, self.coefficient_sets[0].len() - 1)
     }
 
-    /// The main device with parameters `theta`.
-    pub fn device(&self, theta: &[f64]) -> NodalCoefficients {
-        let mut device = self.empty_device();
-        self.device_into(theta, 0, &mut device);
-        device
+    /// The shared coefficient set with parameters `theta`.
+    pub fn nodal(&self, theta: &[f64]) -> NodalCoefficients {
+        let mut nodal = self.empty_nodal();
+        self.nodal_into(theta, 0, &mut nodal);
+        nodal
     }
 
-    /// Device `which` with parameters `theta`, into storage that is used again.
-    pub fn device_into(&self, theta: &[f64], which: usize, device: &mut NodalCoefficients) {
-        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+    /// System `which` with parameters `theta`, into storage that is used again.
+    pub fn nodal_into(&self, theta: &[f64], which: usize, nodal: &mut NodalCoefficients) {
+        for (&f, values) in self.coefficient_sets[which]
+            .iter()
+            .zip(nodal.functions_mut())
+        {
             let theta = &theta[self.ranges[f].clone()];
             match (self.flat[f], theta) {
                 (Some([offset, entry]), [theta]) => values.fill(offset + entry * theta),
@@ -253,26 +262,29 @@ impl Parameterization {
         each.collect()
     }
 
-    /// `B theta` of device `which` without the fixed parts: its change along a direction.
+    /// `B theta` of system `which` without the fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
-        let mut device = self.empty_device();
-        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+        let mut nodal = self.empty_nodal();
+        for (&f, values) in self.coefficient_sets[which]
+            .iter()
+            .zip(nodal.functions_mut())
+        {
             let range = self.ranges[f].clone();
             self.list[f].design.multiply_add(&theta[range], values);
         }
-        device
+        nodal
     }
 
-    /// Adds `B^T` applied to nodal values of device `which` to `out`: Euclidean gradient in nodal
+    /// Adds `B^T` applied to nodal values of system `which` to `out`: Euclidean gradient in nodal
     /// values to Euclidean gradient in parameters.
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
-        for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
+        for (&f, values) in self.coefficient_sets[which].iter().zip(nodal.functions()) {
             let out = &mut out[self.ranges[f].clone()];
             self.list[f].design.transpose_multiply_add(values, out);
         }
     }
 
-    /// [`Parameterization::add_transpose`] of the main device to zero.
+    /// [`Parameterization::add_transpose`] of the shared coefficient set to zero.
     pub fn transpose(&self, nodal: &NodalCoefficients) -> Vec<f64> {
         let mut out = vec![0.0; self.parameters()];
         self.add_transpose(nodal, 0, &mut out);

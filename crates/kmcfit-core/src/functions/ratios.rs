@@ -16,16 +16,12 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// The ratios of a device whose first two coefficients are damping and stiffness.
+    /// The ratios of a system whose first two coefficients are damping and stiffness.
     ///
     /// # Panics
-    /// If the device has fewer coefficients.
-    pub fn of(device: &NodalCoefficients) -> Self {
-        let (m, c, k) = (
-            &device.mass,
-            &device.coefficients[0],
-            &device.coefficients[1],
-        );
+    /// If the system has fewer coefficients.
+    pub fn of(nodal: &NodalCoefficients) -> Self {
+        let (m, c, k) = (&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]);
         let over_mass = |f: &[f64]| -> Vec<f64> { f.iter().zip(m).map(|(f, m)| f / m).collect() };
         let k_over_m = over_mass(k);
         let c_over_m = over_mass(c);

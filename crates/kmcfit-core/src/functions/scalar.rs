@@ -36,14 +36,14 @@ impl ScalarParameter {
 
 /// A number that is known, or fitted as one of the [`ScalarParameter`]s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value {
+pub enum ScalarValue {
     /// Known.
     Known(f64),
     /// The scalar of this index.
-    Sought(usize),
+    Estimated(usize),
 }
 
-impl Value {
+impl ScalarValue {
     /// The number, for the values `scalars` of all scalars.
     ///
     /// # Panics
@@ -52,15 +52,15 @@ impl Value {
     pub fn of(self, scalars: &[f64]) -> f64 {
         match self {
             Self::Known(value) => value,
-            Self::Sought(index) => scalars[index],
+            Self::Estimated(index) => scalars[index],
         }
     }
 
-    /// The index of the scalar, if it is sought.
+    /// The index of the scalar, if it is estimated.
     pub fn index(self) -> Option<usize> {
         match self {
             Self::Known(_) => None,
-            Self::Sought(index) => Some(index),
+            Self::Estimated(index) => Some(index),
         }
     }
 }

@@ -78,14 +78,14 @@ fn cone_row(cone: &Cone, theta: &[f64]) -> Option<Vec<(usize, f64)>> {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::constraints::Statement;
+    use crate::constraints::Constraint;
 
-    fn problem(statement: Statement) -> Problem {
+    fn problem(statement: Constraint) -> Problem {
         let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
         let record = Record::new("decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::constant(1.0),
             CoefficientSpec::constant(0.4),
@@ -95,8 +95,8 @@ mod tests {
         builder.build().unwrap()
     }
 
-    fn at_most(max: f64) -> Statement {
-        Statement::DampingRatio { max }
+    fn at_most(max: f64) -> Constraint {
+        Constraint::DampingRatio { max }
     }
 
     #[test]

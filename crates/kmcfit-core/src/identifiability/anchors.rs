@@ -1,6 +1,6 @@
-//! The instants at which a free motion fixes one ratio whatever the other is.
+//! The instants at which a free response fixes one ratio whatever the other is.
 //!
-//! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the motion says `k/m = (f/m - y'')/y`, where `y = 0`
+//! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the response says `k/m = (f/m - y'')/y`, where `y = 0`
 //! it says `c/m = (f/m - y'')/y'`.
 
 use crate::simulate::Trajectory;
@@ -15,17 +15,17 @@ pub struct Anchors {
     pub zero_crossings: Vec<f64>,
 }
 
-/// The anchors of a motion, by cubic Hermite interpolation of displacement and velocity: of order 4 in
+/// The anchors of a response, by cubic Hermite interpolation of displacement and velocity: of order 4 in
 /// the step for zero crossings, of order 3 for turning points.
 ///
-/// A motion at rest has none.
-pub fn anchors(grid: &Grid, motion: &Trajectory) -> Anchors {
-    let (y, v, h) = (&motion.displacement, &motion.velocity, grid.step());
+/// A response at rest has none.
+pub fn anchors(grid: &Grid, response: &Trajectory) -> Anchors {
+    let (y, v, h) = (&response.displacement, &response.velocity, grid.step());
     let mut anchors = Anchors::default();
-    for i in 0..motion.nodes().saturating_sub(1) {
+    for i in 0..response.nodes().saturating_sub(1) {
         let ends = [y[i], h * v[i], y[i + 1], h * v[i + 1]];
         let time = |x: f64| grid.time(i) + x * h;
-        let last = i + 2 == motion.nodes();
+        let last = i + 2 == response.nodes();
         if let Some(x) = root(last, |x| value(ends, x)) {
             anchors.zero_crossings.push(time(x));
         }
@@ -88,11 +88,11 @@ mod tests {
     #[test]
     fn a_cosine_turns_and_crosses_where_it_should() {
         let grid = Grid::new(0.0, 10.0, 401).unwrap();
-        let motion = Trajectory {
+        let response = Trajectory {
             displacement: grid.times().iter().map(|t| t.cos()).collect(),
             velocity: grid.times().iter().map(|t| -t.sin()).collect(),
         };
-        let found = anchors(&grid, &motion);
+        let found = anchors(&grid, &response);
         let pi = std::f64::consts::PI;
         let turning = [0.0, pi, 2.0 * pi, 3.0 * pi];
         let crossing = [0.5 * pi, 1.5 * pi, 2.5 * pi];

@@ -11,7 +11,7 @@ pub enum Side {
     Above,
     /// Only below: an upper bound is active.
     Below,
-    /// Neither: an equality, or nothing is sought.
+    /// Neither: an equality, or nothing is estimated.
     Neither,
 }
 

@@ -35,7 +35,7 @@ use std::f64::consts::TAU;
 const MOST_PARAMETERS: usize = 800;
 /// Most of these.
 const MOST_SMOOTH: usize = 400;
-/// Most work of their decomposition, readings x directions^2.
+/// Most work of their decomposition, samples x directions^2.
 const MOST_WORK: f64 = 2e9;
 /// Most nodes at which bands are computed; beyond, at every second, third, ...
 const MOST_NODES: usize = 4000;
@@ -68,7 +68,7 @@ impl Default for BandSettings {
     }
 }
 
-/// Bands of all functions and of the ratios of the main device.
+/// Bands of all functions and of the ratios of the shared coefficient set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
     /// s.
@@ -77,7 +77,7 @@ pub struct Bands {
     pub functions: Vec<Band>,
     /// `k/m`, `c/m`, natural frequency, damping ratio; those whose terms the oscillator has.
     pub ratios: Vec<Band>,
-    /// Estimated standard deviation of the readings that have none, in their unit.
+    /// Estimated standard deviation of the samples that have none, in their unit.
     pub sigma: Option<f64>,
     /// Number of directions that nothing sees.
     pub unseen: usize,
@@ -86,7 +86,7 @@ pub struct Bands {
 }
 
 /// A value over time that is linear in the parameters, to first order.
-struct Linearised {
+struct LinearisedCurve {
     /// Answer to each column of the covariance's root, with all active rows held, and with only the
     /// equalities held.
     roots: [DMatrix<f64>; 2],
@@ -104,8 +104,8 @@ impl Bands {
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
-        let readings = problem.reading_count().max(1) as f64;
-        let affordable = (MOST_WORK / readings).sqrt() as usize;
+        let samples = problem.sample_count().max(1) as f64;
+        let affordable = (MOST_WORK / samples).sqrt() as usize;
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
@@ -130,7 +130,7 @@ impl Bands {
             active: &active,
             settings,
         };
-        let linearised: Vec<Linearised> = (0..problem.functions.ranges().len())
+        let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
             .map(|f| maker.function(f))
             .collect();
         let values = problem.functions.values(theta);
@@ -210,7 +210,7 @@ impl Maker<'_> {
         self.directions.row(row.map(|(j, b)| (first + j, b)))
     }
 
-    fn function(&self, f: usize) -> Linearised {
+    fn function(&self, f: usize) -> LinearisedCurve {
         let functions = &self.problem.functions;
         let range = functions.ranges()[f].clone();
         let image = |columns: &DMatrix<f64>| {
@@ -229,7 +229,7 @@ impl Maker<'_> {
             let slope = self.slope(f, *i);
             slope.iter().map(|x| x * x).sum::<f64>().sqrt()
         };
-        Linearised {
+        LinearisedCurve {
             roots: self.factors.map(|factor| image(&factor.root)),
             hidden: self.factors.map(|factor| image(&factor.unseen)),
             sizes: self.nodes.iter().map(size).collect(),
@@ -241,7 +241,7 @@ impl Maker<'_> {
         name: String,
         unit: &str,
         values: Vec<f64>,
-        linear: &Linearised,
+        linear: &LinearisedCurve,
         function: Option<usize>,
     ) -> Band {
         let count = self.nodes.len();
@@ -314,7 +314,12 @@ impl Maker<'_> {
     }
 
     /// The factor of the simultaneous band: the 95 % point of `max |z_i|` over the nodes.
-    fn simultaneous(&self, linear: &Linearised, errors: &[f64], sides: &[Side]) -> Option<f64> {
+    fn simultaneous(
+        &self,
+        linear: &LinearisedCurve,
+        errors: &[f64],
+        sides: &[Side],
+    ) -> Option<f64> {
         if self.settings.draws == 0 {
             return None;
         }
@@ -348,9 +353,9 @@ impl Maker<'_> {
         Some(most[index.clamp(1, most.len()) - 1])
     }
 
-    /// Ratios of the main system by the delta method.
-    fn ratios(&self, values: &[Vec<f64>], linearised: &[Linearised]) -> Vec<Band> {
-        let assembly = self.problem.functions.assembly(0);
+    /// Ratios of the shared coefficient set by the delta method.
+    fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
+        let assembly = self.problem.functions.coefficient_set(0);
         let terms = &self.problem.system.terms;
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;
@@ -406,8 +411,12 @@ fn damping_ratio(at: &[f64]) -> (f64, Vec<f64>) {
 }
 
 /// `sum_f slope_f(t) p_f(t)`, with the slopes at each node.
-fn combine(linearised: &[Linearised], functions: &[usize], slopes: &[Vec<f64>]) -> Linearised {
-    let sum = |of: &dyn Fn(&Linearised) -> &DMatrix<f64>| {
+fn combine(
+    linearised: &[LinearisedCurve],
+    functions: &[usize],
+    slopes: &[Vec<f64>],
+) -> LinearisedCurve {
+    let sum = |of: &dyn Fn(&LinearisedCurve) -> &DMatrix<f64>| {
         let parts = functions.iter().enumerate().map(|(p, f)| {
             let mut part = of(&linearised[*f]).clone();
             for (mut row, slopes) in part.row_iter_mut().zip(slopes) {
@@ -424,7 +433,7 @@ fn combine(linearised: &[Linearised], functions: &[usize], slopes: &[Vec<f64>]) 
         let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
         each.fold(0.0, f64::max)
     };
-    Linearised {
+    LinearisedCurve {
         roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
         hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
         sizes: slopes.iter().enumerate().map(size).collect(),

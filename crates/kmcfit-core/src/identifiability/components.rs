@@ -5,20 +5,24 @@ use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::system::StageSamples;
 
-/// Functions that one factor multiplies: those of devices that have a function in common.
+/// Functions that one factor multiplies: those of systems that have a function in common.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Component {
     /// Indices into the list of functions.
     pub functions: Vec<usize>,
-    /// Indices of the devices.
-    pub devices: Vec<usize>,
+    /// Indices of the systems.
+    pub coefficient_sets: Vec<usize>,
 }
 
-/// The components of the devices that take part in an experiment.
+/// The components of the systems that take part in an experiment.
 pub(super) fn components(problem: &Problem) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
-    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
-        if !problem.experiments.iter().any(|e| e.device == which) {
+    for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
+        if !problem
+            .experiments
+            .iter()
+            .any(|e| e.coefficient_set == which)
+        {
             continue;
         }
         let shares = |c: &Component| c.functions.iter().any(|f| assembly.contains(f));
@@ -26,18 +30,18 @@ pub(super) fn components(problem: &Problem) -> Vec<Component> {
         found = others;
         let mut union = Component {
             functions: assembly.clone(),
-            devices: vec![which],
+            coefficient_sets: vec![which],
         };
         for part in joined {
             union.functions.extend(part.functions);
-            union.devices.extend(part.devices);
+            union.coefficient_sets.extend(part.coefficient_sets);
         }
         union.functions.sort_unstable();
         union.functions.dedup();
-        union.devices.sort_unstable();
+        union.coefficient_sets.sort_unstable();
         found.push(union);
     }
-    found.sort_by_key(|c| c.devices[0]);
+    found.sort_by_key(|c| c.coefficient_sets[0]);
     found
 }
 
@@ -47,7 +51,7 @@ impl Component {
         &'a self,
         problem: &'a Problem,
     ) -> impl Iterator<Item = &'a Experiment> + 'a {
-        let mine = |e: &&Experiment| self.devices.contains(&e.device);
+        let mine = |e: &&Experiment| self.coefficient_sets.contains(&e.coefficient_set);
         problem.experiments.iter().filter(mine)
     }
 
@@ -65,7 +69,7 @@ impl Component {
     }
 
     /// The nodes at which a force acts in one of its experiments: at the node itself or in a step
-    /// beside it. Motion of the base is no force here: it pushes with `m b''`, which scales with `m`.
+    /// beside it. Response of the base is no force here: it pushes with `m b''`, which scales with `m`.
     pub fn forced(&self, problem: &Problem) -> Vec<bool> {
         let mut forced = vec![false; problem.functions.nodes()];
         for experiment in self.experiments(problem) {

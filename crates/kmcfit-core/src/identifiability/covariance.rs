@@ -13,11 +13,11 @@ use nalgebra::{DMatrix, DVector};
 /// What is known of the parameters, in the scaled directions.
 pub(super) struct Information {
     sensitivity: Sensitivity,
-    /// Rows that are measurements: readings, then priors.
+    /// Rows that are measurements: samples, then priors.
     measured: DMatrix<f64>,
     /// Rows that only pull: penalties and broken soft constraints.
     pulled: DMatrix<f64>,
-    /// Rounding of a motion as large as the largest reading, which at worst adds up from step to
+    /// Rounding of a response as large as the largest sample, which at worst adds up from step to
     /// step.
     rounding: f64,
 }
@@ -29,7 +29,7 @@ pub(super) struct Factor {
     pub root: DMatrix<f64>,
     /// Orthonormal basis of the unseen directions, as columns.
     pub unseen: DMatrix<f64>,
-    /// Estimated variance of a reading without sigma, in the square of its unit; `None` if all have one.
+    /// Estimated variance of a sample without sigma, in the square of its unit; `None` if all have one.
     pub variance: Option<f64>,
 }
 
@@ -59,8 +59,8 @@ impl Information {
         for penalty in &problem.penalties {
             pulled = stacked(&pulled, &roughness(problem, penalty, directions));
         }
-        let readings = problem.channels().flat_map(|c| c.observed());
-        let largest = readings.fold(0.0f64, |most, y| most.max(y.abs()));
+        let samples = problem.channels().flat_map(|c| c.observed());
+        let largest = samples.fold(0.0f64, |most, y| most.max(y.abs()));
         Self {
             measured,
             pulled,
@@ -69,7 +69,7 @@ impl Information {
         }
     }
 
-    /// Readings, priors and penalties as rows of one matrix.
+    /// Samples, priors and penalties as rows of one matrix.
     pub fn rows(&self) -> DMatrix<f64> {
         stacked(&self.measured, &self.pulled)
     }
@@ -84,7 +84,7 @@ impl Information {
     }
 
     /// The covariance where the rows `held` cannot change: `H^+ M H^+` in the null space of these rows,
-    /// with `H = J^T W J + R` and `M = J^T W J` (`W` times the estimated variance for readings without a
+    /// with `H = J^T W J + R` and `M = J^T W J` (`W` times the estimated variance for samples without a
     /// sigma).
     pub fn factor(&self, held: &[&ActiveRow]) -> Factor {
         let directions = &self.sensitivity.directions;
@@ -113,12 +113,12 @@ impl Information {
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
-            let readings = self
+            let samples = self
                 .sensitivity
                 .roots
                 .iter()
                 .zip(&self.sensitivity.has_sigma);
-            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(readings) {
+            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(samples) {
                 if !has_sigma {
                     row *= root * variance.sqrt();
                 }
@@ -136,8 +136,8 @@ impl Information {
         }
     }
 
-    /// `sum r^2 / (n - effective parameters)` over the readings without a sigma; infinite where there
-    /// are no more readings than that. A fit that leaves nothing leaves the rounding of the motion:
+    /// `sum r^2 / (n - effective parameters)` over the samples without a sigma; infinite where there
+    /// are no more samples than that. A fit that leaves nothing leaves the rounding of the response:
     /// else all would be known for certain, also what they do not see.
     fn variance(&self, answers: &DMatrix<f64>) -> Option<f64> {
         let s = &self.sensitivity;
@@ -167,13 +167,13 @@ fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
 
 impl Problem {
     /// Covariance of the parameters at an evaluated point, from the linearised predictions:
-    /// `(J^T W J)^-1` with `W = 1/sigma^2` where the readings have a sigma (the Cramer-Rao bound for
+    /// `(J^T W J)^-1` with `W = 1/sigma^2` where the samples have a sigma (the Cramer-Rao bound for
     /// Gaussian noise), else times the residuals' mean square. Penalties, constraints and priors do
     /// not count. `None` where some direction is not identifiable, there are too many parameters, or
     /// noise is neither given nor left by the fit.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
-        let (n, readings) = (self.parameters(), self.reading_count());
-        if n == 0 || n > FEW_PARAMETERS || readings <= n {
+        let (n, samples) = (self.parameters(), self.sample_count());
+        if n == 0 || n > FEW_PARAMETERS || samples <= n {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
@@ -182,7 +182,7 @@ impl Problem {
         let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
         let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
             true => 1.0,
-            false => squares / (readings - n) as f64,
+            false => squares / (samples - n) as f64,
         };
         // A fit that leaves nothing says nothing of the noise.
         (factorisation.rank == n && scale > 0.0).then(|| {

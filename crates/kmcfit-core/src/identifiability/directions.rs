@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 /// With sizes `P_j` of the functions ([`Problem::natural_scales`]) each direction has length one in
 /// `sum_j 1/T integral (delta p_j / P_j)^2 dt + sum_s (delta x_s / size_s)^2`: one unit of `z_k` is a
 /// change by 100 % of the natural size, root mean square over the record. So a singular value says by
-/// how many standard deviations all readings together answer to such a change, whatever the basis.
+/// how many standard deviations all samples together answer to such a change, whatever the basis.
 ///
 /// There is one direction per parameter, or, where these would be too many, hat functions over groups
 /// of neighbouring parameters: a coarser set of smooth directions. What is said of those holds for
@@ -169,11 +169,11 @@ mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
 
-    /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is sought.
+    /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is estimated.
     fn coarse() -> (Problem, Directions) {
         let times: Vec<f64> = (0..=200).map(|i| 0.05 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
-        let record = Record::new("decay").displacement(&times, &readings);
+        let samples: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
         let parts = [
             CoefficientSpec::nodal(1.0),
             CoefficientSpec::constant(0.1),

@@ -27,18 +27,18 @@ use nalgebra::{DMatrix, DVector};
 pub struct CandidateChannel {
     /// What.
     pub kind: ChannelKind,
-    /// Standard deviation of a reading, in the unit of the kind.
+    /// Standard deviation of a sample, in the unit of the kind.
     pub sigma: f64,
 }
 
-/// A record that could be made, of the main device over the whole grid.
+/// A record that could be made, of the shared coefficient set over the whole grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct CandidateExperiment {
     /// Its name.
     pub name: String,
     /// Displacement and velocity at the first node.
     pub initial: State,
-    /// What drives it; `None` is free motion.
+    /// What drives it; `None` is free response.
     pub excitation: Option<Excitation>,
     /// What is measured.
     pub channels: Vec<CandidateChannel>,
@@ -105,12 +105,12 @@ impl Ranked {
 
 /// The candidates, best first: by new directions, then by the volume of the bands. Those that cannot be
 /// simulated come last. With `penalties` these count as seen when the bands are compared; new
-/// directions are always those of the readings.
+/// directions are always those of the samples.
 pub fn rank_experiments(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    candidates: &[Candidate],
+    candidates: &[CandidateExperiment],
     penalties: bool,
 ) -> Vec<Ranked> {
     let sensitivity = Sensitivity::of(problem, evaluation);
@@ -127,7 +127,7 @@ pub fn rank_experiments(
         false => seen,
     };
     let gauge = Gauge::at(problem, theta);
-    let gain = |candidate: &Candidate| -> Result<Gain, String> {
+    let gain = |candidate: &CandidateExperiment| -> Result<Gain, String> {
         let experiment = simulated(problem, candidate)?;
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = Factorisation::of(&stacked(now, &added)).rank;
@@ -175,7 +175,7 @@ fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gau
 }
 
 /// The candidate as an experiment; why it is none otherwise.
-fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, String> {
+fn simulated(problem: &Problem, candidate: &CandidateExperiment) -> Result<Experiment, String> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
     if candidate.channels.is_empty() {
@@ -216,7 +216,7 @@ fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, Str
             grid,
             nodes,
         );
-        experiment = experiment.with_channel(made.ok_or("its readings are not on the grid")?);
+        experiment = experiment.with_channel(made.ok_or("its samples are not on the grid")?);
     }
     Ok(experiment)
 }

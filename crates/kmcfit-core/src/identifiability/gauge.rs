@@ -1,6 +1,6 @@
-//! The directions in which the motion cannot change: the common scale of the functions.
+//! The directions in which the response cannot change: the common scale of the functions.
 //!
-//! With `f = 0` the motion of `s(t) (m, c, k)` is that of `(m, c, k)`. At a point, `s = 1 + epsilon sigma(t)`
+//! With `f = 0` the response of `s(t) (m, c, k)` is that of `(m, c, k)`. At a point, `s = 1 + epsilon sigma(t)`
 //! changes the functions by `delta p_j = epsilon sigma(t) p_j`, for all `j` alike. A gauge direction is a
 //! `delta theta` that does this in every basis, with `sigma = 0` where a force acts or a function that
 //! is known is not zero, and that no equality constraint forbids.
@@ -8,7 +8,7 @@
 use super::components::{Component, components};
 use super::directions::Directions;
 use super::factorisation::{column_space, null_space};
-use super::sensitivity::Spectrum;
+use super::sensitivity::SingularSpectrum;
 use crate::functions::Design;
 use crate::problem::Problem;
 use crate::system::quadrature::trapezoid_weights;
@@ -42,7 +42,7 @@ pub struct Gauge {
     pub directions: Vec<GaugeDirection>,
 }
 
-/// A direction that the readings do not see, with the name of what it does.
+/// A direction that the samples do not see, with the name of what it does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
     /// The gauge it belongs to.
@@ -119,10 +119,10 @@ impl Gauge {
         inside.norm_squared() / z.norm_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// The directions that the readings do not see and that are mostly gauge: constant factors
-    /// first, then those over time, orthogonal to them. The rest of [`Spectrum::unseen`] has other
+    /// The directions that the samples do not see and that are mostly gauge: constant factors
+    /// first, then those over time, orthogonal to them. The rest of [`SingularSpectrum::unseen`] has other
     /// reasons.
-    pub fn unseen(&self, spectrum: &Spectrum) -> Vec<Named> {
+    pub fn unseen(&self, spectrum: &SingularSpectrum) -> Vec<Named> {
         let directions = spectrum.directions();
         let mut named = Vec::new();
         let constant = basis_of(self.constant(), directions);
@@ -161,7 +161,7 @@ fn basis_of<'a>(
 
 /// The directions of the space `basis` (orthonormal columns) that are not seen: principal directions
 /// between it and the null space.
-fn unseen_in(spectrum: &Spectrum, basis: &DMatrix<f64>, name: Option<&str>) -> Vec<Named> {
+fn unseen_in(spectrum: &SingularSpectrum, basis: &DMatrix<f64>, name: Option<&str>) -> Vec<Named> {
     let Some(name) = name else {
         return Vec::new();
     };

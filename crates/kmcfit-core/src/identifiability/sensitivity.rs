@@ -8,28 +8,28 @@ use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Singular values above this share of the largest count along smooth directions of many parameters, where the error of
-/// the stepper, some 1e-5 of a motion, makes the scale over time faintly seen.
+/// the stepper, some 1e-5 of a response, makes the scale over time faintly seen.
 pub const COARSE_RANK: f64 = 1e-5;
 /// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
-/// readings of 3000 parameters. Beyond it the directions are made coarser.
+/// samples of 3000 parameters. Beyond it the directions are made coarser.
 const MOST_WORK: f64 = 3.1e9;
 /// Number of smooth directions, then.
 const COARSE: usize = 600;
 
-/// `sqrt(w_i) dz_i/dtheta . d_k` for all readings `i` and directions `k`.
+/// `sqrt(w_i) dz_i/dtheta . d_k` for all samples `i` and directions `k`.
 ///
-/// `w` are the weights of the readings (`1/sigma^2`, or the quadrature weights of the integral cost; of
+/// `w` are the weights of the samples (`1/sigma^2`, or the quadrature weights of the integral cost; of
 /// a robust loss those of the squares that stand for it), and the directions `d_k` have natural sizes
 /// ([`Directions`]), so the entries have no unit with sigmas, and that of `sqrt(J)` without.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
-    /// Readings x directions.
+    /// Samples x directions.
     pub jacobian: DMatrix<f64>,
-    /// `sqrt(w_i) r_i` with the residuals `r = model - reading`.
+    /// `sqrt(w_i) r_i` with the residuals `r = model - sample`.
     pub residuals: Vec<f64>,
     /// `sqrt(w_i)`, in the inverse unit of the channel or with the root of a second.
     pub roots: Vec<f64>,
-    /// Whether each reading has a standard deviation.
+    /// Whether each sample has a standard deviation.
     pub has_sigma: Vec<bool>,
     /// What the columns differentiate along.
     pub directions: Directions,
@@ -39,12 +39,12 @@ pub struct Sensitivity {
 
 impl Sensitivity {
     /// At an evaluated point, along all parameters; along some 600 smooth directions where these are
-    /// more than about 1000 readings of 3000 parameters ([`Directions::is_coarse`] says so): their rank is
+    /// more than about 1000 samples of 3000 parameters ([`Directions::is_coarse`] says so): their rank is
     /// that of functions on as many knots. The whole Jacobian is still to be had by
-    /// [`Sensitivity::along`], 2000 readings of 6000 parameters in a second; its decomposition takes a
+    /// [`Sensitivity::along`], 2000 samples of 6000 parameters in a second; its decomposition takes a
     /// minute.
     pub fn of(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let (rows, columns) = (problem.reading_count() as f64, problem.parameters() as f64);
+        let (rows, columns) = (problem.sample_count() as f64, problem.parameters() as f64);
         let fits = rows * columns * rows.min(columns) <= MOST_WORK;
         let most = if fits { usize::MAX } else { COARSE };
         Self::along(
@@ -84,13 +84,13 @@ impl Sensitivity {
     }
 
     /// Singular values and directions.
-    pub fn spectrum(&self) -> Spectrum {
+    pub fn spectrum(&self) -> SingularSpectrum {
         let mut factorisation = Factorisation::of(&self.jacobian);
         if self.directions.is_coarse() {
             // Along smooth directions the scale over time shows through the error of the stepper.
             factorisation = factorisation.above(COARSE_RANK);
         }
-        Spectrum {
+        SingularSpectrum {
             factorisation,
             directions: self.directions.clone(),
             names: self.names.clone(),
@@ -103,9 +103,9 @@ fn by_tangents(
     problem: &Problem,
     evaluation: &Evaluation,
     directions: &Directions,
-    readings: usize,
+    samples: usize,
 ) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(readings, directions.len());
+    let mut jacobian = DMatrix::zeros(samples, directions.len());
     for k in 0..directions.len() {
         let changes = problem.predictions_tangent(evaluation, &directions.column(k));
         let all = changes.iter().flatten().flatten();
@@ -114,15 +114,15 @@ fn by_tangents(
     jacobian
 }
 
-/// What the readings see: `J = U S V^T`.
+/// What the samples see: `J = U S V^T`.
 #[derive(Debug, Clone)]
-pub struct Spectrum {
+pub struct SingularSpectrum {
     factorisation: Factorisation,
     directions: Directions,
     names: Vec<String>,
 }
 
-/// A direction of the parameters with what the readings make of it.
+/// A direction of the parameters with what the samples make of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Its singular value.
@@ -133,9 +133,9 @@ pub struct Seen {
     pub functions: Vec<(String, Vec<f64>)>,
 }
 
-impl Spectrum {
-    /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
-    /// readings together per change by 100 % of the natural sizes ([`Directions`]).
+impl SingularSpectrum {
+    /// Decreasing; as many as the smaller of samples and directions. In standard deviations of all
+    /// samples together per change by 100 % of the natural sizes ([`Directions`]).
     pub fn singular_values(&self) -> &[f64] {
         &self.factorisation.singular_values
     }
@@ -188,7 +188,7 @@ impl Spectrum {
         each.collect()
     }
 
-    /// The `count` directions that the readings see best.
+    /// The `count` directions that the samples see best.
     pub fn best(&self, problem: &Problem, count: usize) -> Vec<Seen> {
         self.at(problem, 0..count)
     }
@@ -202,9 +202,9 @@ impl Spectrum {
     pub fn sentence(&self) -> String {
         let (rank, of) = (self.rank(), self.of());
         match self.directions.is_coarse() {
-            false => format!("the readings see {rank} of {of} directions"),
+            false => format!("the samples see {rank} of {of} directions"),
             true => format!(
-                "the readings see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
+                "the samples see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
                  best (of {} parameters; below that the stepper's own error shows)",
                 self.directions.parameters()
             ),

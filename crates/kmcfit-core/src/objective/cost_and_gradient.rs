@@ -10,7 +10,7 @@ impl Problem {
     /// The cost `J` at `theta`, and its Euclidean gradient `dJ/dtheta` by the discrete adjoint into
     /// `gradient`: what an optimiser of one's own asks for.
     ///
-    /// One record of a device with one value a node, in linear free motion by the midpoint rule and
+    /// One record of a system with one value a node, in linear free response by the midpoint rule and
     /// seen at every node, is never written down: forward and adjoint solve run in blocks of the
     /// record at once, and memory is what `theta` and `gradient` take. A record of some 100,000 nodes or more is
     /// shared with a second thread, where a processor is to spare; the bits are the same. Everything
@@ -65,8 +65,8 @@ impl Problem {
         finite.then_some(cost)
     }
 
-    /// The only record, with its channel and the weights of its readings, if it is of free motion, has a
-    /// reading at every node, and its device has the functions as they are listed, with one value a node.
+    /// The only record, with its channel and the weights of its samples, if it is of free response, has a
+    /// sample at every node, and its system has the functions as they are listed, with one value a node.
     pub(crate) fn one_full_record(&self) -> Option<(&Experiment, &Channel, [f64; 2])> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
@@ -80,7 +80,7 @@ impl Problem {
             && channel.len() == nodes
             && channel.stride() == Some(1)
             && self.functions.scalars().is_empty()
-            && matches!(self.functions.assemblies(), [only] if only == &[0, 1, 2])
+            && matches!(self.functions.coefficient_sets(), [only] if only == &[0, 1, 2])
             && designs.all(|d| matches!(d, Design::Identity))
             && experiment
                 .excitation
@@ -101,10 +101,10 @@ mod tests {
     fn problem() -> Problem {
         let grid = Grid::new(0.0, 25.0, 200).unwrap();
         let times = grid.times();
-        let readings: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
         let record = Record::new("free decay")
             .from_state(3.3, 1.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         Builder::new([2.0, 0.5, 1.0].map(CoefficientSpec::nodal))
             .record(record)
             .method(Method::Midpoint)
@@ -121,7 +121,7 @@ mod tests {
         assert!(problem.fused_least_squares(&theta, &mut gradient).is_some());
     }
 
-    /// A device that takes its functions in another order than they are listed in.
+    /// A system that takes its functions in another order than they are listed in.
     #[test]
     fn functions_in_any_order() {
         let mut problem = problem();
@@ -133,7 +133,7 @@ mod tests {
             .try_into()
             .unwrap();
         let grid = problem.system.grid;
-        let functions = Parameterization::with_devices(
+        let functions = Parameterization::with_coefficient_sets(
             vec![k, m, c],
             vec![vec![1, 2, 0]],
             grid.nodes(),

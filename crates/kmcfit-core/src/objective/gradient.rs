@@ -119,7 +119,7 @@ impl Problem {
     fn discrete_gradient(&self, evaluation: &Evaluation) -> Vec<f64> {
         let mut gradient = vec![0.0; self.parameters()];
         let mut nodal: Vec<Option<NodalCoefficients>> =
-            vec![None; self.functions.assemblies().len()];
+            vec![None; self.functions.coefficient_sets().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.channels.is_empty()
@@ -128,13 +128,13 @@ impl Problem {
                 continue;
             }
             let view = self.view(evaluation, e);
-            let empty = || self.functions.empty_device();
-            let total = nodal[experiment.device].get_or_insert_with(empty);
+            let empty = || self.functions.empty_nodal();
+            let total = nodal[experiment.coefficient_set].get_or_insert_with(empty);
             let direct = &mut CoefficientGradient::AtNodes(total);
             let source = self.source(evaluation, e, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
-            add(total, &share.device);
-            add_initial(experiment.sought, share.initial, &mut scalars);
+            add(total, &share.nodal);
+            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
         }
         for (which, nodal) in nodal.iter().enumerate() {
             if let Some(nodal) = nodal {
@@ -145,7 +145,7 @@ impl Problem {
         gradient
     }
 
-    /// The derivative of the misfit of experiment `e` with respect to its motion; those at fixed states are added to
+    /// The derivative of the misfit of experiment `e` with respect to its response; those at fixed states are added to
     /// `direct` and `scalars`.
     fn source(
         &self,
@@ -163,7 +163,7 @@ impl Problem {
         source
     }
 
-    /// Adds the part of experiment `e` if all functions of its device are constants: nothing is then written to the
+    /// Adds the part of experiment `e` if all functions of its system are constants: nothing is then written to the
     /// nodes. Whether that was possible; if not, nothing is added.
     fn add_gradient_of_constants(
         &self,
@@ -173,7 +173,7 @@ impl Problem {
         scalars: &mut [f64],
     ) -> bool {
         let (experiment, functions) = (&self.experiments[e], &self.functions);
-        let assembly = functions.assembly(experiment.device);
+        let assembly = functions.coefficient_set(experiment.coefficient_set);
         let view = self.view(evaluation, e);
         if view.engine() != Engine::Prefactored
             || !assembly.iter().all(|f| functions.is_constant_or_known(*f))
@@ -190,9 +190,9 @@ impl Problem {
         );
         let found = view.engine().discrete_adjoint_sums(
             view.system,
-            view.device,
+            view.nodal,
             view.excitation,
-            view.motion,
+            view.response,
             &source,
         );
         let Some((sums, initial)) = found else {
@@ -204,7 +204,7 @@ impl Problem {
                 gradient[first + j] += entry * (direct + sum);
             }
         }
-        add_initial(experiment.sought, initial, &mut own);
+        add_initial(experiment.initial_parameters, initial, &mut own);
         scalars.iter_mut().zip(&own).for_each(|(s, own)| *s += own);
         true
     }
@@ -213,28 +213,28 @@ impl Problem {
     fn continuous_gradient(&self, evaluation: &Evaluation) -> (Vec<f64>, Vec<f64>) {
         assert!(
             self.supports_continuous(),
-            "Eq. 13 needs one reading per node and no sigma"
+            "Eq. 13 needs one sample per node and no sigma"
         );
         let mut nodal: Vec<Option<NodalCoefficients>> =
-            vec![None; self.functions.assemblies().len()];
+            vec![None; self.functions.coefficient_sets().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
             let share = continuous_adjoint(
                 &self.system,
-                view.device,
+                view.nodal,
                 view.excitation,
-                view.motion,
+                view.response,
                 experiment.channels[0].observed(),
             );
-            match &mut nodal[experiment.device] {
-                Some(total) => add(total, &share.device),
-                none => *none = Some(share.device),
+            match &mut nodal[experiment.coefficient_set] {
+                Some(total) => add(total, &share.nodal),
+                none => *none = Some(share.nodal),
             }
-            add_initial(experiment.sought, share.initial, &mut scalars);
+            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
         }
-        let or_empty = |device: Option<NodalCoefficients>| {
-            device.unwrap_or_else(|| self.functions.empty_device())
+        let or_empty = |nodal: Option<NodalCoefficients>| {
+            nodal.unwrap_or_else(|| self.functions.empty_nodal())
         };
         let nodal: Vec<NodalCoefficients> = nodal.into_iter().map(or_empty).collect();
         let grid = &self.system.grid;
@@ -277,8 +277,8 @@ impl Problem {
 }
 
 /// Adds a gradient with respect to an initial state to the scalars that it is.
-fn add_initial(sought: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
-    for (index, slope) in sought
+fn add_initial(estimated: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
+    for (index, slope) in estimated
         .into_iter()
         .zip([gradient.displacement, gradient.velocity])
     {

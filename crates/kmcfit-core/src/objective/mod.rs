@@ -6,16 +6,16 @@ mod gradient_check;
 mod jacobian;
 mod node_aligned;
 mod prediction;
-mod refine;
 mod scales;
 mod simulated_record;
+mod step_halving;
 mod verify;
 
 pub use gradient::{Gradient, GradientKind};
 pub use gradient_check::GradientCheck;
-pub use refine::Refined;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
+pub use step_halving::Refined;
 pub use verify::GradientError;
 
 use crate::problem::Problem;
@@ -29,28 +29,28 @@ use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 pub struct Evaluation {
     /// Cost `J`, the sum of the next two.
     pub cost: f64,
-    /// Part of the readings.
+    /// Part of the samples.
     pub misfit: f64,
     /// Part of the penalties.
     pub regularisation: f64,
-    /// The main device at this point.
-    pub device: NodalCoefficients,
-    /// The other devices of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
-    pub own_devices: Vec<NodalCoefficients>,
+    /// The shared coefficient set at this point.
+    pub nodal: NodalCoefficients,
+    /// The other systems of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    pub own_nodal: Vec<NodalCoefficients>,
     /// The scalars at this point.
     pub scalars: Vec<f64>,
-    /// The motion in each experiment.
+    /// The response in each experiment.
     pub trajectories: Vec<Trajectory>,
-    /// What the model says of the readings, for each experiment and each of its channels.
+    /// What the model says of the samples, for each experiment and each of its channels.
     pub predictions: Vec<Vec<Vec<f64>>>,
 }
 
 impl Evaluation {
-    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
-    pub fn device_of(&self, which: usize) -> &NodalCoefficients {
+    /// System `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    pub fn nodal_of(&self, which: usize) -> &NodalCoefficients {
         match which {
-            0 => &self.device,
-            own => &self.own_devices[own - 1],
+            0 => &self.nodal,
+            own => &self.own_nodal[own - 1],
         }
     }
 }
@@ -58,13 +58,13 @@ impl Evaluation {
 impl Problem {
     /// Storage for evaluations, used again and again by [`Problem::evaluate_into`].
     pub fn workspace(&self) -> Evaluation {
-        let devices = self.functions.assemblies().len();
+        let nodal_sets = self.functions.coefficient_sets().len();
         Evaluation {
             cost: f64::NAN,
             misfit: f64::NAN,
             regularisation: f64::NAN,
-            device: self.functions.empty_device(),
-            own_devices: vec![self.functions.empty_device(); devices - 1],
+            nodal: self.functions.empty_nodal(),
+            own_nodal: vec![self.functions.empty_nodal(); nodal_sets - 1],
             scalars: vec![0.0; self.functions.scalars().len()],
             trajectories: (self.experiments.iter())
                 .map(|e| Trajectory::zeros(e.nodes))
@@ -75,16 +75,16 @@ impl Problem {
         }
     }
 
-    /// Cost, devices and motions for the parameters `theta`.
+    /// Cost, systems and responses for the parameters `theta`.
     ///
     /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
     /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
-    /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
+    /// of `weight sum |D theta|` ([`crate::functions::TotalVariation`]) plus the price of the soft
     /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
     /// ([`crate::functions::ScalarParameter::price`]).
     ///
     /// # Errors
-    /// A [`SimulationError`] if a motion does not exist (the mass is not positive, or it overflows), or the
+    /// A [`SimulationError`] if a response does not exist (the mass is not positive, or it overflows), or the
     /// cost overflows.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, SimulationError> {
         let mut evaluation = self.workspace();
@@ -116,7 +116,7 @@ impl Problem {
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         self.set_parameters(theta, evaluation);
-        self.motions(purpose, evaluation)?;
+        self.responses(purpose, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         if !evaluation.cost.is_finite() {
@@ -127,9 +127,9 @@ impl Problem {
 
     /// Functions and scalars for the parameters `theta`.
     pub(crate) fn set_parameters(&self, theta: &[f64], evaluation: &mut Evaluation) {
-        self.functions.device_into(theta, 0, &mut evaluation.device);
-        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
-            self.functions.device_into(theta, i + 1, own);
+        self.functions.nodal_into(theta, 0, &mut evaluation.nodal);
+        for (i, own) in evaluation.own_nodal.iter_mut().enumerate() {
+            self.functions.nodal_into(theta, i + 1, own);
         }
         evaluation.scalars.copy_from_slice(self.scalars(theta));
     }
@@ -142,27 +142,27 @@ impl Problem {
         self.channels().zip(evaluation.predictions.iter().flatten())
     }
 
-    fn motions(
+    fn responses(
         &self,
         purpose: Purpose,
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         evaluation.misfit = 0.0;
         for (e, experiment) in self.experiments.iter().enumerate() {
-            let device = match experiment.device {
-                0 => &evaluation.device,
-                own => &evaluation.own_devices[own - 1],
+            let nodal = match experiment.coefficient_set {
+                0 => &evaluation.nodal,
+                own => &evaluation.own_nodal[own - 1],
             };
-            let motion = &mut evaluation.trajectories[e];
+            let response = &mut evaluation.trajectories[e];
             let initial = experiment.initial_state(&evaluation.scalars);
             let (system, excitation) = (&self.system, experiment.excitation.as_ref());
-            let engine = Engine::choose(system, excitation, motion.nodes(), purpose);
-            engine.forward_into(system, device, initial, excitation, motion)?;
+            let engine = Engine::choose(system, excitation, response.nodes(), purpose);
+            engine.forward_into(system, nodal, initial, excitation, response)?;
             let view = SimulatedRecord {
                 system,
-                device,
+                nodal,
                 excitation,
-                motion,
+                response,
                 scalars: &evaluation.scalars,
             };
             let predictions = experiment
@@ -182,9 +182,9 @@ impl Problem {
         let experiment = &self.experiments[e];
         SimulatedRecord {
             system: &self.system,
-            device: evaluation.device_of(experiment.device),
+            nodal: evaluation.nodal_of(experiment.coefficient_set),
             excitation: experiment.excitation.as_ref(),
-            motion: &evaluation.trajectories[e],
+            response: &evaluation.trajectories[e],
             scalars: &evaluation.scalars,
         }
     }
@@ -197,24 +197,24 @@ impl Problem {
         along: &[f64],
     ) -> Vec<Vec<Vec<f64>>> {
         let scalars = self.scalars(along);
-        let devices: Vec<NodalCoefficients> = (0..self.functions.assemblies().len())
+        let nodal_sets: Vec<NodalCoefficients> = (0..self.functions.coefficient_sets().len())
             .map(|d| self.functions.direction(along, d))
             .collect();
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
-            let change = |sought: Option<usize>| sought.map_or(0.0, |i| scalars[i]);
+            let change = |estimated: Option<usize>| estimated.map_or(0.0, |i| scalars[i]);
             let direction = SystemTangent {
-                device: devices[experiment.device].clone(),
+                nodal: nodal_sets[experiment.coefficient_set].clone(),
                 initial: State {
-                    displacement: change(experiment.sought[0]),
-                    velocity: change(experiment.sought[1]),
+                    displacement: change(experiment.initial_parameters[0]),
+                    velocity: change(experiment.initial_parameters[1]),
                 },
             };
-            let (device, excitation) = (view.device, view.excitation);
-            let motion = tangent(view.system, device, excitation, view.motion, &direction);
+            let (nodal, excitation) = (view.nodal, view.excitation);
+            let response = tangent(view.system, nodal, excitation, view.response, &direction);
             let along = RecordTangent {
-                device: &direction.device,
-                motion: &motion,
+                nodal: &direction.nodal,
+                response: &response,
                 scalars,
             };
             let channels = experiment.channels.iter();

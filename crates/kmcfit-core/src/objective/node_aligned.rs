@@ -9,12 +9,12 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
-    /// Whether reading `i` is the acceleration at node `i`.
+    /// Whether sample `i` is the acceleration at node `i`.
     pub(super) fn is_acceleration_on_nodes(&self) -> bool {
         self.is_on_every_node() && self.kind() == ChannelKind::Acceleration
     }
 
-    /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
+    /// Force and acceleration of the base at eight samples from sample `i` on; beyond the last one they mean
     /// nothing.
     #[inline(always)]
     fn around_eight<A: Arithmetic>(
@@ -31,7 +31,7 @@ impl Channel {
             let [forces, bases] = &mut rows;
             let lanes = forces.iter_mut().zip(bases).enumerate();
             for (l, (force, base)) in lanes.take(self.len() - i) {
-                let around = self.around_reading(excitation, i + l);
+                let around = self.around_sample(excitation, i + l);
                 (*force, *base) = (around.force, around.base);
             }
         }
@@ -49,15 +49,15 @@ impl Channel {
     ) {
         let nodes = NodalObservations {
             system: view.system,
-            device: view.device,
-            states: view.motion,
+            nodal: view.nodal,
+            states: view.response,
         };
         let around = self.around_eight(arithmetic, view.excitation, i);
         nodes.accelerations(arithmetic, i, around, seen);
     }
 }
 
-/// Appends what the model says of the readings of `channel`.
+/// Appends what the model says of the samples of `channel`.
 pub(super) struct Predict<'a> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -94,7 +94,7 @@ impl Kernel for Predict<'_> {
     }
 }
 
-/// [`Channel::add_transpose`] of such readings, after the filter.
+/// [`Channel::add_transpose`] of such samples, after the filter.
 pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -138,12 +138,12 @@ impl Kernel for AddTranspose<'_, '_> {
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
             match direct {
-                CoefficientGradient::AtNodes(device) => {
-                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                CoefficientGradient::AtNodes(nodal) => {
+                    for (values, by) in nodal.functions_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
-                // Lanes without a reading have no slope.
+                // Lanes without a sample have no slope.
                 CoefficientGradient::Summed(_) => {
                     for (sums, by) in sums.iter_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, sums);

@@ -10,16 +10,16 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::TimePoint;
 
 impl Channel {
-    /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
+    /// What the sensor sees at sample `i`, before gain, offset and drift, and its derivatives.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
             view.system,
             self.kind(),
-            view.device,
+            view.nodal,
             view.excitation,
-            view.motion,
+            view.response,
             self.places()[i],
-            self.around_reading(view.excitation, i),
+            self.around_sample(view.excitation, i),
         );
         if let Some(base) = self.base().get(i) {
             sensed.value += base;
@@ -34,12 +34,12 @@ impl Channel {
             self.places()[i].as_node(),
             self.base().is_empty(),
         ) {
-            (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
+            (ChannelKind::Displacement, Some(node), true) => view.response.displacement[node],
             _ => self.sensed(view, i).value,
         }
     }
 
-    /// What the model says of the readings.
+    /// What the model says of the samples.
     pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
         self.predict_into(view, &mut out);
@@ -50,7 +50,7 @@ impl Channel {
     pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
         if self.is_on_every_node() && self.is_plain() {
-            out.extend_from_slice(&view.motion.displacement[..self.len()]);
+            out.extend_from_slice(&view.response.displacement[..self.len()]);
             return;
         }
         if self.is_acceleration_on_nodes() {
@@ -149,15 +149,15 @@ impl Channel {
     }
 }
 
-/// The change of what is sensed when the motion and the device change.
+/// The change of what is sensed when the response and the system change.
 fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
-    let (y, v) = (&along.motion.displacement, &along.motion.velocity);
+    let (y, v) = (&along.response.displacement, &along.response.velocity);
     let by_states = sensed.states[0] * y[step]
         + sensed.states[1] * v[step]
         + sensed.states[2] * y[step + 1]
         + sensed.states[3] * v[step + 1];
     let mut change = by_states;
-    for (f, values) in along.device.functions().enumerate() {
+    for (f, values) in along.nodal.functions().enumerate() {
         for side in 0..2 {
             let slope = sensed.functions[side][f];
             if slope != 0.0 {

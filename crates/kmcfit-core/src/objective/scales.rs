@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 impl Problem {
     /// For each function of the list the larger of its own largest value and of the value at which
-    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
+    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the responses of
     /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
     /// of a damping that matters.
     pub fn natural_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
@@ -31,26 +31,27 @@ impl Problem {
         let terms = &self.system.terms;
         let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
-            .map(|motion| squares(motion, terms, step))
+            .map(|response| squares(response, terms, step))
             .collect();
         let any_read = self.experiments.iter().any(Experiment::is_read);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
-        for (which, assembly) in self.functions.assemblies().iter().enumerate() {
-            let device = evaluation.device_of(which);
+        for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
+            let nodal = evaluation.nodal_of(which);
             // Of the accelerations first, then of what each term sees.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
-                let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
+                let own =
+                    own.filter(|(e, _)| e.coefficient_set == which && (e.is_read() || !any_read));
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = size_of(&device.mass);
+            let mass = size_of(&nodal.mass);
             let inertia = mass * root(0);
             let natural = |j: usize| match root(j + 1) {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
             let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
-            let own = device.functions().map(size_of);
+            let own = nodal.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
@@ -86,11 +87,11 @@ impl Problem {
 }
 
 /// The sums over the nodes of `y''^2` and of `phi^2` of each term.
-fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
-    let (y, v) = (&motion.displacement, &motion.velocity);
+fn squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    let (y, v) = (&response.displacement, &response.velocity);
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
-        return squares_in_order(motion, terms, step);
+        return squares_in_order(response, terms, step);
     }
     let inertia = sum_of_squares(nodes, |i| curvature_at(y, step, i));
     let of = |term: &Term| match term {
@@ -104,9 +105,9 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
 
 /// [`squares`] of a short record: descents along the gradient alone depend on every bit, so all are added in order, those of
 /// four columns side by side, as each sum waits for itself.
-fn squares_in_order(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+fn squares_in_order(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     const PART: usize = 256;
-    let (y, v) = (&motion.displacement, &motion.velocity);
+    let (y, v) = (&response.displacement, &response.velocity);
     let mut sums = vec![0.0; terms.len() + 1];
     let mut part = [[0.0; PART]; 4];
     for (first, sums) in (0..).step_by(4).zip(sums.chunks_mut(4)) {
@@ -144,7 +145,7 @@ fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
     sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
 
-/// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
+/// How large displacement and velocity of a response are, from samples of one `kind` that are `spacing`
 /// (s) apart: their rms, and their dominant frequency.
 pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -172,7 +173,7 @@ mod tests {
     #[test]
     fn the_state_of_a_sine_has_its_size_whatever_was_read() {
         let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
-        let readings = |size: f64, phase: f64| -> Vec<f64> {
+        let samples = |size: f64, phase: f64| -> Vec<f64> {
             let at = |i: usize| size * (5.0 + (omega * spacing * i as f64 + phase).sin());
             (0..400).map(at).collect()
         };
@@ -188,7 +189,7 @@ mod tests {
         ];
         let rms = amplitude / 2f64.sqrt();
         for (kind, size, phase) in cases {
-            let [displacement, velocity] = state_scales(kind, &readings(size, phase), spacing);
+            let [displacement, velocity] = state_scales(kind, &samples(size, phase), spacing);
             // The dominant frequency is known to a small part of its distance to the next.
             assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
             assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
@@ -197,17 +198,17 @@ mod tests {
     }
 
     /// One period of `y = size cos(w t)` with m = 1 and k = w^2, a cubic stiffness of next to nothing, and
-    /// another such motion of three times the size, read or not.
+    /// another such response of three times the size, read or not.
     fn swinging(size: f64, other_is_read: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let record = |name: &str, size: f64| {
-            let readings: Vec<f64> = times
+            let samples: Vec<f64> = times
                 .iter()
                 .map(|t| size * (TAU * t / 10.0).cos())
                 .collect();
             Record::new(name)
                 .from_state(size, 0.0)
-                .displacement(&times, &readings)
+                .displacement(&times, &samples)
         };
         let stiffness = (TAU / 10.0).powi(2);
         let parts = [1.0, 0.0, stiffness].map(CoefficientSpec::fixed);
@@ -232,7 +233,7 @@ mod tests {
     #[test]
     fn the_natural_size_makes_a_force_as_large_as_that_of_the_mass() {
         let omega = TAU / 10.0;
-        // One motion of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
+        // One response of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
         // sixth powers.
         for (read, six_over_two) in [(false, 1.0), (true, 73.0)] {
             let found = sizes(&swinging(0.5, read));
@@ -245,7 +246,7 @@ mod tests {
         }
     }
 
-    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
+    /// A response of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
     /// then the size of its own values, and not an infinite one.
     #[test]
     fn a_term_that_sees_nothing_has_its_own_size() {

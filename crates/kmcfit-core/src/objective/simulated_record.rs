@@ -8,12 +8,12 @@ use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
     pub system: &'a System,
-    /// The device that moves.
-    pub device: &'a NodalCoefficients,
+    /// The system that moves.
+    pub nodal: &'a NodalCoefficients,
     /// What drives it.
     pub excitation: Option<&'a Excitation>,
-    /// Its motion.
-    pub motion: &'a Trajectory,
+    /// Its response.
+    pub response: &'a Trajectory,
     /// Values of all scalars.
     pub scalars: &'a [f64],
 }
@@ -21,10 +21,10 @@ pub struct SimulatedRecord<'a> {
 /// How a view changes along a direction.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordTangent<'a> {
-    /// Change of the device.
-    pub device: &'a NodalCoefficients,
-    /// Change of the motion.
-    pub motion: &'a Trajectory,
+    /// Change of the system.
+    pub nodal: &'a NodalCoefficients,
+    /// Change of the response.
+    pub response: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
 }
@@ -32,19 +32,19 @@ pub struct RecordTangent<'a> {
 impl SimulatedRecord<'_> {
     /// The engine of its response and derivatives.
     pub(crate) fn engine(&self) -> Engine {
-        let nodes = self.motion.nodes();
+        let nodes = self.response.nodes();
         Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
+    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its response.
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
+            response,
             ..
         } = self;
-        (self.engine()).discrete_adjoint(system, device, *excitation, motion, source)
+        (self.engine()).discrete_adjoint(system, nodal, *excitation, response, source)
     }
 }

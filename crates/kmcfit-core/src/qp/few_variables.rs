@@ -1,7 +1,7 @@
 //! Least squares in few variables by one triangular factor.
 
 use super::Subproblem;
-use crate::simd::tall_qr::{PIECE, Piece, Triangle};
+use crate::simd::tall_qr::{PIECE, RowBlock, Triangle};
 
 /// A column that keeps less than this share of its length depends on those before it.
 const INDEPENDENT: f64 = 1e-14;
@@ -49,7 +49,7 @@ pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
     rows.sort_by(|(a, _), (b, _)| b.total_cmp(a));
 
     let mut triangle = Triangle::new(free.len());
-    let mut piece = Piece::new(free.len());
+    let mut piece = RowBlock::new(free.len());
     let mut right = [0.0; PIECE];
     for part in rows.chunks(PIECE) {
         piece.clear();

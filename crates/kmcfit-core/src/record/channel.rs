@@ -4,35 +4,35 @@ use super::{ChannelKind, Loss, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputSample, TimePoint};
 
-/// The readings of one sensor.
+/// The samples of one sensor.
 ///
-/// The model of reading `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
-/// displacement, velocity or acceleration of the motion ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the
-/// base where the sensor does not move with it, and `t_0` the time of the first reading. With a
-/// filter, model and readings are filtered alike before they are compared.
+/// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
+/// displacement, velocity or acceleration of the response ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the
+/// base where the sensor does not move with it, and `t_0` the time of the first sample. With a
+/// filter, model and samples are filtered alike before they are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     kind: ChannelKind,
     times: Vec<f64>,
     places: Vec<TimePoint>,
     observed: Vec<f64>,
-    /// The readings before the filter; none without one.
+    /// The samples before the filter; none without one.
     unfiltered: Vec<f64>,
     weighting: Weighting,
     loss: Loss,
     sensor: Sensor,
-    /// Forces and accelerations of the base at the readings, if they are given.
+    /// Forces and accelerations of the base at the samples, if they are given.
     around: Option<[Vec<f64>; 2]>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
-    /// Whether reading `i` stands on node `i`.
+    /// Whether sample `i` stands on node `i`.
     on_every_node: bool,
 }
 
 impl Channel {
-    /// Readings `values` (in the SI unit of `kind`) at `times` (s, increasing), a motion over the
-    /// first `nodes` nodes of `grid`; `None` unless there is a reading, one time for each, and all
-    /// times are within the motion.
+    /// Samples `values` (in the SI unit of `kind`) at `times` (s, increasing), a response over the
+    /// first `nodes` nodes of `grid`; `None` unless there is a sample, one time for each, and all
+    /// times are within the response.
     pub fn new(
         kind: ChannelKind,
         times: Vec<f64>,
@@ -81,15 +81,15 @@ impl Channel {
         let times = (0..values.len()).map(|i| grid.time(i * stride)).collect();
         let kind = ChannelKind::Displacement;
         let channel = Self::new(kind, times, values, weighting, grid, grid.nodes());
-        let channel = channel.expect("readings on the nodes of the grid");
-        assert!(stride > 0, "readings advance");
+        let channel = channel.expect("samples on the nodes of the grid");
+        assert!(stride > 0, "samples advance");
         channel
     }
 
-    /// With what a residual costs; only readings with a sigma can have another loss than squares.
+    /// With what a residual costs; only samples with a sigma can have another loss than squares.
     ///
     /// # Panics
-    /// If a robust loss meets readings without a sigma.
+    /// If a robust loss meets samples without a sigma.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         assert!(
@@ -107,14 +107,14 @@ impl Channel {
         self
     }
 
-    /// With force and acceleration of the base at the times of the readings, which an acceleration
+    /// With force and acceleration of the base at the times of the samples, which an acceleration
     /// depends on; without them both are taken as linear over each step.
     ///
     /// # Panics
-    /// If there is not one for each reading.
+    /// If there is not one for each sample.
     #[must_use]
     pub fn with_surroundings(mut self, around: Vec<InputSample>) -> Self {
-        assert_eq!(around.len(), self.times.len(), "one for each reading");
+        assert_eq!(around.len(), self.times.len(), "one for each sample");
         let forces = around.iter().map(|a| a.force).collect();
         let bases = around.iter().map(|a| a.base).collect();
         self.around = Some([forces, bases]);
@@ -125,34 +125,34 @@ impl Channel {
     /// the mass that does not move with the base.
     ///
     /// # Panics
-    /// If there is not one for each reading.
+    /// If there is not one for each sample.
     #[must_use]
     pub fn with_base(mut self, base: Vec<f64>) -> Self {
-        assert_eq!(base.len(), self.times.len(), "one for each reading");
+        assert_eq!(base.len(), self.times.len(), "one for each sample");
         self.base = base;
         self
     }
 
-    /// With a zero-phase filter for readings and model; the readings given so far are filtered.
+    /// With a zero-phase filter for samples and model; the samples given so far are filtered.
     #[must_use]
     pub fn with_filter(mut self, filter: Vec<SecondOrder>) -> Self {
         if self.unfiltered.is_empty() {
             self.unfiltered = std::mem::take(&mut self.observed);
         }
         self.filter = filter;
-        self.filter_readings();
+        self.filter_samples();
         self
     }
 
-    /// With other readings: `predicted`, as the model says them (after the filter), plus `noise` as a
+    /// With other samples: `predicted`, as the model says them (after the filter), plus `noise` as a
     /// sensor adds it (before the filter).
     ///
     /// # Panics
-    /// If there is not one of each for every reading.
+    /// If there is not one of each for every sample.
     #[must_use]
     pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
-        assert_eq!(predicted.len(), self.len(), "one for each reading");
-        assert_eq!(noise.len(), self.len(), "one for each reading");
+        assert_eq!(predicted.len(), self.len(), "one for each sample");
+        assert_eq!(noise.len(), self.len(), "one for each sample");
         let filtered = match self.filter.is_empty() {
             true => noise.to_vec(),
             false => zero_phase(&self.filter, noise),
@@ -163,7 +163,7 @@ impl Channel {
         self
     }
 
-    fn filter_readings(&mut self) {
+    fn filter_samples(&mut self) {
         if !self.unfiltered.is_empty() {
             self.observed = zero_phase(&self.filter, &self.unfiltered);
         }
@@ -176,7 +176,7 @@ impl Channel {
         self
     }
 
-    /// The first `count` readings, at least one; filtered as if there had been no more.
+    /// The first `count` samples, at least one; filtered as if there had been no more.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
         let count = count.max(1);
@@ -197,23 +197,23 @@ impl Channel {
             filter: self.filter.clone(),
             on_every_node: self.on_every_node,
         };
-        part.filter_readings();
+        part.filter_samples();
         part
     }
 
-    /// The readings within the first `steps` steps, if there are any; what stands on the node behind them
+    /// The samples within the first `steps` steps, if there are any; what stands on the node behind them
     /// belongs to the next.
     pub(crate) fn within(&self, steps: usize) -> Option<Self> {
         let count = self.count_within(steps);
         (count > 0).then(|| self.first(count))
     }
 
-    /// How many readings [`Channel::within`] takes.
+    /// How many samples [`Channel::within`] takes.
     pub(crate) fn count_within(&self, steps: usize) -> usize {
         self.places.partition_point(|p| p.step < steps)
     }
 
-    /// The same readings on another grid over the same time; `None` if they are not all on it.
+    /// The same samples on another grid over the same time; `None` if they are not all on it.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
         let unfiltered = Self::new(
             self.kind,
@@ -235,7 +235,7 @@ impl Channel {
         self.kind
     }
 
-    /// Times of the readings, s.
+    /// Times of the samples, s.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
@@ -245,17 +245,17 @@ impl Channel {
         &self.places
     }
 
-    /// The readings, filtered if the channel has a filter, in the SI unit of the kind.
+    /// The samples, filtered if the channel has a filter, in the SI unit of the kind.
     pub fn observed(&self) -> &[f64] {
         &self.observed
     }
 
-    /// Number of readings; at least one.
+    /// Number of samples; at least one.
     pub fn len(&self) -> usize {
         self.observed.len()
     }
 
-    /// Never: a channel has a reading.
+    /// Never: a channel has a sample.
     pub fn is_empty(&self) -> bool {
         self.observed.is_empty()
     }
@@ -280,8 +280,8 @@ impl Channel {
         &self.filter
     }
 
-    /// Force and base at reading `i`: as given, or else linear over the step.
-    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
+    /// Force and base at sample `i`: as given, or else linear over the step.
+    pub(crate) fn around_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.around, excitation) {
             (Some([forces, bases]), _) => InputSample {
                 force: forces[i],
@@ -292,25 +292,25 @@ impl Channel {
         }
     }
 
-    /// [`Channel::base_at`] every reading; empty for none.
+    /// [`Channel::base_at`] every sample; empty for none.
     #[inline(always)]
     pub(crate) fn base(&self) -> &[f64] {
         &self.base
     }
 
-    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
+    /// Response of the base that a sensor fixed in space adds to sample `i`; zero for one that moves
     /// with the base.
     pub fn base_at(&self, i: usize) -> f64 {
         self.base.get(i).copied().unwrap_or(0.0)
     }
 
-    /// Time since the first reading, s.
+    /// Time since the first sample, s.
     pub fn age(&self, i: usize) -> f64 {
         self.times[i] - self.times[0]
     }
 
-    /// Whether the readings are displacements of a plain sensor, and nothing is between model and
-    /// readings.
+    /// Whether the samples are displacements of a plain sensor, and nothing is between model and
+    /// samples.
     pub(crate) fn is_plain(&self) -> bool {
         self.kind == ChannelKind::Displacement
             && self.sensor == Sensor::default()
@@ -318,30 +318,30 @@ impl Channel {
             && self.filter.is_empty()
     }
 
-    /// Whether all readings are displacements at nodes.
+    /// Whether all samples are displacements at nodes.
     pub(crate) fn is_displacement_at_nodes(&self) -> bool {
         let all = || self.places.iter().all(|p| p.as_node().is_some());
         self.kind == ChannelKind::Displacement && (self.on_every_node || all())
     }
 
-    /// Whether reading `i` stands on node `i`.
+    /// Whether sample `i` stands on node `i`.
     pub(crate) fn is_on_every_node(&self) -> bool {
         self.on_every_node
     }
 
-    /// Forces and accelerations of the base at the readings, if they are given.
+    /// Forces and accelerations of the base at the samples, if they are given.
     #[inline(always)]
     pub(crate) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
         self.around.as_ref()
     }
 
-    /// What the filter makes of a series over the readings.
+    /// What the filter makes of a series over the samples.
     pub(crate) fn filtered(&self, series: &[f64]) -> Vec<f64> {
         zero_phase(&self.filter, series)
     }
 
-    /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
-    /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
+    /// The nodes from one sample to the next, if the samples are displacements of a plain sensor at
+    /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and samples.
     pub fn stride(&self) -> Option<usize> {
         if self.is_plain() && self.on_every_node {
             return Some(1);

@@ -3,43 +3,43 @@
 use super::{Channel, Input};
 use crate::system::{Excitation, Grid, State};
 
-/// One record of a device's motion.
+/// One record of a system's response.
 #[derive(Debug, Clone)]
 pub struct Experiment {
     /// Name for reports.
     pub name: String,
-    /// Displacement and velocity at the first node; where they are sought, the start of the search.
+    /// Displacement and velocity at the first node; where they are estimated, the start of the search.
     pub initial: State,
-    /// The scalars that displacement and velocity at the first node are, where they are sought.
-    pub sought: [Option<usize>; 2],
-    /// What drives the motion, on the grid; `None` is free motion.
+    /// The scalars that displacement and velocity at the first node are, where they are estimated.
+    pub initial_parameters: [Option<usize>; 2],
+    /// What drives the response, on the grid; `None` is free response.
     pub excitation: Option<Excitation>,
     /// What it was made from; empty where it was given on the grid.
     pub drive: Input,
-    /// Number of nodes of its motion: a record may end before the grid does.
+    /// Number of nodes of its response: a record may end before the grid does.
     pub nodes: usize,
-    /// Which device of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies) moves.
-    pub device: usize,
+    /// Which system of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies) moves.
+    pub coefficient_set: usize,
     /// What was measured; none for an experiment that is only simulated.
     pub channels: Vec<Channel>,
 }
 
 impl Experiment {
-    /// Free motion of the main device over `nodes` nodes from a known state, without readings.
+    /// Free response of the shared coefficient set over `nodes` nodes from a known state, without samples.
     pub fn free(name: impl Into<String>, initial: State, nodes: usize) -> Self {
         Self {
             name: name.into(),
             initial,
-            sought: [None; 2],
+            initial_parameters: [None; 2],
             excitation: None,
             drive: Input::default(),
             nodes,
-            device: 0,
+            coefficient_set: 0,
             channels: Vec::new(),
         }
     }
 
-    /// With one more channel of readings.
+    /// With one more channel of samples.
     #[must_use]
     pub fn with_channel(mut self, channel: Channel) -> Self {
         self.channels.push(channel);
@@ -55,14 +55,14 @@ impl Experiment {
 
     /// The state at the first node, for the values `scalars` of all scalars.
     pub fn initial_state(&self, scalars: &[f64]) -> State {
-        let value = |sought: Option<usize>, known: f64| sought.map_or(known, |i| scalars[i]);
+        let value = |estimated: Option<usize>, known: f64| estimated.map_or(known, |i| scalars[i]);
         State {
-            displacement: value(self.sought[0], self.initial.displacement),
-            velocity: value(self.sought[1], self.initial.velocity),
+            displacement: value(self.initial_parameters[0], self.initial.displacement),
+            velocity: value(self.initial_parameters[1], self.initial.velocity),
         }
     }
 
-    /// The same experiment on a grid of half the step; `None` if its readings are not on it. An
+    /// The same experiment on a grid of half the step; `None` if its samples are not on it. An
     /// excitation that was given on the old grid is linear between its stages.
     pub fn halved(&self, grid: &Grid) -> Option<Self> {
         let nodes = 2 * self.nodes - 1;
@@ -83,7 +83,7 @@ impl Experiment {
         })
     }
 
-    /// Whether nothing drives the motion.
+    /// Whether nothing drives the response.
     pub fn is_free(&self) -> bool {
         self.excitation.as_ref().is_none_or(Excitation::is_zero)
     }
@@ -93,8 +93,8 @@ impl Experiment {
         !self.channels.is_empty()
     }
 
-    /// Number of readings of all channels.
-    pub fn reading_count(&self) -> usize {
+    /// Number of samples of all channels.
+    pub fn sample_count(&self) -> usize {
         self.channels.iter().map(Channel::len).sum()
     }
 }

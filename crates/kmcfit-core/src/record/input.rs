@@ -1,7 +1,7 @@
 //! Inputs over time, from which the excitation on any grid is made.
 
 use super::ChannelKind;
-use crate::signal::{Shape, Signal};
+use crate::signal::{ExcitationShape, Signal};
 use crate::system::{Excitation, Grid, StageSamples};
 
 /// A force over time.
@@ -10,7 +10,7 @@ pub enum Waveform {
     /// Measured, N.
     Samples(Signal),
     /// A formula, N.
-    Shape(Shape),
+    Shape(ExcitationShape),
 }
 
 /// A measured motion of the base.
@@ -22,7 +22,7 @@ pub enum BaseMotion {
     Displacement(Signal),
 }
 
-/// What drives a motion, at any time: from it the excitation on any grid is made.
+/// What drives a response, at any time: from it the excitation on any grid is made.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Input {
     /// The force.
@@ -32,7 +32,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
+    /// The excitation at the stages of the steps of a response over the first `nodes` nodes of `grid`.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
         let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
             let step = |i: usize| {

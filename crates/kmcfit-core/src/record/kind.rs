@@ -33,7 +33,7 @@ impl ChannelKind {
         }
     }
 
-    /// SI unit of motion along a line, or of turning.
+    /// SI unit of response along a line, or of turning.
     pub fn unit_of(self, angular: bool) -> &'static str {
         match (self, angular) {
             (_, false) => self.unit(),
@@ -43,7 +43,7 @@ impl ChannelKind {
         }
     }
 
-    /// SI unit of motion along a line.
+    /// SI unit of response along a line.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",

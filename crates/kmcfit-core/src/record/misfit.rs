@@ -6,19 +6,19 @@ use crate::system::quadrature::trapezoid_weights_at;
 use std::ops::Range;
 
 impl Channel {
-    /// Residuals `r = model - reading`, one per reading.
+    /// Residuals `r = model - sample`, one per sample.
     pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         predicted.iter().zip(self.observed()).map(|(y, o)| y - o)
     }
 
-    /// The residuals of some readings.
+    /// The residuals of some samples.
     pub(crate) fn residuals_of<'a>(
         &'a self,
         predicted: &'a [f64],
-        readings: Range<usize>,
+        samples: Range<usize>,
     ) -> impl Iterator<Item = f64> + 'a {
-        let pairs = predicted[readings.clone()].iter();
-        pairs.zip(&self.observed()[readings]).map(|(y, o)| y - o)
+        let pairs = predicted[samples.clone()].iter();
+        pairs.zip(&self.observed()[samples]).map(|(y, o)| y - o)
     }
 
     /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or
@@ -51,7 +51,7 @@ impl Channel {
             .sum()
     }
 
-    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
+    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the responses are close,
     /// the difference of two rounded costs would be lost in their rounding.
     pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
         let pairs = from.iter().zip(to).zip(self.observed()).enumerate();
@@ -70,7 +70,7 @@ impl Channel {
         pairs.map(difference).sum()
     }
 
-    /// The weights of the readings within and at both ends, if the cost is a sum of squares and all
+    /// The weights of the samples within and at both ends, if the cost is a sum of squares and all
     /// within have the same.
     pub fn uniform_weights(&self) -> Option<[f64; 2]> {
         match (self.weighting(), self.loss()) {
@@ -82,7 +82,7 @@ impl Channel {
         }
     }
 
-    /// Weight of the residual `r` of reading `i` in the least-squares problem that has the gradient
+    /// Weight of the residual `r` of sample `i` in the least-squares problem that has the gradient
     /// of the cost: `sum w r^2`.
     pub fn weight(&self, i: usize, r: f64) -> f64 {
         let weight = self.weighting().weight(i, self.len());
@@ -92,7 +92,7 @@ impl Channel {
         }
     }
 
-    /// `dJ/d model = 2 w r` of every reading.
+    /// `dJ/d model = 2 w r` of every sample.
     pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
         if let Some([inner, ends]) = self.uniform_weights() {
             let residuals = self.residuals(predicted);
@@ -111,7 +111,7 @@ impl Channel {
 }
 
 /// Weights of the trapezoid rule over times that need not be equally spaced: the paper's cost for
-/// irregular readings.
+/// irregular samples.
 pub fn integral_over(times: &[f64]) -> Weighting {
     Weighting::Trapezoid(trapezoid_weights_at(times))
 }

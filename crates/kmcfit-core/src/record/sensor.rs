@@ -1,31 +1,31 @@
 //! Sensors: gain, offset and drift between a response and its samples.
 
-use crate::functions::Value;
+use crate::functions::ScalarValue;
 
-/// Reading `= gain * motion + offset + drift * time`.
+/// Sample `= gain * response + offset + drift * time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
     /// Factor, without unit.
-    pub gain: Value,
-    /// Reading at rest, in the unit of the channel.
-    pub offset: Value,
+    pub gain: ScalarValue,
+    /// Sample at rest, in the unit of the channel.
+    pub offset: ScalarValue,
     /// Change of the offset, in the unit of the channel per s.
-    pub drift: Value,
+    pub drift: ScalarValue,
 }
 
 impl Default for Sensor {
     /// A perfect sensor.
     fn default() -> Self {
         Self {
-            gain: Value::Known(1.0),
-            offset: Value::Known(0.0),
-            drift: Value::Known(0.0),
+            gain: ScalarValue::Known(1.0),
+            offset: ScalarValue::Known(0.0),
+            drift: ScalarValue::Known(0.0),
         }
     }
 }
 
 impl Sensor {
-    fn list(self) -> [Value; 3] {
+    fn list(self) -> [ScalarValue; 3] {
         [self.gain, self.offset, self.drift]
     }
 
@@ -40,9 +40,9 @@ impl Sensor {
             .map(|index| index.map_or(0.0, |i| scalars[i]))
     }
 
-    /// Which scalars they are, where they are sought.
+    /// Which scalars they are, where they are estimated.
     pub fn indices(self) -> [Option<usize>; 3] {
-        self.list().map(Value::index)
+        self.list().map(ScalarValue::index)
     }
 
     /// Adds the gradient with respect to the scalars: `slope` times the `factors` of gain, offset and drift.

@@ -157,8 +157,8 @@ impl Signal {
         }
     }
 
-    fn piece(&self, cell: usize) -> spline::Piece {
-        spline::Piece {
+    fn piece(&self, cell: usize) -> spline::SplineSegment {
+        spline::SplineSegment {
             times: [self.times[cell], self.times[cell + 1]],
             values: [self.values[cell], self.values[cell + 1]],
             curvatures: [self.curvatures[cell], self.curvatures[cell + 1]],

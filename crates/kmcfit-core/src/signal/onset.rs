@@ -3,22 +3,22 @@
 use super::Spectrum;
 use crate::diagnostics::{far_off, median_size, rms};
 
-/// Fewest readings that stand still.
+/// Fewest samples that stand still.
 const STILL: usize = 16;
-/// The motion has begun where it is further from the level before than this share of its largest distance.
+/// The response has begun where it is further from the level before than this share of its largest distance.
 const BEGUN: f64 = 0.15;
-/// Readings that move are so many times as large as those that stand still.
+/// Samples that move are so many times as large as those that stand still.
 const SUDDEN: f64 = 10.0;
 
-/// How many readings stand still before the motion begins, if a record begins so: 16 or more, for at least a period of the
-/// motion that follows, at one level but for a tenth of that motion. `spacing` is the distance of readings in s.
-/// `None` where single readings lie far off.
+/// How many samples stand still before the response begins, if a record begins so: 16 or more, for at least a period of the
+/// response that follows, at one level but for a tenth of that response. `spacing` is the distance of samples in s.
+/// `None` where single samples lie far off.
 ///
 /// ```
 /// use kmcfit_core::internals::signal::onset;
 /// let swing = |i: i32| (-0.01 * f64::from(i)).exp() * (0.2 * f64::from(i)).cos();
 /// let held: Vec<f64> = (-60..400).map(|i| swing(i.max(0))).collect();
-/// let first = onset(&held, 0.05).expect("it is held for 60 readings");
+/// let first = onset(&held, 0.05).expect("it is held for 60 samples");
 /// assert!((60..66).contains(&first));
 /// let free: Vec<f64> = (0..400).map(swing).collect();
 /// assert_eq!(onset(&free, 0.05), None);
@@ -53,7 +53,7 @@ mod tests {
     }
 
     fn record(still: i32, noise: f64) -> Vec<f64> {
-        let reading = |i: i32| {
+        let sample = |i: i32| {
             let (t, shock) = (f64::from(i - still), shock(i));
             let swing = match t >= 0.0 {
                 true => (-0.01 * t).exp() * (0.2 * t).sin(),
@@ -61,7 +61,7 @@ mod tests {
             };
             swing + noise * shock
         };
-        (0..500).map(reading).collect()
+        (0..500).map(sample).collect()
     }
 
     #[test]
@@ -79,7 +79,7 @@ mod tests {
     fn what_moves_from_the_beginning_has_none() {
         let none = |values: Vec<f64>| assert_eq!(onset(&values, 0.01), None);
         none(record(0, 0.0));
-        // Less than a period, 31 readings, and too few.
+        // Less than a period, 31 samples, and too few.
         none(record(20, 0.0));
         none(record(10, 0.0));
         none((0..500).map(shock).collect());

@@ -19,12 +19,12 @@ pub enum SweepLaw {
 /// phases in rad.
 ///
 /// ```
-/// use kmcfit_core::internals::signal::Shape;
-/// let step = Shape::Step { amplitude: 2.0, at: 1.0 };
+/// use kmcfit_core::internals::signal::ExcitationShape;
+/// let step = ExcitationShape::Step { amplitude: 2.0, at: 1.0 };
 /// assert_eq!((step.value_before(1.0), step.value(1.0)), (0.0, 2.0));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
+pub enum ExcitationShape {
     /// `a`.
     Constant {
         /// `a`.
@@ -79,7 +79,7 @@ pub enum Shape {
     },
 }
 
-impl Shape {
+impl ExcitationShape {
     /// The value at a time; where it jumps, the value after the jump.
     pub fn value(&self, t: f64) -> f64 {
         self.on(t, |time| t >= time - ROUNDING * time.abs())
@@ -151,7 +151,7 @@ fn cycles(from: f64, to: f64, duration: f64, law: SweepLaw, s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SWEEP: Shape = Shape::Sweep {
+    const SWEEP: ExcitationShape = ExcitationShape::Sweep {
         amplitude: 2.0,
         from: 1.0,
         to: 4.0,
@@ -162,8 +162,11 @@ mod tests {
 
     #[test]
     fn shapes_have_their_values() {
-        assert_eq!(Shape::Constant { amplitude: 3.0 }.value(-1.0), 3.0);
-        let sine = Shape::Sine {
+        assert_eq!(
+            ExcitationShape::Constant { amplitude: 3.0 }.value(-1.0),
+            3.0
+        );
+        let sine = ExcitationShape::Sine {
             amplitude: 2.0,
             frequency: 0.25,
             phase: PI / 2.0,
@@ -171,7 +174,7 @@ mod tests {
         assert_eq!(sine.value(0.0), 2.0);
         assert!(sine.value(1.0).abs() < 1e-15);
         assert!((sine.value(2.0) + 2.0).abs() < 1e-15);
-        let blow = Shape::HalfSine {
+        let blow = ExcitationShape::HalfSine {
             amplitude: 5.0,
             at: 1.0,
             duration: 0.5,
@@ -185,7 +188,7 @@ mod tests {
 
     #[test]
     fn jumps_have_two_sides() {
-        let step = Shape::Step {
+        let step = ExcitationShape::Step {
             amplitude: 2.0,
             at: 0.3,
         };

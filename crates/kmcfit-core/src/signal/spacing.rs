@@ -1,6 +1,6 @@
 //! The spacing of sampling times.
 
-/// How far readings may be from equal spacing, in spacings.
+/// How far samples may be from equal spacing, in spacings.
 const REGULAR: f64 = 1e-6;
 
 /// The spacing of equally spaced times; `None` where they are not, or fewer than two.

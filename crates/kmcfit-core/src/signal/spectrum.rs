@@ -7,7 +7,7 @@ use rustfft::num_complex::Complex;
 
 /// One density of white noise in twenty thousand is so many times the mean of all.
 const ABOVE_NOISE: f64 = 10.0;
-/// A motion stands out of noise with this share of the energy; of noise alone 1 in 2000 parts does.
+/// A response stands out of noise with this share of the energy; of noise alone 1 in 2000 parts does.
 const STANDS_OUT: f64 = 0.02;
 /// Fewest values of which a spectrum is made.
 const FEWEST: usize = 4;
@@ -122,7 +122,7 @@ impl Spectrum {
     }
 
     /// The spectrum without white noise: densities below ten times its floor are zero. The floor is the mean of the
-    /// exponential distribution of a density of noise whose median is that of all densities. Where a motion fills half of
+    /// exponential distribution of a density of noise whose median is that of all densities. Where a response fills half of
     /// the frequencies, or there is nothing but noise, next to nothing stands out of it: then the spectrum as it is.
     ///
     /// ```

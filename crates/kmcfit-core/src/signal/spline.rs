@@ -58,13 +58,13 @@ pub fn curvatures(times: &[f64], values: &[f64]) -> Vec<f64> {
 
 /// The spline between two samples.
 #[derive(Debug, Clone, Copy)]
-pub struct Piece {
+pub struct SplineSegment {
     pub times: [f64; 2],
     pub values: [f64; 2],
     pub curvatures: [f64; 2],
 }
 
-impl Piece {
+impl SplineSegment {
     /// Parts `A`, `B` of the interval on the right and the left of a time, and its length.
     fn parts(&self, t: f64) -> (f64, f64, f64) {
         let h = self.times[1] - self.times[0];

@@ -1,7 +1,7 @@
 //! The choice among the reference functions and their specialisations.
 
 use super::error::{SimulationError, require_finite, require_positive_mass};
-use super::fast::blocks::LinearDevice;
+use super::fast::blocks::LinearSystem;
 use super::fast::{continuous_adjoint, prefactored, simd_adjoint};
 use super::reference::equation::EquationOfMotion;
 use super::reference::{self, AdjointEquation};
@@ -67,7 +67,7 @@ impl Engine {
     pub fn forward_into(
         self,
         system: &System,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
         trajectory: &mut Trajectory,
@@ -75,7 +75,7 @@ impl Engine {
         match self {
             Self::Reference => {}
             Self::ParallelInTime => {
-                if let Some(linear) = LinearDevice::of(system, device, trajectory.nodes()) {
+                if let Some(linear) = LinearSystem::of(system, nodal, trajectory.nodes()) {
                     linear.forward(initial, trajectory);
                     if trajectory.is_finite() {
                         return Ok(());
@@ -83,9 +83,9 @@ impl Engine {
                 }
             }
             Self::Prefactored => {
-                require_positive_mass(&system.grid, device)?;
+                require_positive_mass(&system.grid, nodal)?;
                 let nodes = trajectory.nodes();
-                let equation = EquationOfMotion::new(system, device, excitation, nodes);
+                let equation = EquationOfMotion::new(system, nodal, excitation, nodes);
                 if prefactored::forward(equation, system.method, initial, trajectory)
                     && require_finite(&system.grid, trajectory).is_ok()
                 {
@@ -93,14 +93,14 @@ impl Engine {
                 }
             }
         }
-        reference::forward_into(system, device, initial, excitation, trajectory)
+        reference::forward_into(system, nodal, initial, excitation, trajectory)
     }
 
     /// [`reference::discrete_adjoint`].
     pub fn discrete_adjoint(
         self,
         system: &System,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         source: &Trajectory,
@@ -109,18 +109,18 @@ impl Engine {
         let gradient = match self {
             Self::Reference => None,
             // What is not finite anywhere is not finite at the beginning.
-            Self::ParallelInTime => LinearDevice::of(system, device, nodes)
+            Self::ParallelInTime => LinearSystem::of(system, nodal, nodes)
                 .map(|linear| linear.gradient(trajectory, source))
                 .filter(|gradient| gradient.initial.is_finite()),
             Self::Prefactored => {
-                let equation = EquationOfMotion::new(system, device, excitation, nodes);
+                let equation = EquationOfMotion::new(system, nodal, excitation, nodes);
                 let method = system.method;
                 Some(simd_adjoint::gradient(equation, method, trajectory, source))
                     .filter(SystemTangent::is_finite)
             }
         };
         gradient.unwrap_or_else(|| {
-            reference::discrete_adjoint(system, device, excitation, trajectory, source)
+            reference::discrete_adjoint(system, nodal, excitation, trajectory, source)
         })
     }
 
@@ -129,13 +129,13 @@ impl Engine {
     pub(crate) fn discrete_adjoint_sums(
         self,
         system: &System,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         excitation: Option<&Excitation>,
         trajectory: &Trajectory,
         source: &Trajectory,
     ) -> Option<(Vec<f64>, State)> {
         (self == Self::Prefactored).then_some(())?;
-        let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+        let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
         let mut sums = vec![0.0; 1 + system.terms.len()];
         let gradient = CoefficientGradient::Summed(&mut sums);
         let initial = simd_adjoint::back(equation, system.method, trajectory, source, gradient);
@@ -147,12 +147,12 @@ impl Engine {
 /// [`reference::continuous_adjoint`], to the bit.
 pub fn continuous_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
 ) -> SystemTangent {
-    let equation = AdjointEquation::new(system, device, trajectory, observed);
+    let equation = AdjointEquation::new(system, nodal, trajectory, observed);
     let adjoint = continuous_adjoint::solve(&equation);
     equation.gradients(system, excitation, trajectory, &adjoint)
 }
@@ -182,6 +182,6 @@ pub(crate) fn least_squares(
     assert_eq!(observed.len(), nodes, "a measurement per node");
     let engine = Engine::choose(system, None, nodes, Purpose::Estimation);
     (engine == Engine::ParallelInTime).then_some(())?;
-    let device = LinearDevice::new(functions, system.grid.step(), nodes)?;
-    Some(device.least_squares(initial, observed, weights, gradient))
+    let nodal = LinearSystem::new(functions, system.grid.step(), nodes)?;
+    Some(nodal.least_squares(initial, observed, weights, gradient))
 }

@@ -5,14 +5,14 @@ use crate::simd::sum::are_positive;
 use crate::system::{Grid, NodalCoefficients};
 use thiserror::Error;
 
-/// Why a motion could not be computed.
+/// Why a response could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
     /// The mass is zero, negative or not a number: the equation of motion has no meaning there.
     Mass,
-    /// The motion left the range of floating-point numbers.
+    /// The response left the range of floating-point numbers.
     Overflow,
-    /// The motion exists, but the square of a residual leaves the range of floating-point numbers.
+    /// The response exists, but the square of a residual leaves the range of floating-point numbers.
     CostOverflow,
 }
 
@@ -38,7 +38,7 @@ impl SimulationError {
             Cause::Mass => format!("the mass is {value} kg at t = {time:.6} s, not positive"),
             Cause::Overflow => format!("the motion overflows at t = {time:.6} s"),
             Cause::CostOverflow => format!(
-                "the cost overflows: the motion and a reading are {value:.3e} apart at t = \
+                "the cost overflows: the response and a sample are {value:.3e} apart at t = \
                  {time:.6} s"
             ),
         }
@@ -48,14 +48,14 @@ impl SimulationError {
 /// Refuses a mass that is not positive at some node.
 pub(super) fn require_positive_mass(
     grid: &Grid,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
 ) -> Result<(), SimulationError> {
-    if are_positive(&device.mass) {
+    if are_positive(&nodal.mass) {
         return Ok(());
     }
     let broken = |m: &f64| m.is_nan() || *m <= 0.0;
-    match device.mass.iter().position(broken) {
-        Some(node) => Err(at(grid, Cause::Mass, node, device.mass[node])),
+    match nodal.mass.iter().position(broken) {
+        Some(node) => Err(at(grid, Cause::Mass, node, nodal.mass[node])),
         None => Ok(()),
     }
 }

@@ -33,13 +33,13 @@ impl System {
     /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
     ///
     /// # Panics
-    /// If `device` or `excitation` does not fit the grid and the terms.
+    /// If `system` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        reference::forward(self, device, initial, excitation)
+        reference::forward(self, nodal, initial, excitation)
     }
 }

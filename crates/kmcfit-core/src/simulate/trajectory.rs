@@ -10,7 +10,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// A motion of zeros over `nodes` nodes.
+    /// A response of zeros over `nodes` nodes.
     pub fn zeros(nodes: usize) -> Self {
         Self {
             displacement: vec![0.0; nodes],

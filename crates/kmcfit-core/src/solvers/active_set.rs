@@ -11,8 +11,8 @@ const NEAR: f64 = 1e-6;
 /// A push counts if giving way by one per cent of the row's scale would lower J by more than this
 /// share of it, and by more than [`ROUNDING`] of what there is to explain.
 const PUSH: f64 = 1e-6;
-/// Rounding of a change of J, as a share of the misfit of no motion: residuals are rounded in the
-/// last digits of the motion, and a change of the motion in the thousands of steps that make it.
+/// Rounding of a change of J, as a share of the misfit of no response: residuals are rounded in the
+/// last digits of the response, and a change of the response in the thousands of steps that make it.
 const ROUNDING: f64 = 1e-12;
 
 /// A group of constraints with active rows.

@@ -3,13 +3,13 @@
 //! A fit is a fixed sequence of units: searches, and long computations between them. Whoever goes on
 //! walks the same sequence again. A unit that had ended is not computed again but recalled, the search
 //! that had not ended goes on from where it last stood, and everything after it is computed. What is
-//! recalled is parameters and the memory of the solver, bit by bit; motions and gradients are computed
+//! recalled is parameters and the memory of the solver, bit by bit; responses and gradients are computed
 //! from these again, and what does not come out with the bits that were noted is not used: its unit is
 //! computed from its beginning. So what is kept decides how long a fit takes and never how it ends.
 
-use super::counts::Counts;
 use super::history::IterationRecord;
 use super::settings::StartStrategy;
+use super::solve_counts::SolveCounts;
 use super::termination::Outcome;
 use super::timings::Timings;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
@@ -37,10 +37,10 @@ pub struct SolverState {
     pub memory: MethodState,
     /// `J0`, the cost from which the search set out, and `G0^2`.
     pub references: ExactF64s,
-    /// The points whose motions are kept for figures, by iteration.
+    /// The points whose responses are kept for figures, by iteration.
     pub snapshots: Vec<(u64, ExactF64s)>,
     /// Work done.
-    pub counts: Counts,
+    pub counts: SolveCounts,
     /// What that work took.
     pub timings: Timings,
     /// Wall-clock time so far.

@@ -1,9 +1,9 @@
 //! Counted and timed evaluations: all solves of a search.
 
-use super::counts::{ADJOINT, FORWARD, QP, TANGENT};
 use super::iterate::Iterate;
 use super::linearization::{Linearization, halfway, in_halves};
 use super::settings::{FitSettings, Solver};
+use super::solve_counts::{ADJOINT, FORWARD, QP, TANGENT};
 use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
@@ -78,8 +78,8 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         (point.fingerprint() == fingerprint).then_some(point)
     }
 
-    /// The motions at a point that was there before, computed again without counting.
-    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
+    /// The responses at a point that was there before, computed again without counting.
+    pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
         problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
@@ -114,14 +114,14 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         })
     }
 
-    /// Counts the tangent solves of a linearisation, where those of its point have not been counted.
+    /// SolveCounts the tangent solves of a linearisation, where those of its point have not been counted.
     pub fn count_linearisation(&mut self, solves: u64) {
         if self.halfway.is_none() {
             self.count_tangents(solves);
         }
     }
 
-    /// Counts tangent solves.
+    /// SolveCounts tangent solves.
     pub fn count_tangents(&mut self, solves: u64) {
         self.count(TANGENT, solves);
     }

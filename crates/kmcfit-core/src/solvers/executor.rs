@@ -1,7 +1,6 @@
 //! The loop around every solver, run by argmin's executor.
 
 use super::checkpoint::{ExactF64s, MethodState, Observer, SolverState};
-use super::counts::Counts;
 use super::evaluator::CountedEvaluator;
 use super::fit::{Fit, measured};
 use super::history::{IterationRecord, Recorder, Reference};
@@ -9,6 +8,7 @@ use super::iterate::Iterate;
 use super::methods::{Step, StepRule, equation_error, step_rule};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
+use super::solve_counts::SolveCounts;
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
@@ -69,7 +69,7 @@ pub(super) fn search_prepared(
             watch.observe(),
         ));
     }
-    // A part of a record has not a reading at every node of the grid.
+    // A part of a record has not a sample at every node of the grid.
     let mut settings = settings.clone();
     if !problem.supports_continuous() {
         settings.gradient = GradientKind::Discrete;
@@ -80,7 +80,7 @@ pub(super) fn search_prepared(
     if let Some(spare) = prepared.spare {
         method.recycle(spare);
     }
-    let run = Run {
+    let run = SearchDriver {
         method,
         settings,
         reference,
@@ -91,7 +91,7 @@ pub(super) fn search_prepared(
         trouble: None,
         outcome: None,
         kept,
-        before: Before::default(),
+        before: PriorWork::default(),
         watch,
     };
     let result = Executor::new(problem, run)
@@ -99,8 +99,8 @@ pub(super) fn search_prepared(
         .ctrlc(false)
         .timer(false)
         .run()
-        .expect("Run reports by outcome and never returns an error to the executor");
-    let counts = Counts::of(&result.problem);
+        .expect("SearchDriver reports by outcome and never returns an error to the executor");
+    let counts = SolveCounts::of(&result.problem);
     result.solver.finish(counts)
 }
 
@@ -108,7 +108,7 @@ pub(super) fn search_prepared(
 /// near an optimum, or whose start is the question.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself has no motion.
+/// A [`SimulationError`] if the start itself has no response.
 pub fn fit_from(
     problem: &Problem,
     start: &[f64],
@@ -129,7 +129,7 @@ pub(super) fn search_unobserved(
 }
 
 /// One method at work, seen by argmin as a solver.
-struct Run<'a, 'w> {
+struct SearchDriver<'a, 'w> {
     method: Box<dyn StepRule>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
@@ -138,38 +138,38 @@ struct Run<'a, 'w> {
     clock: Instant,
     timings: Timings,
     /// `None` before argmin calls `init`, and where the start has no response.
-    progress: Option<Progress>,
+    progress: Option<SearchProgress>,
     /// Why the start has no response.
     trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
     /// What was kept of this search when it ran before.
     kept: Option<(Vec<IterationRecord>, SolverState)>,
-    before: Before,
+    before: PriorWork,
     watch: &'a mut Observer<'w>,
 }
 
 /// What a search did before it was ended from outside.
 #[derive(Default)]
-struct Before {
-    counts: Counts,
+struct PriorWork {
+    counts: SolveCounts,
     timings: Timings,
     elapsed: Duration,
 }
 
-struct Progress {
+struct SearchProgress {
     point: Iterate,
     recorder: Recorder,
 }
 
-/// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
+/// argmin's view of the search: parameters and cost; the rest lives in [`SearchDriver`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl Run<'_, '_> {
+impl SearchDriver<'_, '_> {
     fn start(
         &mut self,
         work: &mut CountedEvaluator,
         parameters: Vec<f64>,
-    ) -> Result<Progress, SimulationError> {
+    ) -> Result<SearchProgress, SimulationError> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
             None => {
@@ -179,7 +179,7 @@ impl Run<'_, '_> {
             }
         };
         let point = work.complete(parameters, evaluation);
-        Ok(Progress {
+        Ok(SearchProgress {
             recorder: Recorder::new(&point, self.reference),
             point,
         })
@@ -187,7 +187,7 @@ impl Run<'_, '_> {
 
     /// The search where it stood when it was ended from outside, if that was kept and comes out with
     /// the same bits.
-    fn restored(&mut self, work: &CountedEvaluator) -> Option<Progress> {
+    fn restored(&mut self, work: &CountedEvaluator) -> Option<SearchProgress> {
         let (rows, standing) = self.kept.take()?;
         let progress = self.stand_again(work, rows, standing);
         if progress.is_none() {
@@ -203,13 +203,13 @@ impl Run<'_, '_> {
         work: &CountedEvaluator,
         rows: Vec<IterationRecord>,
         standing: SolverState,
-    ) -> Option<Progress> {
+    ) -> Option<SearchProgress> {
         let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
         if !fits(&standing.parameters.0) {
             return None;
         }
-        let motions = |parameters: &[f64]| match fits(parameters) {
-            true => work.motions_again(parameters).ok(),
+        let responses = |parameters: &[f64]| match fits(parameters) {
+            true => work.responses_again(parameters).ok(),
             false => None,
         };
         if rows.len() as u64 != standing.iterations {
@@ -217,7 +217,7 @@ impl Run<'_, '_> {
         }
         let snapshots = standing.snapshots.into_iter();
         let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
+        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, responses)?;
         let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
             && !(self.method).restore(standing.memory, work.problem(), &mut point)
@@ -225,16 +225,16 @@ impl Run<'_, '_> {
             return None;
         }
         self.outcome = standing.outcome;
-        self.before = Before {
+        self.before = PriorWork {
             counts: standing.counts,
             timings: standing.timings,
             elapsed: standing.elapsed,
         };
-        Some(Progress { point, recorder })
+        Some(SearchProgress { point, recorder })
     }
 
     /// Keeps where the search stands: when it is time to, and before it ends by an interrupt.
-    fn keep(&mut self, counts: Counts) {
+    fn keep(&mut self, counts: SolveCounts) {
         let interrupted = |o: &Outcome| o.status == Status::Interrupted;
         let now = match &self.outcome {
             Some(outcome) => interrupted(outcome),
@@ -251,8 +251,8 @@ impl Run<'_, '_> {
         }
     }
 
-    fn stand(&mut self, counts: Counts, outcome: Option<Outcome>) {
-        let Some(Progress { point, recorder }) = &self.progress else {
+    fn stand(&mut self, counts: SolveCounts, outcome: Option<Outcome>) {
+        let Some(SearchProgress { point, recorder }) = &self.progress else {
             return;
         };
         let standing = || SolverState {
@@ -332,7 +332,7 @@ impl Run<'_, '_> {
             if problem.is_some_and(|p| p.channels().any(infinite)) {
                 return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
-            // Squares of readings below 1e-154 are zero.
+            // Squares of samples below 1e-154 are zero.
             return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
                 true => converged(Reason::ZeroReadings),
                 false => converged(Reason::ExactStart),
@@ -351,7 +351,7 @@ impl Run<'_, '_> {
         is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
-    fn finish(mut self, counts: Counts) -> Result<Fit, SimulationError> {
+    fn finish(mut self, counts: SolveCounts) -> Result<Fit, SimulationError> {
         match &self.outcome {
             _ if self.progress.is_none() => self.watch.nothing(),
             // It goes on from where it was kept to stand.
@@ -359,7 +359,7 @@ impl Run<'_, '_> {
             outcome => self.stand(counts, outcome.clone()),
         }
         let elapsed = self.elapsed();
-        let Some(Progress { point, recorder }) = self.progress else {
+        let Some(SearchProgress { point, recorder }) = self.progress else {
             return Err(self.trouble.expect("a search starts, or there is a reason"));
         };
         Ok(Fit {
@@ -380,7 +380,7 @@ impl Run<'_, '_> {
 
     fn view(&self, state: SearchState) -> SearchState {
         match &self.progress {
-            Some(Progress { point, .. }) => state
+            Some(SearchProgress { point, .. }) => state
                 .param(point.parameters.clone())
                 .cost(point.evaluation.cost),
             None => state,
@@ -388,7 +388,7 @@ impl Run<'_, '_> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -425,7 +425,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         let mut work = CountedEvaluator::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
-        self.keep(Counts::of(problem));
+        self.keep(SolveCounts::of(problem));
         Ok((self.view(state), None))
     }
 

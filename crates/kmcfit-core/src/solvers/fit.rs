@@ -1,11 +1,11 @@
 //! A finished fit.
 
-use super::counts::Counts;
-use super::history::{IterationRecord, Snapshot, ratio};
+use super::history::{IterationRecord, ResponseSnapshot, ratio};
 use super::iterate::Iterate;
 use super::optimality::{Optimality, judged};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
+use super::solve_counts::SolveCounts;
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
@@ -27,11 +27,11 @@ pub struct Fit {
     /// One row per iteration.
     pub history: Vec<IterationRecord>,
     /// Motions on the way.
-    pub snapshots: Vec<Snapshot>,
+    pub snapshots: Vec<ResponseSnapshot>,
     /// How it ended.
     pub outcome: Outcome,
     /// Work done.
-    pub counts: Counts,
+    pub counts: SolveCounts,
     /// What that work took; the rest of `elapsed` is bookkeeping.
     pub timings: Timings,
     /// Wall-clock time.
@@ -44,7 +44,12 @@ pub struct Fit {
 
 impl Fit {
     /// This fit with the work of another one besides.
-    pub(super) fn with_work_of(self, counts: Counts, timings: Timings, elapsed: Duration) -> Self {
+    pub(super) fn with_work_of(
+        self,
+        counts: SolveCounts,
+        timings: Timings,
+        elapsed: Duration,
+    ) -> Self {
         Self {
             counts: self.counts + counts,
             timings: self.timings + timings,
@@ -64,9 +69,9 @@ impl Fit {
 pub struct Attempt {
     /// Where it started.
     pub start: StartStrategy,
-    /// J at its start; NaN if the start had no motion.
+    /// J at its start; NaN if the start had no response.
     pub initial_cost: f64,
-    /// J at its end; NaN if the start had no motion.
+    /// J at its end; NaN if the start had no response.
     pub cost: f64,
     /// Iterations it took.
     pub iterations: u64,

@@ -27,16 +27,16 @@ pub struct IterationRecord {
     pub relative_change: f64,
 }
 
-/// A motion on the way.
+/// A response on the way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
+pub struct ResponseSnapshot {
     /// After which iteration; 0 is the start.
     pub iteration: u64,
-    /// The motion in each experiment.
+    /// The response in each experiment.
     pub trajectories: Vec<Trajectory>,
 }
 
-/// Iterations after which the motion is kept for figures: the paper's Fig. 3b and its continuation.
+/// Iterations after which the response is kept for figures: the paper's Fig. 3b and its continuation.
 pub const SNAPSHOT_ITERATIONS: [u64; 8] = [0, 10, 30, 100, 300, 1000, 3000, 10_000];
 
 /// What the ratios of a run are taken to: `J0` and `G0^2`.
@@ -50,7 +50,7 @@ pub(super) struct Reference {
 #[derive(Debug)]
 pub(super) struct Recorder {
     pub rows: Vec<IterationRecord>,
-    pub snapshots: Vec<Snapshot>,
+    pub snapshots: Vec<ResponseSnapshot>,
     pub initial_cost: f64,
     pub started_from: f64,
     pub initial_norm_squared: f64,
@@ -95,7 +95,7 @@ impl Recorder {
             return None;
         }
         let restored = snapshots.iter().map(|(iteration, parameters)| {
-            Some(Snapshot {
+            Some(ResponseSnapshot {
                 iteration: *iteration,
                 trajectories: at(parameters)?,
             })
@@ -144,7 +144,7 @@ impl Recorder {
 
     fn keep_snapshot(&mut self, iteration: u64, point: &Iterate) {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
-            self.snapshots.push(Snapshot {
+            self.snapshots.push(ResponseSnapshot {
                 iteration,
                 trajectories: point.evaluation.trajectories.clone(),
             });

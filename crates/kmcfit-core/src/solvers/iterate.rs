@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 pub struct Iterate {
     /// Parameters of all functions.
     pub parameters: Vec<f64>,
-    /// Cost, device and motions.
+    /// Cost, system and responses.
     pub evaluation: Evaluation,
     /// Gradient of the cost.
     pub gradient: Gradient,

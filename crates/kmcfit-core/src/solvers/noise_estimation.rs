@@ -22,9 +22,9 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// [`fit`](super::fit()), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
 /// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
 /// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
-/// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
+/// parameters in proportion to the channel's samples). Returns the problem with its sigmas.
 ///
-/// With a robust loss sigma is that of the bulk of the readings, from the median of the absolute
+/// With a robust loss sigma is that of the bulk of the samples, from the median of the absolute
 /// residuals.
 ///
 /// # Errors
@@ -99,8 +99,8 @@ fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
 
 /// Puts the sigmas of the residuals into the problem; the largest relative change.
 fn update(problem: &mut Problem, found: &Fit) -> f64 {
-    let readings = problem.reading_count() as f64;
-    let share = (problem.parameters() as f64 / readings).min(0.5);
+    let samples = problem.sample_count() as f64;
+    let share = (problem.parameters() as f64 / samples).min(0.5);
     let mut largest = 0.0f64;
     let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
@@ -109,7 +109,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
                 continue;
             };
             let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
-            // Readings that are fitted exactly still need a scale.
+            // Samples that are fitted exactly still need a scale.
             let sigma = sigma.max(f64::EPSILON * rms(channel.observed()));
             if sigma > 0.0 {
                 largest = largest.max((sigma / before).ln().abs());
@@ -142,15 +142,15 @@ mod tests {
     use crate::system::Grid;
     use std::time::Duration;
 
-    /// Work and time of both, the motions of the first, and the place of the second.
+    /// Work and time of both, the responses of the first, and the place of the second.
     #[test]
     fn a_fit_with_another_round_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),

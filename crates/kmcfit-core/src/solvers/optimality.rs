@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
 /// measurements.
 const NEGLIGIBLE: f64 = 1e-20;
-/// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
+/// Relative rounding of a computed response, in units of the machine precision: some thousand steps.
 const MOTION_ROUNDING: f64 = 1000.0;
 /// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
 const BYTES_PER_NODE: u64 = 4000;
@@ -34,7 +34,7 @@ const BYTES_PER_NODE: u64 = 4000;
 /// ```
 ///
 /// `|delta|^2 = sum_f 1/T integral (delta p_f / size of p_f)^2 dt`: a change of a function by its size costs as
-/// much as J, so that directions that the readings do not show promise nothing. Without constraints
+/// much as J, so that directions that the samples do not show promise nothing. Without constraints
 /// the decrease is `g' (4 H)^-1 g` with the gradient `g` and the Gauss-Newton Hessian `2 H`, penalties and `J |.|^2` included.
 /// It is zero exactly where the conditions of Karush, Kuhn and Tucker hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -125,7 +125,7 @@ impl Optimality {
         for (d, s) in sub.proximal.iter_mut().zip(&scales) {
             *d = cost * s;
         }
-        let found = Minimum::of(&sub)?;
+        let found = LinearisedMinimum::of(&sub)?;
         let parameters: Vec<f64> = point
             .parameters
             .iter()
@@ -153,7 +153,7 @@ pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
 }
 
 /// The minimum of a linearised problem.
-struct Minimum {
+struct LinearisedMinimum {
     z: Vec<f64>,
     /// `sum |multiplier| distance` at zero, of the whole cost.
     complementarity: f64,
@@ -161,7 +161,7 @@ struct Minimum {
     accuracy: f64,
 }
 
-impl Minimum {
+impl LinearisedMinimum {
     fn of(sub: &Subproblem) -> Option<Self> {
         if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, 0.1 * TOLERANCE)) {
             return Some(Self {

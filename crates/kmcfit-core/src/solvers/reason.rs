@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// A value and the limit that it is within.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Within {
+pub struct BoundedValue {
     /// The value.
     pub value: f64,
     /// The limit.
@@ -22,9 +22,9 @@ pub enum Reason {
     #[error("{}", ratios(cost.as_ref(), gradient.as_ref()))]
     Ratios {
         /// `J / J0`, if there is a limit.
-        cost: Option<Within>,
+        cost: Option<BoundedValue>,
         /// `G^2 / G0^2`, if there is a limit.
-        gradient: Option<Within>,
+        gradient: Option<BoundedValue>,
     },
     /// The last iteration changed every function by at most this share of its size.
     #[error("the last iteration changed no function by more than {0:.1e} of its size")]
@@ -54,14 +54,14 @@ pub enum Reason {
     /// All functions are fixed.
     #[error("there is nothing to fit: every function is fixed")]
     NoParameters,
-    /// The readings, or their squares, are zero.
-    #[error("there is nothing to explain: the readings, or their squares, are zero")]
+    /// The samples, or their squares, are zero.
+    #[error("there is nothing to explain: the samples, or their squares, are zero")]
     ZeroReadings,
     /// The cost at the start is zero.
     #[error("the start fits exactly")]
     ExactStart,
-    /// The squares of the readings overflow.
-    #[error("the squares of the readings leave the range of numbers: give them in a larger unit")]
+    /// The squares of the samples overflow.
+    #[error("the squares of the samples leave the range of numbers: give them in a larger unit")]
     Overflow,
     /// The cost is zero to machine precision.
     #[error("the cost is zero to rounding")]
@@ -172,18 +172,18 @@ pub enum MissingMeasurement {
         "its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations"
     )]
     FilteredDrive,
-    /// Readings.
-    #[error("there are too few readings")]
+    /// Samples.
+    #[error("there are too few samples")]
     Readings,
     /// Anything that moves.
     #[error("nothing moves")]
     Motion,
 }
 
-fn ratios(cost: Option<&Within>, gradient: Option<&Within>) -> String {
+fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> String {
     let named = [("J/J0", cost), ("G^2/G0^2", gradient)];
     let given = named.into_iter().filter_map(|(name, test)| {
-        let Within { value, limit } = test?;
+        let BoundedValue { value, limit } = test?;
         Some(format!("{name} {value:.3e} <= {limit:.3e}"))
     });
     given.collect::<Vec<_>>().join(" and ")
@@ -208,7 +208,7 @@ fn equation_error(program: Option<ConicStatus>, has_mass: bool) -> String {
     let but = match has_mass {
         true => "",
         false => {
-            "; its mass is not positive at all times, so no device moves so: give the mass a `min`"
+            "; its mass is not positive at all times, so the equation of motion cannot be solved: give the mass a `min`"
         }
     };
     format!("the equation error is convex, and its minimum was found by {how}{but}")

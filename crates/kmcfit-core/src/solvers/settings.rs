@@ -42,7 +42,7 @@ impl Solver {
 pub enum Initial {
     /// From the start values of the functions.
     Functions,
-    /// From the equation error of the readings.
+    /// From the equation error of the samples.
     Data,
 }
 
@@ -84,7 +84,7 @@ impl StartStrategy {
             Self::StartValues => "start values",
             Self::EquationError => "equation error",
             Self::GrowingHorizon => "growing horizon",
-            Self::Collocation => "motion of the readings",
+            Self::Collocation => "motion of the samples",
             Self::Continued => "best of these, continued",
         }
     }

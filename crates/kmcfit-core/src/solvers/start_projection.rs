@@ -5,7 +5,7 @@ use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project};
 
-/// Smallest mass that counts as positive, as a share of the start's largest: a lighter device swings
+/// Smallest mass that counts as positive, as a share of the start's largest: a lighter system swings
 /// a thousand times in the time of one swing of the start, which no grid that suits the start resolves.
 const POSITIVE: f64 = 1e-6;
 
@@ -38,8 +38,8 @@ impl Problem {
             Some(violation) if violation.relative > 0.0 => violation,
             _ => return StartProjection::Kept(start.to_vec()),
         };
-        let device = self.functions.device(start);
-        let sizes: Vec<f64> = (device.functions())
+        let nodal = self.functions.nodal(start);
+        let sizes: Vec<f64> = (nodal.functions())
             .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
             .collect();
         let metric = self
@@ -87,7 +87,7 @@ impl Problem {
     /// `moved`, or where that has no positive mass the nearest point to `start` that has one, if there
     /// is any in the constraint set.
     fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
-        let positive = |theta: &[f64]| self.functions.device(theta).mass.iter().all(|m| *m > 0.0);
+        let positive = |theta: &[f64]| self.functions.nodal(theta).mass.iter().all(|m| *m > 0.0);
         if positive(&moved) || !positive(start) {
             return moved;
         }
@@ -112,8 +112,8 @@ impl Problem {
 
     /// The constraints and a mass that is positive at every node; `start` tells what is small.
     fn constraints_with_mass(&self, start: &[f64]) -> Constraints {
-        let device = self.functions.device(start);
-        let largest = device.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let nodal = self.functions.nodal(start);
+        let largest = nodal.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let least = POSITIVE * largest;
         let mut group = RowGroup::new("mass > 0");
         let parts = self.functions.iter().zip(self.functions.ranges());

@@ -7,11 +7,11 @@
 //! and parameters together, from a response near the measurements.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::{Prepared, search, search_prepared};
 use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
+use super::solve_counts::SolveCounts;
 use super::start_projection::StartProjection;
 use super::starts::{
     Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
@@ -28,7 +28,7 @@ use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A fit explains the readings of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
+/// A fit explains the samples of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
 /// goes near zero) to tens of per cent (a wrong period); a fit in between costs another attempt.
 const EXPLAINED: f64 = 1e-3;
 /// Most iterations of an attempt before the next is tried: Gauss-Newton from a good start takes some ten.
@@ -87,7 +87,7 @@ struct Attempts<'a, 'w> {
     /// Cost and gradient at the start values, which all attempts are compared to.
     reference: Option<Reference>,
     /// Work before and between the searches.
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     best: Option<Fit>,
     attempts: Vec<Attempt>,
@@ -115,7 +115,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             has_several,
             truncated: None,
             reference: None,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             best: None,
             attempts: Vec::new(),
@@ -336,7 +336,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     winner.with_work_of(other.counts, other.timings, other.elapsed)
 }
 
-/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
+/// Each channel for itself: beside the velocity of a stiff system its displacement weighs nothing.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
     let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
@@ -352,23 +352,23 @@ fn explains(problem: &Problem, fit: &Fit) -> bool {
 
 impl Problem {
     /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
-    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
+    /// `n + 2 sqrt(2 n)`; `None` unless all samples have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.channels().all(|c| c.weighting().is_sigma());
-        known.then(|| largest_chi_square(self.reading_count()))
+        known.then(|| largest_chi_square(self.sample_count()))
     }
 }
 
 impl Channel {
-    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
+    /// [`Problem::largest_chi_square`] of its own samples; `None` unless they have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.weighting().is_sigma();
         known.then(|| largest_chi_square(self.len()))
     }
 }
 
-fn largest_chi_square(readings: usize) -> f64 {
-    let n = readings as f64;
+fn largest_chi_square(samples: usize) -> f64 {
+    let n = samples as f64;
     n + 2.0 * (2.0 * n).sqrt()
 }
 
@@ -384,10 +384,10 @@ mod tests {
     fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),

@@ -1,7 +1,7 @@
 //! Termination of a fit: stopping tests, and how a fit ended.
 
 use super::history::IterationRecord;
-use super::reason::{Reason, Within};
+use super::reason::{BoundedValue, Reason};
 use crate::qp::Subproblem;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -22,7 +22,7 @@ pub enum Status {
     Stalled,
     /// Ended from outside.
     Interrupted,
-    /// No device satisfies the constraints and the motion.
+    /// No system satisfies the constraints and the response.
     Infeasible,
     /// The start cannot be evaluated.
     Failed,
@@ -144,10 +144,11 @@ impl Stopping {
     /// The ratios of cost and gradient of `row`, if they are within all limits that are given: what was asked
     /// for, but no sign of a minimum.
     pub(super) fn ratios_met(&self, row: &IterationRecord) -> Option<Reason> {
-        let test = |value: f64, limit: Option<f64>| limit.map(|limit| Within { value, limit });
+        let test =
+            |value: f64, limit: Option<f64>| limit.map(|limit| BoundedValue { value, limit });
         let cost = test(row.cost_ratio, self.cost_ratio);
         let gradient = test(row.gradient_norm_squared_ratio, self.gradient_ratio);
-        let is_met = |test: &Within| test.value <= test.limit;
+        let is_met = |test: &BoundedValue| test.value <= test.limit;
         let mut given = cost.iter().chain(&gradient).peekable();
         (given.peek().is_some() && given.all(is_met)).then_some(Reason::Ratios { cost, gradient })
     }

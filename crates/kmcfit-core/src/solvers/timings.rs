@@ -9,7 +9,7 @@ use std::time::Duration;
 /// bookkeeping.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Timings {
-    /// Forward solves: motions, predictions and costs.
+    /// Forward solves: responses, predictions and costs.
     pub forward: Duration,
     /// Adjoint solves: gradients.
     pub adjoint: Duration,
@@ -20,7 +20,7 @@ pub struct Timings {
     /// The plain Gauss-Newton step (assembled, factored and solved), the recursion of L-BFGS, the
     /// plain solution of the equation error.
     pub linear_algebra: Duration,
-    /// Starts from the readings, with all that is solved for them.
+    /// Starts from the samples, with all that is solved for them.
     pub start: Duration,
     /// Checkpoints, and where the search stood at its end; not the lines of its iterations.
     #[serde(default)]

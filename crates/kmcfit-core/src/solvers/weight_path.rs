@@ -1,13 +1,13 @@
 //! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
 use super::history::IterationRecord;
 use super::iterate::Iterate;
 use super::linearization::{Linearization, linearisation_tangents, linearise};
 use super::settings::FitSettings;
+use super::solve_counts::SolveCounts;
 use super::start_strategy::search_from_starts;
 use super::termination::{Outcome, Status};
 use super::timings::{Timings, timed};
@@ -49,7 +49,7 @@ pub struct PathPoint {
     pub weight: f64,
     /// Iterations of the fit, all its starts together.
     pub iterations: u64,
-    /// Misfit of the readings; chi-square where they have a sigma.
+    /// Misfit of the samples; chi-square where they have a sigma.
     pub misfit: f64,
     /// `sum |L theta - target|^2` of the penalties on the path, without the weight.
     pub roughness: f64,
@@ -83,7 +83,7 @@ impl WeightPath {
     }
 }
 
-/// Largest weight of the path, relative to the misfit of no motion over a roughness of one.
+/// Largest weight of the path, relative to the misfit of no response over a roughness of one.
 const LARGEST: f64 = 1e4;
 /// Decades that the path spans, and points per decade.
 const DECADES: f64 = 8.0;
@@ -109,7 +109,7 @@ impl Problem {
 /// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
-/// A [`SimulationError`] if the fit at the middle weight, the first, has no motion at its start.
+/// A [`SimulationError`] if the fit at the middle weight, the first, has no response at its start.
 pub fn choose_weight(
     problem: &Problem,
     start: &[f64],
@@ -141,7 +141,7 @@ pub fn choose_weight_watched(
     which: &[usize],
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
-    let mut walk = Walk {
+    let mut walk = WeightPathSearch {
         problem,
         settings: settings.clone(),
         which,
@@ -149,7 +149,7 @@ pub fn choose_weight_watched(
         from: start.to_vec(),
         last: None,
         attempts: Vec::new(),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: Duration::ZERO,
     };
@@ -187,7 +187,7 @@ pub fn choose_weight_watched(
 /// A walk along the path. The first fit tries the starting points of [`fit`]; every other starts where its
 /// neighbour ended, and needs none: a fit that explains the record is followed while its weight
 /// changes, also to weights so large that it explains the record no longer.
-struct Walk<'a, 'w> {
+struct WeightPathSearch<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
@@ -195,12 +195,12 @@ struct Walk<'a, 'w> {
     from: Vec<f64>,
     last: Option<Outcome>,
     attempts: Vec<Attempt>,
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     elapsed: Duration,
 }
 
-impl Walk<'_, '_> {
+impl WeightPathSearch<'_, '_> {
     /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
     /// at the middle a fit explains the record, which it need not at the largest weight, and
     /// converges fast, which it need not at the smallest.
@@ -239,7 +239,7 @@ impl Walk<'_, '_> {
         self.elapsed += found.elapsed;
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
-        let n = problem.reading_count() as f64;
+        let n = problem.sample_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
         let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
@@ -303,7 +303,7 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
         .sum()
 }
 
-/// Trace of the matrix that takes the readings to their fitted values, by random signs.
+/// Trace of the matrix that takes the samples to their fitted values, by random signs.
 fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
     let Iterate {
         parameters,
@@ -311,7 +311,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         ..
     } = &found.best;
     let fresh = Linearization::Fresh;
-    let (mut sub, readings) = linearise(problem, parameters, evaluation, &fresh, timings);
+    let (mut sub, samples) = linearise(problem, parameters, evaluation, &fresh, timings);
     // The proximal term of a fit that has ended is gone.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();
@@ -320,7 +320,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
     let probes: Vec<Vec<f64>> = (0..PROBES)
         .map(|_| {
             (0..rows)
-                .map(|i| if i < readings { sign() } else { 0.0 })
+                .map(|i| if i < samples { sign() } else { 0.0 })
                 .collect()
         })
         .collect();
@@ -334,7 +334,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         fitted
             .iter()
             .zip(probe)
-            .take(readings)
+            .take(samples)
             .map(|(a, b)| a * b)
             .sum::<f64>()
     });
@@ -379,7 +379,7 @@ fn remark(
 ) -> Option<String> {
     match (rule, index) {
         (WeightRule::Discrepancy, Some(0)) => Some(
-            "every weight on the path explains the readings, so the largest is taken: the data \
+            "every weight on the path explains the samples, so the largest is taken: the data \
              ask for no roughness at all"
                 .into(),
         ),
@@ -390,7 +390,7 @@ fn remark(
                 .fold(f64::INFINITY, f64::min);
             Some(format!(
                 "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
-                 sigma may be too small, or the model cannot explain the readings",
+                 sigma may be too small, or the model cannot explain the samples",
                 problem.largest_chi_square().unwrap_or(f64::NAN)
             ))
         }

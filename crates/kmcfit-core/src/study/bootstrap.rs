@@ -1,7 +1,7 @@
-//! Intervals from fits to simulated readings.
+//! Intervals from fits to simulated samples.
 //!
-//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to readings
-//! made from the optimum's predictions plus noise: normal with the readings' sigma (parametric), or
+//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to samples
+//! made from the optimum's predictions plus noise: normal with the samples' sigma (parametric), or
 //! the residuals themselves drawn with replacement within each channel, after their mean is taken off
 //! and they are widened by `sqrt(n / (n - p))` (residual). What is not in the predictions, a prior or
 //! a penalty, stays as it is.
@@ -12,7 +12,7 @@
 use super::functional::Linear;
 use super::parallel::map;
 use super::refit::settings;
-use super::simulate::{normal, sigmas, stream, with_readings};
+use super::simulate::{normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
@@ -23,8 +23,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Where the noise of a replicate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Noise {
-    /// Normal, with the sigma of the readings or that of the residuals.
+pub enum ReplicateNoise {
+    /// Normal, with the sigma of the samples or that of the residuals.
     Parametric,
     /// The residuals, drawn again.
     Residual,
@@ -33,7 +33,7 @@ pub enum Noise {
 /// Why there are no refits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoRefits {
-    /// The readings do not determine all parameters, or these are too many: refits from the optimum would not move along
+    /// The samples do not determine all parameters, or these are too many: refits from the optimum would not move along
     /// the others.
     Undetermined,
     /// The optimum has no response.
@@ -57,7 +57,7 @@ pub fn intervals(
     problem: &Problem,
     optimum: &[f64],
     further: impl Iterator<Item = Linear>,
-    (noise, count, seed): (Noise, usize, u64),
+    (noise, count, seed): (ReplicateNoise, usize, u64),
     level: f64,
     threads: usize,
 ) -> Result<Vec<NumberInterval>, NoRefits> {
@@ -95,11 +95,11 @@ pub struct Bootstrap {
 /// `count` refits about `optimum`, on up to `threads` threads; the same bits for any number of them.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no response.
 pub fn bootstrap(
     problem: &Problem,
     optimum: &[f64],
-    noise: Noise,
+    noise: ReplicateNoise,
     count: usize,
     seed: u64,
     threads: usize,
@@ -109,13 +109,13 @@ pub fn bootstrap(
     let job = |index: usize| {
         let mut random = stream(seed, index);
         let errors = match noise {
-            Noise::Parametric => {
+            ReplicateNoise::Parametric => {
                 let unit = normal(&mut random, sigmas.len());
                 unit.iter().zip(&sigmas).map(|(u, s)| u * s).collect()
             }
-            Noise::Residual => drawn(problem, &evaluation, &mut random),
+            ReplicateNoise::Residual => drawn(problem, &evaluation, &mut random),
         };
-        let simulated = with_readings(problem, &evaluation, &errors);
+        let simulated = with_samples(problem, &evaluation, &errors);
         match fit_from(&simulated, optimum, &settings()) {
             Err(breakdown) => Err(breakdown.to_string()),
             Ok(fit) => match fit.outcome.status {
@@ -131,13 +131,13 @@ pub fn bootstrap(
     })
 }
 
-/// Residuals of every channel, centred, widened and drawn again. Readings with sigmas of their own
+/// Residuals of every channel, centred, widened and drawn again. Samples with sigmas of their own
 /// keep them: what is drawn is the residual in units of sigma.
 fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
-    let readings = problem.reading_count() as f64;
-    let freedom = (readings - problem.parameters() as f64).max(1.0);
-    let wider = (readings / freedom).sqrt();
-    let mut all = Vec::with_capacity(problem.reading_count());
+    let samples = problem.sample_count() as f64;
+    let freedom = (samples - problem.parameters() as f64).max(1.0);
+    let wider = (samples / freedom).sqrt();
+    let mut all = Vec::with_capacity(problem.sample_count());
     for (channel, predicted) in problem.predicted(evaluation) {
         let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
         let residuals = channel.residuals(predicted).enumerate();

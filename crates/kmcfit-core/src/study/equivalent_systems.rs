@@ -1,6 +1,6 @@
 //! Equivalent systems of a fit: those with chosen masses, each checked by a simulation of its own.
 
-use super::equivalent::{Motion, Wish, equivalent};
+use super::equivalent_coefficients::{EquivalentOptions, TargetResponse, equivalent_coefficients};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::{NodalCoefficients, State};
@@ -27,9 +27,9 @@ pub struct EquivalentSystem {
     /// Name of the choice, or `the fit`.
     pub name: String,
     /// Its coefficients.
-    pub device: NodalCoefficients,
+    pub nodal: NodalCoefficients,
     /// Largest distance of its response from the fit's, as a share of the largest displacement.
-    pub motion_error: f64,
+    pub response_error: f64,
 }
 
 /// The fit itself and the equivalent systems of the choices, or of some masses that are the fit's times a factor over time;
@@ -46,32 +46,37 @@ pub fn equivalent_systems(
     if !is_linear || experiment.nodes != problem.system.grid.nodes() {
         return Vec::new();
     }
-    let motion = Motion::of(problem, evaluation, 0);
-    let device = evaluation.device_of(experiment.device);
+    let response = TargetResponse::of(problem, evaluation, 0);
+    let nodal = evaluation.nodal_of(experiment.coefficient_set);
     let initial = State {
-        displacement: motion.displacement[0],
-        velocity: motion.velocity[0],
+        displacement: response.displacement[0],
+        velocity: response.velocity[0],
     };
-    let least = LEAST_STIFFNESS * device.coefficients[1].iter().copied().fold(0.0, f64::max);
+    let least = LEAST_STIFFNESS * nodal.coefficients[1].iter().copied().fold(0.0, f64::max);
     let find = |choice: Choice| {
         let damping = choice.damping;
-        let damping = damping.unwrap_or_else(|| device.coefficients[0].clone());
-        let found = equivalent(&choice.mass, &motion, &Wish::near(damping, least)).ok()?;
+        let damping = damping.unwrap_or_else(|| nodal.coefficients[0].clone());
+        let found = equivalent_coefficients(
+            &choice.mass,
+            &response,
+            &EquivalentOptions::near(damping, least),
+        )
+        .ok()?;
         let excitation = experiment.excitation.as_ref();
         let moved = problem.system.forward(&found, initial, excitation).ok()?;
-        let largest = (motion.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
-        let pairs = moved.displacement.iter().zip(&motion.displacement);
+        let largest = (response.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
+        let pairs = moved.displacement.iter().zip(&response.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         // Steps that are too long for the system change its response.
-        let motion_error = if off == 0.0 { 0.0 } else { off / largest };
-        (motion_error <= SAME_MOTION).then_some(EquivalentSystem {
+        let response_error = if off == 0.0 { 0.0 } else { off / largest };
+        (response_error <= SAME_MOTION).then_some(EquivalentSystem {
             name: choice.name,
-            device: found,
-            motion_error,
+            nodal: found,
+            response_error,
         })
     };
     let choices = match choices {
-        [] => factors(&device.mass),
+        [] => factors(&nodal.mass),
         choices => choices.to_vec(),
     };
     let found: Vec<EquivalentSystem> = choices.into_iter().filter_map(find).collect();
@@ -80,8 +85,8 @@ pub fn equivalent_systems(
     }
     let fit = EquivalentSystem {
         name: "the fit".into(),
-        device: device.clone(),
-        motion_error: 0.0,
+        nodal: nodal.clone(),
+        response_error: 0.0,
     };
     std::iter::once(fit).chain(found).collect()
 }

@@ -1,11 +1,11 @@
 //! Prediction of an unseen run, with its uncertainty.
 //!
-//! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
+//! The band is that of the linearised response, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
 //! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
-//! envelope of the motions of given extreme devices ([`super::pull_apart`]): the readings rule
+//! envelope of the responses of given extreme systems ([`super::extremes`]): the samples rule
 //! none of them out, however unlikely the linearisation calls them.
 
-use super::pull_apart::Extreme;
+use super::extremes::Extreme;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
 use crate::simulate::{SimulationError, Trajectory};
@@ -17,25 +17,25 @@ const Z_95: f64 = 1.959_963_984_540_054;
 
 /// An unseen run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct PredictionCase {
     /// Its name.
     pub name: String,
     /// State at the first node.
     pub initial: State,
-    /// What drives it, on the problem's grid; `None` for free motion.
+    /// What drives it, on the problem's grid; `None` for free response.
     pub excitation: Option<Excitation>,
-    /// Which device of the problem moves.
-    pub device: usize,
+    /// Which system of the problem moves.
+    pub nodal: usize,
 }
 
-impl Run {
-    /// Free motion of the main device.
+impl PredictionCase {
+    /// Free response of the shared coefficient set.
     pub fn free(name: impl Into<String>, initial: State) -> Self {
         Self {
             name: name.into(),
             initial,
             excitation: None,
-            device: 0,
+            nodal: 0,
         }
     }
 }
@@ -47,38 +47,38 @@ pub struct Prediction {
     pub name: String,
     /// Times of the nodes, s.
     pub times: Vec<f64>,
-    /// The optimum's motion.
-    pub motion: Trajectory,
+    /// The optimum's response.
+    pub response: Trajectory,
     /// 95 % band of the displacement at each node, m; `None` without a covariance.
     pub band: Option<Vec<[f64; 2]>>,
-    /// Envelope of the displacements of the optimum and the extreme devices, m; `None` without
-    /// extreme devices that have a motion.
+    /// Envelope of the displacements of the optimum and the extreme systems, m; `None` without
+    /// extreme systems that have a response.
     pub worst: Option<Vec<[f64; 2]>>,
-    /// The extreme device that is furthest from the optimum, and the largest distance, m.
+    /// The extreme system that is furthest from the optimum, and the largest distance, m.
     pub furthest: Option<(String, f64)>,
-    /// Extreme devices without a motion in this run.
-    pub without_motion: Vec<String>,
+    /// Extreme systems without a response in this run.
+    pub no_response: Vec<String>,
 }
 
 /// Predicts `run` from the parameters `theta`, with the band of `covariance` and the worst case over
 /// `extremes`.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion in the run.
+/// A [`SimulationError`] if the optimum has no response in the run.
 ///
 /// # Panics
 /// If the covariance is not one of the parameters.
 pub fn predict(
     problem: &Problem,
     theta: &[f64],
-    run: &Run,
+    run: &PredictionCase,
     covariance: Option<&DMatrix<f64>>,
     extremes: &[Extreme],
 ) -> Result<Prediction, SimulationError> {
     let seen = with_run(problem, run);
     let evaluation = seen.evaluate(theta)?;
-    let motion = evaluation.trajectories[0].clone();
-    let y = &motion.displacement;
+    let response = evaluation.trajectories[0].clone();
+    let y = &response.displacement;
     let band = covariance.map(|covariance| {
         assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
         let n = theta.len();
@@ -101,10 +101,10 @@ pub fn predict(
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;
-    let mut without_motion = Vec::new();
+    let mut no_response = Vec::new();
     for extreme in extremes {
         let Ok(other) = seen.evaluate(&extreme.parameters) else {
-            without_motion.push(extreme.name());
+            no_response.push(extreme.name());
             continue;
         };
         let mut distance = 0.0f64;
@@ -123,13 +123,13 @@ pub fn predict(
         band,
         worst: furthest.is_some().then_some(envelope),
         furthest,
-        without_motion,
-        motion,
+        no_response,
+        response,
     })
 }
 
 /// The problem with the run as its only experiment, its displacement read at all nodes.
-fn with_run(problem: &Problem, run: &Run) -> Problem {
+fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let mut seen = problem.clone();
     let grid = problem.system.grid;
     let nodes = grid.nodes();
@@ -137,7 +137,7 @@ fn with_run(problem: &Problem, run: &Run) -> Problem {
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
-    experiment.device = run.device;
+    experiment.coefficient_set = run.nodal;
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

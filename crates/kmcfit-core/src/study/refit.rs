@@ -27,7 +27,7 @@ pub fn settings() -> FitSettings {
 }
 
 /// How large a change of each parameter is large: the natural size of its function, or the scalar's
-/// own. `theta` must have a motion; else all sizes are 1.
+/// own. `theta` must have a response; else all sizes are 1.
 pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
     let Ok(evaluation) = problem.evaluate(theta) else {
         return vec![1.0; theta.len()];

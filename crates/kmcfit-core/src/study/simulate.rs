@@ -1,4 +1,4 @@
-//! Readings that a device would have given, with seeded noise.
+//! Samples that a system would have given, with seeded noise.
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -13,7 +13,7 @@ pub fn stream(seed: u64, index: usize) -> ChaCha8Rng {
     random
 }
 
-/// Standard deviation of every reading, in the order of experiments, channels and readings: the
+/// Standard deviation of every sample, in the order of experiments, channels and samples: the
 /// stated one, or where none is stated the root of the unweighted residuals' mean square, all
 /// channels without sigma together, made unbiased by `n / (n - p)`.
 pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
@@ -37,8 +37,8 @@ pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
     (0..count).map(|_| StandardNormal.sample(random)).collect()
 }
 
-/// The problem with the readings `predictions + noise`, noise in the order of [`sigmas`].
-pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
+/// The problem with the samples `predictions + noise`, noise in the order of [`sigmas`].
+pub fn with_samples(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
     let mut simulated = problem.clone();
     let mut first = 0;
     let experiments = simulated.parts_mut().experiments.iter_mut();

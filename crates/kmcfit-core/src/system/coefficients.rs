@@ -25,7 +25,7 @@ pub struct NodalCoefficients {
 }
 
 impl NodalCoefficients {
-    /// A device with all values zero: `nodes` nodes, `terms` terms.
+    /// A system with all values zero: `nodes` nodes, `terms` terms.
     pub fn zeros(nodes: usize, terms: usize) -> Self {
         Self {
             mass: vec![0.0; nodes],
@@ -54,11 +54,11 @@ impl NodalCoefficients {
     }
 }
 
-/// A direction in which device and initial state change.
+/// A direction in which system and initial state change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemTangent {
     /// Change of every function at the nodes.
-    pub device: NodalCoefficients,
+    pub nodal: NodalCoefficients,
     /// Change of the initial state.
     pub initial: State,
 }
@@ -66,6 +66,6 @@ pub struct SystemTangent {
 impl SystemTangent {
     pub(crate) fn is_finite(&self) -> bool {
         let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-        self.device.functions().all(finite) && self.initial.is_finite()
+        self.nodal.functions().all(finite) && self.initial.is_finite()
     }
 }

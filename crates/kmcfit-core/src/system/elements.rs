@@ -56,7 +56,7 @@ impl Term {
         }
     }
 
-    /// Whether the response is proportional to the motion.
+    /// Whether the response is proportional to the response.
     pub fn is_linear(self) -> bool {
         matches!(self, Term::Damping | Term::Stiffness)
     }

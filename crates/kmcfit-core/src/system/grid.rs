@@ -109,7 +109,7 @@ impl TimePoint {
         })
     }
 
-    /// Node `node` of a motion over `nodes` nodes: the left node of a step, but for the last.
+    /// Node `node` of a response over `nodes` nodes: the left node of a step, but for the last.
     pub fn node(node: usize, nodes: usize) -> Self {
         match node + 1 < nodes {
             true => Self {

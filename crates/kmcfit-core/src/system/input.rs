@@ -1,7 +1,7 @@
 //! The input of a record: force and motion of the base.
 
 use super::TimePoint;
-use super::integrator::Position;
+use super::integrator::StagePosition;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a
 /// right end is the limit from the left, so that a jump at a node belongs to the step after it.
@@ -42,18 +42,18 @@ impl StageSamples {
     }
 
     #[inline(always)]
-    pub(crate) fn at(&self, i: usize, position: Position) -> f64 {
+    pub(crate) fn at(&self, i: usize, position: StagePosition) -> f64 {
         self.0[i][match position {
-            Position::Left => 0,
-            Position::Middle => 1,
-            Position::Right => 2,
+            StagePosition::Left => 0,
+            StagePosition::Middle => 1,
+            StagePosition::Right => 2,
         }]
     }
 }
 
 /// Force and motion of the base in one experiment.
 ///
-/// Under base excitation `y` is the motion relative to the base `b(t)`, so the equation of motion is
+/// Under base excitation `y` is the response relative to the base `b(t)`, so the equation of motion is
 /// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`: the base pushes with `-m b''`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
@@ -72,7 +72,7 @@ impl Excitation {
         }
     }
 
-    /// Whether nothing drives the motion.
+    /// Whether nothing drives the response.
     pub fn is_zero(&self) -> bool {
         let zero = |part: &Option<StageSamples>| part.as_ref().is_none_or(StageSamples::is_zero);
         zero(&self.force) && zero(&self.base)
@@ -111,7 +111,7 @@ impl Excitation {
         }
     }
 
-    /// Whether it covers the steps of a motion over `nodes` nodes.
+    /// Whether it covers the steps of a response over `nodes` nodes.
     pub(crate) fn covers(&self, nodes: usize) -> bool {
         let parts = [&self.force, &self.base];
         parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)

@@ -11,7 +11,7 @@ mod input;
 mod integrator;
 pub mod quadrature;
 
-pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
+pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};
@@ -19,7 +19,7 @@ pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputSample, StageSamples};
 pub use integrator::Method;
 
-/// Most functions of a device: the mass and one for each term.
+/// Most functions of a system: the mass and one for each term.
 pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
 
 /// Grid, stepper and force terms of an oscillator. The values of the coefficient functions are a [`NodalCoefficients`].

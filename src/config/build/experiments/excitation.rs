@@ -8,7 +8,7 @@ use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::Kind;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
-use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
+use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]
@@ -190,7 +190,7 @@ fn signal(
 }
 
 /// A force without samples.
-pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, InputError> {
+pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
     let key = format!("{key}.force");
     let Some(shape) = spec.shape else {
         return Err(file
@@ -202,13 +202,13 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
     let (amplitude, at) = (number(spec.amplitude), number(spec.at));
     let duration = number(spec.duration);
     Ok(match shape {
-        ForceShape::Constant => Shape::Constant { amplitude },
-        ForceShape::Sine => Shape::Sine {
+        ForceShape::Constant => ExcitationShape::Constant { amplitude },
+        ForceShape::Sine => ExcitationShape::Sine {
             amplitude,
             frequency: number(spec.frequency),
             phase: number(spec.phase),
         },
-        ForceShape::Sweep => Shape::Sweep {
+        ForceShape::Sweep => ExcitationShape::Sweep {
             amplitude,
             from: number(spec.from),
             to: number(spec.to),
@@ -216,8 +216,8 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
             duration,
             law: SweepLaw::Linear,
         },
-        ForceShape::Step => Shape::Step { amplitude, at },
-        ForceShape::HalfSine => Shape::HalfSine {
+        ForceShape::Step => ExcitationShape::Step { amplitude, at },
+        ForceShape::HalfSine => ExcitationShape::HalfSine {
             amplitude,
             at,
             duration,

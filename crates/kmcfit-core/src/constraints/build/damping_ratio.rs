@@ -1,7 +1,7 @@
 //! A cap on the damping ratio, as second-order cones.
 
 use super::All;
-use super::form::Form;
+use super::linear_form::LinearForm;
 use super::sampling::value;
 use crate::constraints::{Cone, ConeGroup, Rows};
 
@@ -27,7 +27,7 @@ pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3], zeta: f64) -> ConeGrou
     }
 }
 
-fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
+fn cone(m: &LinearForm, c: &LinearForm, k: &LinearForm) -> Cone {
     let mut sum = m.clone();
     sum.add(1.0, k);
     let mut difference = m.clone();
@@ -41,7 +41,7 @@ fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
 
 /// The power of two nearest to `sqrt(k/m)`, by the largest values at the start.
 fn balance(all: &All<'_>, m: usize, k: usize) -> f64 {
-    let start = all.functions.device(&all.functions.start());
+    let start = all.functions.nodal(&all.functions.start());
     let sizes: Vec<f64> = (start.functions())
         .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
         .collect();

@@ -1,8 +1,8 @@
 //! One function equal to a multiple of another.
 
-use super::form::{Form, group};
+use super::linear_form::{LinearForm, group};
 use super::sampling::value;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
@@ -10,10 +10,14 @@ use crate::functions::Basis;
 const DEPENDENT: f64 = 1e-10;
 /// A row that follows from others must have the right-hand side that follows, relative to its size.
 const CONSISTENT: f64 = 1e-8;
-/// Up to so many parameters dependent rows are sought out; one value per node has none.
+/// Up to so many parameters dependent rows are estimated out; one value per node has none.
 const MOST_PARAMETERS: usize = 400;
 
-pub(super) fn build(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Result<RowGroup, Impossible> {
+pub(super) fn build(
+    all: &All<'_>,
+    [a, b]: [usize; 2],
+    ratio: f64,
+) -> Result<RowGroup, ConstraintError> {
     let (first, second) = (all.list[a], all.list[b]);
     let name = match ratio {
         1.0 => format!("{} = {}", all.name(a), all.name(b)),
@@ -38,7 +42,7 @@ pub(super) fn build(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Result<Row
     }
 }
 
-fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
+fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<LinearForm> {
     let ranges = all.functions.ranges();
     let knots = (all.list[a].basis.as_ref()).map_or(Vec::new(), |b| b.knot_times(all.grid));
     let ends = all.ends();
@@ -47,7 +51,7 @@ fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
             true => [knots[i - ranges[a].start]; 2],
             false => ends,
         };
-        Form {
+        LinearForm {
             entries: vec![(i, 1.0), (j, -ratio)],
             constant: 0.0,
             time: span[0],
@@ -58,7 +62,7 @@ fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
     pairs.map(form).collect()
 }
 
-fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
+fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<LinearForm> {
     let times = all.grid.times();
     let mut forms = all.forms(a, 0, &times);
     for (form, other) in forms.iter_mut().zip(all.forms(b, 0, &times)) {
@@ -69,7 +73,7 @@ fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
 
 /// The equalities without those that follow from others: the most independent row first, each
 /// against what the rows before it leave of all others.
-fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, Impossible> {
+fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, ConstraintError> {
     let count = group.rows.len();
     let mut rest: Vec<Vec<f64>> = (0..count)
         .map(|i| {
@@ -113,7 +117,7 @@ fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, Impossibl
         .iter()
         .position(|row| row[parameters].abs() > CONSISTENT * right)
     {
-        return Err(Impossible::Broken {
+        return Err(ConstraintError::Broken {
             name: group.name.clone(),
             time: group.times[i][0],
         });

@@ -4,15 +4,15 @@
 //! ends of all pieces and so holds **at all times**: `nodal`, `constant`, `piecewise-constant` and
 //! `piecewise-linear` functions, lines, parabolas' slopes, and the curvature of cubic splines. Values
 //! and slopes of other polynomials and of splines are held at every node, where the equation of
-//! motion looks at them; **between nodes nothing is promised** about those.
+//! response looks at them; **between nodes nothing is promised** about those.
 //!
 //! A row that is about a single parameter (a value at a knot) stays one, so that clipping is exact.
 
 mod bounds;
 mod damping_ratio;
 mod equal;
-mod form;
 mod frequency;
+mod linear_form;
 mod passive;
 mod sampling;
 mod shape;
@@ -72,7 +72,7 @@ impl fmt::Display for TimeHistory {
 
 /// What is demanded of the functions.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Statement {
+pub enum Constraint {
     /// `min <= p(t) <= max`, in the unit of the function.
     Bounds {
         /// The function `p`.
@@ -135,7 +135,7 @@ pub enum Statement {
     /// The stored energy never grows: `c - m'/2 >= 0` and `k' <= 0`. In every cell `c` at both ends
     /// is at least half the slope of `m` there; a `piecewise-constant` mass must not jump up.
     Passive,
-    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the device at rest
+    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the system at rest
     /// stays in a band, in Hz.
     Frequency {
         /// Lowest frequency, Hz.
@@ -157,8 +157,8 @@ pub enum Statement {
 
 /// Why a statement cannot become rows.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Impossible {
-    /// The device has no such function.
+pub enum ConstraintError {
+    /// The system has no such function.
     Absent(CoefficientKind),
     /// All functions that it is about are fixed.
     Fixed(Vec<CoefficientKind>),
@@ -171,19 +171,19 @@ pub enum Impossible {
     },
 }
 
-impl Statement {
+impl Constraint {
     /// The functions that it is about.
     pub fn functions(&self) -> Vec<CoefficientKind> {
         match self {
-            Statement::Bounds { of, .. }
-            | Statement::Slope { of, .. }
-            | Statement::Shape { of, .. }
-            | Statement::Value { of, .. }
-            | Statement::Mean { of, .. }
-            | Statement::Integral { of, .. } => vec![*of],
-            Statement::Equal { first, second, .. } => vec![*first, *second],
-            Statement::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
-            Statement::Passive | Statement::DampingRatio { .. } => {
+            Constraint::Bounds { of, .. }
+            | Constraint::Slope { of, .. }
+            | Constraint::Shape { of, .. }
+            | Constraint::Value { of, .. }
+            | Constraint::Mean { of, .. }
+            | Constraint::Integral { of, .. } => vec![*of],
+            Constraint::Equal { first, second, .. } => vec![*first, *second],
+            Constraint::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
+            Constraint::Passive | Constraint::DampingRatio { .. } => {
                 vec![
                     CoefficientKind::Mass,
                     CoefficientKind::Damping,
@@ -202,57 +202,57 @@ impl Statement {
         &self,
         grid: &Grid,
         functions: &Parameterization,
-    ) -> Result<Constraints, Impossible> {
+    ) -> Result<Constraints, ConstraintError> {
         self.build_for(grid, functions, 0)
     }
 
-    /// [`Statement::build`] about the functions of device `device` of
+    /// [`Constraint::build`] about the functions of system `system` of
     /// [`Parameterization::assemblies`].
     ///
     /// # Errors
-    /// As [`Statement::build`].
+    /// As [`Constraint::build`].
     pub fn build_for(
         &self,
         grid: &Grid,
         functions: &Parameterization,
-        device: usize,
-    ) -> Result<Constraints, Impossible> {
-        let all = All::new(grid, functions, device);
+        set: usize,
+    ) -> Result<Constraints, ConstraintError> {
+        let all = All::new(grid, functions, set);
         let about = self.functions();
         let indices: Vec<usize> = (about.iter())
             .map(|q| all.index(*q))
             .collect::<Result<_, _>>()?;
         if indices.iter().all(|&j| all.list[j].parameters() == 0) {
-            return Err(Impossible::Fixed(about));
+            return Err(ConstraintError::Fixed(about));
         }
         let mut found = Constraints::default();
         match (self, indices.as_slice()) {
-            (Statement::Bounds { min, max, .. }, &[j]) => {
+            (Constraint::Bounds { min, max, .. }, &[j]) => {
                 found.groups = bounds::build(&all, j, min.as_ref(), max.as_ref())?;
             }
-            (Statement::Slope { min, max, .. }, &[j]) => {
+            (Constraint::Slope { min, max, .. }, &[j]) => {
                 found.groups = slope::build(&all, j, *min, *max)?;
             }
-            (Statement::Shape { shape, .. }, &[j]) => {
+            (Constraint::Shape { shape, .. }, &[j]) => {
                 found.groups = vec![shape::build(&all, j, *shape)?];
             }
-            (Statement::Value { at, value, .. }, &[j]) => {
+            (Constraint::Value { at, value, .. }, &[j]) => {
                 found.groups = vec![values::build(&all, j, *at, *value)?];
             }
-            (Statement::Mean { value, .. }, &[j]) => {
+            (Constraint::Mean { value, .. }, &[j]) => {
                 found.groups = vec![totals::mean(&all, j, *value)?];
             }
-            (Statement::Integral { value, .. }, &[j]) => {
+            (Constraint::Integral { value, .. }, &[j]) => {
                 found.groups = vec![totals::integral(&all, j, *value)?];
             }
-            (Statement::Equal { ratio, .. }, &[a, b]) => {
+            (Constraint::Equal { ratio, .. }, &[a, b]) => {
                 found.groups = vec![equal::build(&all, [a, b], *ratio)?];
             }
-            (Statement::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
-            (Statement::Frequency { min, max }, &[m, k]) => {
+            (Constraint::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
+            (Constraint::Frequency { min, max }, &[m, k]) => {
                 found.groups = frequency::build(&all, [m, k], *min, *max)?;
             }
-            (Statement::DampingRatio { max }, &[m, c, k]) => {
+            (Constraint::DampingRatio { max }, &[m, c, k]) => {
                 found.cones = vec![damping_ratio::build(&all, [m, c, k], *max)];
             }
             _ => unreachable!("one index for each function of a statement"),
@@ -272,19 +272,19 @@ struct All<'a> {
 }
 
 impl<'a> All<'a> {
-    fn new(grid: &'a Grid, functions: &'a Parameterization, device: usize) -> Self {
+    fn new(grid: &'a Grid, functions: &'a Parameterization, set: usize) -> Self {
         Self {
             grid,
             functions,
             list: functions.iter().collect(),
-            assembly: functions.assembly(device),
+            assembly: functions.coefficient_set(set),
         }
     }
 
-    fn index(&self, quantity: CoefficientKind) -> Result<usize, Impossible> {
+    fn index(&self, quantity: CoefficientKind) -> Result<usize, ConstraintError> {
         let is_meant = |f: &&usize| self.list[**f].quantity == quantity;
         let found = self.assembly.iter().find(is_meant);
-        found.copied().ok_or(Impossible::Absent(quantity))
+        found.copied().ok_or(ConstraintError::Absent(quantity))
     }
 
     fn name(&self, j: usize) -> String {

@@ -1,14 +1,17 @@
 //! Passivity: the stored energy `m v^2/2 + k y^2/2` never grows.
 
-use super::form::group;
+use super::linear_form::group;
 use super::sampling::{slope, value};
 use super::shape::DOWN;
 use super::slope::slopes;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
-pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3]) -> Result<Vec<RowGroup>, Impossible> {
+pub(super) fn build(
+    all: &All<'_>,
+    [m, c, k]: [usize; 3],
+) -> Result<Vec<RowGroup>, ConstraintError> {
     let mut groups = Vec::new();
     let mut parts = vec![value(c, 1.0)];
     if let Some(Basis::PiecewiseConstant { .. }) = all.list[m].basis {

@@ -1,9 +1,9 @@
 //! Monotone, convex and concave functions.
 
-use super::form::{Form, group};
-use super::sampling::Part;
+use super::linear_form::{LinearForm, group};
+use super::sampling::DerivativeTerm;
 use super::slope::slopes;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
@@ -36,7 +36,7 @@ impl Shape {
 pub(super) const UP: [f64; 2] = [0.0, f64::INFINITY];
 pub(super) const DOWN: [f64; 2] = [f64::NEG_INFINITY, 0.0];
 
-pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, Impossible> {
+pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, ConstraintError> {
     let (forms, bounds) = match shape {
         Shape::NonIncreasing => (slopes(all, j), DOWN),
         Shape::NonDecreasing => (slopes(all, j), UP),
@@ -49,7 +49,7 @@ pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, I
 
 /// The curvature of a function, or where it is not square-integrable its divided differences, scaled
 /// by the root of their spacing.
-fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
+fn curvatures(all: &All<'_>, j: usize) -> Vec<LinearForm> {
     match &all.list[j].basis {
         Some(
             basis
@@ -66,7 +66,7 @@ fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
             all.matrix_forms(j, &rows, &times)
         }
         _ => {
-            let curvature = Part {
+            let curvature = DerivativeTerm {
                 function: j,
                 derivative: 2,
                 factor: 1.0,

@@ -1,6 +1,6 @@
 //! Cubic B-splines: smooth functions with local parameters.
 
-use super::knots::Knots;
+use super::knots::KnotSpans;
 use super::space::BasisFunctions;
 
 /// Degree of the pieces.
@@ -9,14 +9,14 @@ const DEGREE: usize = 3;
 /// Clamped cubic B-splines: the break points with each end repeated, so that the first and the last
 /// parameter are the values at the ends of the record.
 pub(super) struct CubicSpline {
-    knots: Knots,
+    knots: KnotSpans,
 }
 
 impl CubicSpline {
     /// Between `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
-            knots: Knots::new(knots),
+            knots: KnotSpans::new(knots),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Knots and the cells between them.
+//! KnotSpans and the cells between them.
 
 use crate::system::Grid;
 
@@ -23,13 +23,13 @@ pub fn uniform_knots(grid: &Grid, count: usize) -> Vec<f64> {
 
 /// Increasing times and the cells between them.
 #[derive(Debug, Clone)]
-pub(super) struct Knots {
+pub(super) struct KnotSpans {
     times: Vec<f64>,
     widths: Vec<f64>,
     slack: f64,
 }
 
-impl Knots {
+impl KnotSpans {
     /// Cells between `times` (s).
     pub fn new(times: &[f64]) -> Self {
         let widths = times.windows(2).map(|w| w[1] - w[0]).collect();

@@ -1,28 +1,28 @@
 //! One value per knot, linear in between.
 
 use super::differences;
-use super::knots::Knots;
+use super::knots::KnotSpans;
 use super::space::{BasisFunctions, square_integral};
 use crate::rows::Rows;
 use crate::system::Grid;
 
 /// Hat functions: 1 at their own knot, 0 at all others.
 pub(super) struct PiecewiseLinear {
-    knots: Knots,
+    knots: KnotSpans,
 }
 
 impl PiecewiseLinear {
     /// Between `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
-            knots: Knots::new(knots),
+            knots: KnotSpans::new(knots),
         }
     }
 
     /// Between the nodes of `grid`.
     pub fn on_nodes(grid: &Grid) -> Self {
         Self {
-            knots: Knots::nodes(grid),
+            knots: KnotSpans::nodes(grid),
         }
     }
 }

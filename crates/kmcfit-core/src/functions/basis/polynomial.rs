@@ -49,7 +49,7 @@ impl BasisFunctions for Legendre {
 /// The coefficients `a_0..=a_d` of `p(t) = sum_i a_i t^i` for the Legendre parameters `theta`; `t` in
 /// s as in the file, `a_i` in (unit of p)/s^i.
 ///
-/// High powers cancel each other: use these numbers for reading, not for computing.
+/// High powers cancel each other: use these numbers for sample, not for computing.
 pub fn physical_powers(grid: &Grid, theta: &[f64]) -> Vec<f64> {
     // x = scale t + shift
     let scale = 2.0 / grid.duration();

@@ -1,25 +1,25 @@
 //! The derivatives of all predictions with respect to all parameters, from tangents in lanes.
 
-mod moving;
-mod reader;
+mod observation_rows;
+mod sensitivity_layout;
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
-use crate::simd::tall_qr::Piece;
+use crate::simd::tall_qr::RowBlock;
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
-use moving::Moving;
 use nalgebra::DMatrix;
-use reader::Reader;
+use observation_rows::JacobianRows;
+use sensitivity_layout::Moving;
 use std::ops::Range;
 
 impl Problem {
-    /// The change of every prediction (rows: readings of all channels of all experiments, in order)
+    /// The change of every prediction (rows: samples of all channels of all experiments, in order)
     /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
         self.each_piece(evaluation, &order, |piece| {
             for (place, j) in order.iter().enumerate().take(piece.begun()) {
@@ -39,7 +39,7 @@ impl Problem {
     /// One direction after the other: for numbers at the ends of their range, where the order of the
     /// operations decides what is still finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let mut unit = vec![0.0; self.parameters()];
         for (j, mut column) in jacobian.column_iter_mut().enumerate() {
             unit[j] = 1.0;
@@ -64,7 +64,7 @@ impl Problem {
     }
 
     /// Whether the pieces of [`Problem::each_piece`] are all there is to the Jacobian: nothing of a sensor is
-    /// sought, and no channel is filtered.
+    /// estimated, and no channel is filtered.
     pub(crate) fn comes_in_pieces(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
@@ -79,16 +79,16 @@ impl Problem {
         &self,
         evaluation: &Evaluation,
         order: &[usize],
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
-            if experiment.reading_count() > 0 && !order.is_empty() {
+            if experiment.sample_count() > 0 && !order.is_empty() {
                 let view = self.view(evaluation, e);
                 let all = 0..experiment.nodes - 1;
                 sweep(self, experiment, view, order, row, all, &mut take);
             }
-            row += experiment.reading_count();
+            row += experiment.sample_count();
         }
     }
 
@@ -102,7 +102,7 @@ impl Problem {
         (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
-    /// [`Problem::each_piece`] for the readings in some steps of the only record, which begin with a tile, and how
+    /// [`Problem::each_piece`] for the samples in some steps of the only record, which begin with a tile, and how
     /// displacement and velocity at their end answer to each place. Later steps than the first do not know how the
     /// state that they set out from answers: that state has two places of its own, behind the others.
     pub(crate) fn each_piece_of_part(
@@ -110,13 +110,13 @@ impl Problem {
         evaluation: &Evaluation,
         order: &[usize],
         steps: Range<usize>,
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) -> Vec<[f64; 2]> {
         let (experiment, view) = (&self.experiments[0], self.view(evaluation, 0));
         sweep(self, experiment, view, order, 0, steps, &mut take)
     }
 
-    /// What the sensors that are sought add to a Jacobian, and what the filters make of it.
+    /// What the sensors that are estimated add to a Jacobian, and what the filters make of it.
     fn add_sensors(&self, evaluation: &Evaluation, jacobian: &mut DMatrix<f64>) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
@@ -129,7 +129,7 @@ impl Problem {
     }
 }
 
-/// Goes through some steps of the motion of one experiment, whose first reading has the row `row`: how displacement and
+/// Goes through some steps of the response of one experiment, whose first sample has the row `row`: how displacement and
 /// velocity at the end answer to each place.
 fn sweep(
     problem: &Problem,
@@ -138,7 +138,7 @@ fn sweep(
     order: &[usize],
     mut row: usize,
     steps: Range<usize>,
-    take: &mut impl FnMut(Piece) -> Piece,
+    take: &mut impl FnMut(RowBlock) -> RowBlock,
 ) -> Vec<[f64; 2]> {
     let moving = Moving::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
@@ -150,12 +150,12 @@ fn sweep(
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
         let first = channel.places().partition_point(|p| p.step < steps.start);
-        let mut piece = Piece::new(places);
+        let mut piece = RowBlock::new(places);
         piece.restart(row + first);
-        readers.push((Reader::new(channel, view, first), piece));
+        readers.push((JacobianRows::new(channel, view, first), piece));
         row += channel.len();
     }
-    let mut give = |piece: &mut Piece| {
+    let mut give = |piece: &mut RowBlock| {
         let next = piece.first + piece.count;
         let full = std::mem::take(piece);
         *piece = take(full);
@@ -163,9 +163,9 @@ fn sweep(
     };
     let course = BaseTrajectory {
         system: view.system,
-        device: view.device,
+        nodal: view.nodal,
         excitation: view.excitation,
-        motion: view.motion,
+        response: view.response,
     };
     let mut from = steps.start;
     let mut last = 0;
@@ -230,7 +230,7 @@ mod tests {
 
     const NODES: usize = 70;
 
-    /// Two records of two devices that differ in their stiffness, the second over the first `nodes` nodes of the grid,
+    /// Two records of two systems that differ in their stiffness, the second over the first `nodes` nodes of the grid,
     /// each with a displacement at every third node and `count` accelerations from the first node on.
     fn problem(with_knots: bool, nodes: usize, count: usize) -> Problem {
         let grid = Grid::new(0.0, 7.0, NODES).expect("a grid");
@@ -250,20 +250,21 @@ mod tests {
             function(CoefficientKind::Stiffness, 20, 2.0),
             function(CoefficientKind::Stiffness, 20, 3.0),
         ];
-        let devices = vec![vec![0, 1, 2], vec![0, 1, 3]];
-        let functions = Parameterization::with_devices(list, devices, NODES, grid.step());
+        let coefficient_sets = vec![vec![0, 1, 2], vec![0, 1, 3]];
+        let functions =
+            Parameterization::with_coefficient_sets(list, coefficient_sets, NODES, grid.step());
         let force: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin()).collect();
-        let record = |device: usize, nodes: usize| {
+        let record = |coefficient_set: usize, nodes: usize| {
             let channel = |kind, at: Vec<usize>| {
                 let times: Vec<f64> = at.iter().map(|i| grid.time(*i)).collect();
                 let values = times.iter().map(|t| (2.0 * t).cos()).collect();
                 let weighting = Weighting::Sigma(0.1);
-                Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+                Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
             };
             let accelerations = (0..count.min(nodes)).collect();
             let thirds = (0..nodes).step_by(3).collect();
             Experiment {
-                device,
+                coefficient_set,
                 ..Experiment::free("driven", State::default(), nodes)
                     .with_excitation(Excitation::force_at_nodes(&force))
                     .with_channel(channel(ChannelKind::Acceleration, accelerations))

@@ -4,11 +4,11 @@ mod piece;
 mod triangle;
 
 use super::{Aligned, LANES, Row};
-pub(crate) use piece::{PIECE, Piece};
+pub(crate) use piece::{PIECE, RowBlock};
 pub(crate) use triangle::Triangle;
 
 /// Rows of a piece, in lanes: with 34 columns they fill the processor's nearest memory.
 const HIGH: usize = 12;
 
 /// A column of a piece.
-type Column = Aligned<[Row; HIGH]>;
+type BlockColumn = Aligned<[Row; HIGH]>;

@@ -1,13 +1,13 @@
 //! Some rows of a tall matrix.
 
-use super::{Aligned, Column, HIGH, LANES};
+use super::{Aligned, BlockColumn, HIGH, LANES};
 
 /// Most rows of a piece.
 pub(crate) const PIECE: usize = HIGH * LANES;
 
 /// Up to [`PIECE`] rows, column by column; what is below them means nothing.
 #[derive(Default)]
-pub(crate) struct Piece {
+pub(crate) struct RowBlock {
     /// Which row of the matrix the first one is.
     pub first: usize,
     /// Number of rows.
@@ -15,10 +15,10 @@ pub(crate) struct Piece {
     /// Columns that have begun: what stands behind them means nothing, and stands for zeros.
     begun: usize,
     /// A column at each place, and one to spare.
-    pub(super) columns: Vec<Column>,
+    pub(super) columns: Vec<BlockColumn>,
 }
 
-impl Piece {
+impl RowBlock {
     /// One without rows, for so many places, that have all begun with zeros.
     pub fn new(places: usize) -> Self {
         Self {

@@ -1,10 +1,10 @@
 //! The triangular factor of a tall matrix, by Householder reflections of some rows at a time.
 //!
 //! The rows are taken in pieces that stay in the processor's nearest memory; each is reflected into the
-//! triangle of all rows before it. A parameter that the first readings do not see stays out of the way
+//! triangle of all rows before it. A parameter that the first samples do not see stays out of the way
 //! until it is seen: the columns are taken in the order in which they begin.
 
-use super::{Column, HIGH, LANES, PIECE, Piece, Row};
+use super::{BlockColumn, HIGH, LANES, PIECE, Row, RowBlock};
 use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
@@ -41,7 +41,7 @@ impl Triangle {
         let mut order: Vec<usize> = (0..columns.len()).collect();
         order.sort_by_key(|j| begins[*j]);
         let mut triangle = Self::new(order.len());
-        let mut piece = Piece::new(order.len());
+        let mut piece = RowBlock::new(order.len());
         while piece.first < height {
             let rows = piece.first..(piece.first + PIECE).min(height);
             piece.count = rows.len();
@@ -56,7 +56,7 @@ impl Triangle {
     }
 
     /// Adds the rows of a piece, with `D` and `d` for each; what the piece holds then means nothing.
-    pub fn add_weighted(&mut self, piece: &mut Piece, roots: &[f64], right: &[f64]) {
+    pub fn add_weighted(&mut self, piece: &mut RowBlock, roots: &[f64], right: &[f64]) {
         let places = self.begin(piece);
         simd::run(Weigh {
             columns: &mut piece.columns[..places],
@@ -66,13 +66,13 @@ impl Triangle {
     }
 
     /// As [`Triangle::add_weighted`] with ones for `D`.
-    pub fn add(&mut self, piece: &mut Piece, right: &[f64]) {
+    pub fn add(&mut self, piece: &mut RowBlock, right: &[f64]) {
         self.begin(piece);
         self.reflect(piece, right);
     }
 
     /// Takes in the columns that begin in a piece: how many have.
-    fn begin(&mut self, piece: &mut Piece) -> usize {
+    fn begin(&mut self, piece: &mut RowBlock) -> usize {
         let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
         let has_begun = |place: &usize| piece.column(*place).chunks(4 * LANES).any(any);
         let last = (self.begun..piece.begun()).rev().find(has_begun);
@@ -81,7 +81,7 @@ impl Triangle {
         self.begun
     }
 
-    fn reflect(&mut self, piece: &mut Piece, right: &[f64]) {
+    fn reflect(&mut self, piece: &mut RowBlock, right: &[f64]) {
         let columns = &mut piece.columns[..=self.begun];
         // The right-hand side behind the columns that have begun: the others are zero.
         let to = columns[self.begun].as_flattened_mut();
@@ -92,7 +92,7 @@ impl Triangle {
         for column in columns.iter_mut() {
             column.as_flattened_mut()[right.len()..].fill(0.0);
         }
-        simd::run(Reflect {
+        simd::run(BlockReflection {
             triangle: self,
             piece: columns,
         });
@@ -121,7 +121,7 @@ impl Triangle {
     /// by `states` those two.
     pub fn join(&mut self, other: &Triangle, states: &[[f64; 2]]) {
         let n = self.rows.len();
-        let mut piece = Piece::new(n);
+        let mut piece = RowBlock::new(n);
         piece.restart(0);
         piece.count = other.begun;
         piece.widen(n);
@@ -209,7 +209,7 @@ fn begin(column: &[f64]) -> usize {
 
 /// Multiplies the rows of columns by their `roots`.
 struct Weigh<'a> {
-    columns: &'a mut [Column],
+    columns: &'a mut [BlockColumn],
     roots: &'a [f64],
 }
 
@@ -230,12 +230,12 @@ impl Kernel for Weigh<'_> {
 }
 
 /// Reflects a piece, its right-hand side last, into the triangle.
-struct Reflect<'a> {
+struct BlockReflection<'a> {
     triangle: &'a mut Triangle,
-    piece: &'a mut [Column],
+    piece: &'a mut [BlockColumn],
 }
 
-impl Kernel for Reflect<'_> {
+impl Kernel for BlockReflection<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -283,7 +283,7 @@ impl Kernel for Reflect<'_> {
 
 /// `1 - factor (top, column) (top, column)'`.
 struct Reflector<'a> {
-    column: &'a Column,
+    column: &'a BlockColumn,
     top: f64,
     factor: f64,
 }
@@ -293,7 +293,7 @@ impl Reflector<'_> {
     fn reflect<A: Arithmetic, const J: usize>(
         &self,
         arithmetic: A,
-        columns: &mut [Column],
+        columns: &mut [BlockColumn],
         tops: &mut [f64],
     ) {
         let Some(columns) = columns.first_chunk_mut::<J>() else {
@@ -332,7 +332,7 @@ impl Reflector<'_> {
 }
 
 #[inline(always)]
-fn dot<A: Arithmetic>(arithmetic: A, a: &Column, b: &Column) -> f64 {
+fn dot<A: Arithmetic>(arithmetic: A, a: &BlockColumn, b: &BlockColumn) -> f64 {
     let mut sums = [Eight::splat(arithmetic, 0.0); 4];
     for h in 0..HIGH {
         sums[h % 4] += Eight::load(arithmetic, &a[h]) * Eight::load(arithmetic, &b[h]);
@@ -411,7 +411,7 @@ mod tests {
         let (matrix, roots, right) = problem();
         let (whole, order) = Triangle::of(&matrix, &roots, &right);
         let mut parts = Triangle::new(order.len());
-        let mut piece = Piece::new(order.len());
+        let mut piece = RowBlock::new(order.len());
         let mut first = 0;
         for count in (1..).take_while(|count| *count < 100) {
             let rows = first..(first + count).min(ROWS);

@@ -34,14 +34,14 @@ struct Sweep<'a> {
 
 /// What eight steps need, each at its right node and at mid-step: `m`, `C - 2 m'`, `m'' - C' + K` and `2 (y - y_obs) / m`.
 #[repr(align(64))]
-struct Coefficients {
+struct StageCoefficients {
     mass: Row,
     damping: Row,
     stiffness: Row,
     source: Row,
 }
 
-impl Coefficients {
+impl StageCoefficients {
     /// `z''` of step `j` at `(z, w) = (z, z')`.
     #[inline(always)]
     fn slope(&self, j: usize, w: f64, z: f64) -> f64 {
@@ -91,9 +91,9 @@ fn right_and_middle<A: Arithmetic>(arithmetic: A, f: &[f64], first: usize) -> [E
 
 /// What eight steps need at one place, from the values there, in the order of [`Sweep::lists`].
 #[inline(always)]
-fn coefficients<A: Arithmetic>(values: [Eight<A>; LISTS]) -> Coefficients {
+fn coefficients<A: Arithmetic>(values: [Eight<A>; LISTS]) -> StageCoefficients {
     let [m, m1, m2, c, c1, k, y, observed] = values;
-    Coefficients {
+    StageCoefficients {
         mass: m.row(),
         damping: (c - (m1 + m1)).row(),
         stiffness: (m2 - c1 + k).row(),

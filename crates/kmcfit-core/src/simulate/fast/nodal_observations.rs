@@ -31,7 +31,7 @@ impl Accelerations {
 #[derive(Clone, Copy)]
 pub(crate) struct NodalObservations<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub states: &'a Trajectory,
 }
 
@@ -64,12 +64,12 @@ impl NodalObservations<'_> {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
         let y = padded_loads::eight(arithmetic, &self.states.displacement, i);
         let v = padded_loads::eight(arithmetic, &self.states.velocity, i);
-        let per_mass = one / padded_loads::eight(arithmetic, &self.device.mass, i);
+        let per_mass = one / padded_loads::eight(arithmetic, &self.nodal.mass, i);
         let minus_per_mass = -per_mass;
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
         for (j, term) in terms.iter().enumerate().take(TERMS) {
-            let p = &self.device.coefficients[j];
+            let p = &self.nodal.coefficients[j];
             let p = padded_loads::eight(arithmetic, p, i);
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;

@@ -27,7 +27,7 @@ pub(crate) fn forward(
         Term::CoulombFriction { width } => Some(*width),
         _ => None,
     });
-    simd::run(Forward {
+    simd::run(PrefactoredForward {
         equation,
         method,
         kinds,
@@ -102,7 +102,7 @@ const NOTHING: StageRates = {
     }
 };
 
-struct Forward<'a> {
+struct PrefactoredForward<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
     /// The term of each kind.
@@ -112,7 +112,7 @@ struct Forward<'a> {
     trajectory: &'a mut Trajectory,
 }
 
-impl Kernel for Forward<'_> {
+impl Kernel for PrefactoredForward<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -129,7 +129,7 @@ impl Kernel for Forward<'_> {
     }
 }
 
-impl Forward<'_> {
+impl PrefactoredForward<'_> {
     #[inline(always)]
     fn sweep<A: Arithmetic, const S: usize>(
         self,
@@ -137,21 +137,21 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
-        let device = self.equation.device;
-        let is_constant = |j: usize| padded_loads::is_constant(&device.coefficients[j]);
-        let has_constant_mass = padded_loads::is_constant(&device.mass);
+        let nodal = self.equation.nodal;
+        let is_constant = |j: usize| padded_loads::is_constant(&nodal.coefficients[j]);
+        let has_constant_mass = padded_loads::is_constant(&nodal.mass);
         let mut steady = [false; MOST_TERMS];
         for (steady, kind) in steady.iter_mut().zip(&self.kinds) {
             *steady = has_constant_mass && kind.is_some_and(is_constant);
         }
         let mut stages = [NOTHING; STAGES];
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
-        let motion = &mut *self.trajectory;
-        let steps = motion.nodes() - 1;
-        (motion.displacement[0], motion.velocity[0]) = (y, v);
+        let response = &mut *self.trajectory;
+        let steps = response.nodes() - 1;
+        (response.displacement[0], response.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            let per_mass = padded_loads::per_mass(arithmetic, &device.mass, from);
+            let per_mass = padded_loads::per_mass(arithmetic, &nodal.mass, from);
             prepare_drive(
                 arithmetic,
                 tableau,
@@ -166,7 +166,7 @@ impl Forward<'_> {
                     if from > 0 && steady {
                         continue;
                     }
-                    let values = &self.equation.device.coefficients[j];
+                    let values = &self.equation.nodal.coefficients[j];
                     prepare(
                         arithmetic,
                         tableau,
@@ -180,9 +180,9 @@ impl Forward<'_> {
                 }
             }
             let to = (from + LANES).min(steps);
-            let ends = motion.displacement[from + 1..=to]
+            let ends = response.displacement[from + 1..=to]
                 .iter_mut()
-                .zip(&mut motion.velocity[from + 1..=to]);
+                .zip(&mut response.velocity[from + 1..=to]);
             for (l, (end_y, end_v)) in ends.enumerate() {
                 let l = l & (LANES - 1);
                 step(
@@ -397,17 +397,16 @@ mod tests {
                 };
                 (0..41).map(|i| value + grows(i)).collect()
             };
-            let device = NodalCoefficients {
+            let nodal = NodalCoefficients {
                 mass: values(0, 1.2),
                 coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
             };
             let zeros = || Trajectory::zeros(41);
             let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
             Engine::Prefactored
-                .forward_into(&system, &device, initial, drive, &mut fast)
+                .forward_into(&system, &nodal, initial, drive, &mut fast)
                 .expect("a motion");
-            reference::forward_into(&system, &device, initial, drive, &mut plain)
-                .expect("a motion");
+            reference::forward_into(&system, &nodal, initial, drive, &mut plain).expect("a motion");
             let pairs = (fast.displacement.iter().zip(&plain.displacement))
                 .chain(fast.velocity.iter().zip(&plain.velocity));
             for (fast, plain) in pairs {

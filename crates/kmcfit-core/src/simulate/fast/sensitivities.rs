@@ -3,10 +3,10 @@
 //! Each equals [`tangent`](crate::simulate::reference::tangent()) to 40 machine precisions of the largest value for each
 //! step.
 //! The linearised steps, which the directions share, are computed once, in eight steps at a time. The
-//! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
+//! response is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
 //! are ever in memory as a whole.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -18,7 +18,7 @@ pub(crate) const TILE: usize = 64;
 /// Nodes of a tile: its last node is the first of the next.
 pub(crate) const TILE_NODES: usize = TILE + 1;
 
-/// A function of the device that changes along directions of a group.
+/// A function of the system that changes along directions of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     /// Group of directions.
@@ -75,9 +75,9 @@ pub(crate) struct Tangents {
 #[derive(Clone, Copy)]
 pub(crate) struct BaseTrajectory<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
-    pub motion: &'a Trajectory,
+    pub response: &'a Trajectory,
 }
 
 impl Tangents {
@@ -160,14 +160,14 @@ impl Tangents {
     pub fn advance(&mut self, course: BaseTrajectory, steps: Range<usize>) {
         let BaseTrajectory {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
+            response,
         } = course;
         simd::run(Advance {
-            equation: EquationOfMotion::new(system, device, excitation, motion.nodes()),
+            equation: EquationOfMotion::new(system, nodal, excitation, response.nodes()),
             method: system.method,
-            motion,
+            response,
             steps,
             tangents: self,
         });
@@ -177,7 +177,7 @@ impl Tangents {
 struct Advance<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
-    motion: &'a Trajectory,
+    response: &'a Trajectory,
     steps: Range<usize>,
     tangents: &'a mut Tangents,
 }
@@ -195,7 +195,7 @@ impl Kernel for Advance<'_> {
                 .any(|slot| tangents.moves[slot]);
         }
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         for (slot, steady) in tangents.slots.iter().zip(&tangents.steady) {
             match steady {
                 Some(_) => wanted.sum[slot.function] = true,
@@ -208,7 +208,7 @@ impl Kernel for Advance<'_> {
                 arithmetic,
                 self.method,
                 &self.equation,
-                self.motion,
+                self.response,
                 first + from,
                 &wanted,
                 &mut tangents.maps,

@@ -1,7 +1,7 @@
-//! The discrete adjoint with its steps linearised eight at a time: the motion is known, so only two
+//! The discrete adjoint with its steps linearised eight at a time: the response is known, so only two
 //! products of a step wait for the step after it.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::simulate::{CoefficientGradient, Trajectory};
@@ -16,13 +16,13 @@ pub(crate) fn gradient(
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
-    let gradient = CoefficientGradient::AtNodes(&mut device);
+    let mut nodal = NodalCoefficients::zeros(equation.nodal.mass.len(), equation.terms.len());
+    let gradient = CoefficientGradient::AtNodes(&mut nodal);
     let initial = back(equation, method, trajectory, source, gradient);
-    SystemTangent { device, initial }
+    SystemTangent { nodal, initial }
 }
 
-/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
+/// Goes back through a response: the gradient with respect to the initial state. That with respect to the functions is
 /// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
 pub(crate) fn back(
     equation: EquationOfMotion,
@@ -57,7 +57,7 @@ impl Kernel for Back<'_> {
         let mut gradient = self.gradient;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         let asked = match &gradient {
             CoefficientGradient::AtNodes(_) => &mut wanted.ends,
             CoefficientGradient::Summed(_) => &mut wanted.sum,
@@ -95,10 +95,10 @@ impl Kernel for Back<'_> {
             ];
             for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
                 match &mut gradient {
-                    CoefficientGradient::AtNodes(device) => {
+                    CoefficientGradient::AtNodes(nodal) => {
                         let left = share(arithmetic, &maps.left[f], ends);
                         let right = share(arithmetic, &maps.right[f], ends);
-                        let values = &mut device.function_mut(f)[from..];
+                        let values = &mut nodal.function_mut(f)[from..];
                         set(arithmetic, left, right, to - from, values);
                     }
                     CoefficientGradient::Summed(_) => {

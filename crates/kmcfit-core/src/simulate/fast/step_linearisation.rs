@@ -6,7 +6,7 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{
-    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, StageSamples, Tableau, Term,
+    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, RK4, StagePosition, StageSamples, Tableau, Term,
 };
 
 /// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
@@ -34,14 +34,14 @@ impl StepLinearisation {
 
 /// Requested derivatives, mass first.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Wanted {
+pub(super) struct RequestedDerivatives {
     /// With respect to the values at both nodes.
     pub ends: [bool; FUNCTIONS],
     /// With respect to one value for both.
     pub sum: [bool; FUNCTIONS],
 }
 
-/// A function at the three [`Position`]s of eight steps.
+/// A function at the three [`StagePosition`]s of eight steps.
 #[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
 
@@ -57,7 +57,7 @@ impl<A: Arithmetic> Places<A> {
     }
 
     #[inline(always)]
-    fn at(&self, position: Position) -> Eight<A> {
+    fn at(&self, position: StagePosition) -> Eight<A> {
         self.0[position as usize]
     }
 }
@@ -72,22 +72,22 @@ pub(super) fn linearise<A: Arithmetic>(
     arithmetic: A,
     method: Method,
     equation: &EquationOfMotion,
-    motion: &Trajectory,
+    response: &Trajectory,
     i: usize,
-    wanted: &Wanted,
+    wanted: &RequestedDerivatives,
     maps: &mut StepLinearisation,
 ) {
     let terms = equation.terms;
     with_known!(terms, terms, TERMS => match method {
         Method::Midpoint => {
             let stages = StageDerivatives::<A, 2, TERMS>::new(
-                arithmetic, &MIDPOINT, terms, equation, motion, i,
+                arithmetic, &MIDPOINT, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &MIDPOINT, terms.len(), equation.dt, wanted, maps);
         }
         Method::Rk4 => {
             let stages = StageDerivatives::<A, 4, TERMS>::new(
-                arithmetic, &RK4, terms, equation, motion, i,
+                arithmetic, &RK4, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &RK4, terms.len(), equation.dt, wanted, maps);
         }
@@ -113,21 +113,21 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: &[Term],
         equation: &EquationOfMotion,
-        motion: &Trajectory,
+        response: &Trajectory,
         i: usize,
     ) -> Self {
         let zero = Eight::splat(arithmetic, 0.0);
-        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.device.mass, i));
+        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.nodal.mass, i));
         let input = equation.excitation;
         let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
         let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);
         let mut functions = [Places([zero; 3]); TERMS];
-        let coefficients = equation.device.coefficients.iter().take(terms.len());
+        let coefficients = equation.nodal.coefficients.iter().take(terms.len());
         for (places, values) in functions.iter_mut().zip(coefficients) {
             *places = Places::of(arithmetic, values, i);
         }
-        let y0 = padded_loads::eight(arithmetic, &motion.displacement, i);
-        let v0 = padded_loads::eight(arithmetic, &motion.velocity, i);
+        let y0 = padded_loads::eight(arithmetic, &response.displacement, i);
+        let v0 = padded_loads::eight(arithmetic, &response.velocity, i);
         let [mut v, mut a] = [[zero; S]; 2];
         let mut stages = Self {
             by_y: [zero; S],
@@ -174,7 +174,7 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: usize,
         dt: f64,
-        wanted: &Wanted,
+        wanted: &RequestedDerivatives,
         maps: &mut StepLinearisation,
     ) {
         let zero = Eight::splat(arithmetic, 0.0);
@@ -240,9 +240,9 @@ fn at_ends<A: Arithmetic, const S: usize>(
     let [mut left, mut middle, mut right] = [Eight::splat(arithmetic, 0.0); 3];
     for (s, stage) in stages.into_iter().enumerate() {
         match tableau.position[s] {
-            Position::Left => left += stage,
-            Position::Middle => middle += stage,
-            Position::Right => right += stage,
+            StagePosition::Left => left += stage,
+            StagePosition::Middle => middle += stage,
+            StagePosition::Right => right += stage,
         }
     }
     middle = middle * Eight::splat(arithmetic, 0.5);

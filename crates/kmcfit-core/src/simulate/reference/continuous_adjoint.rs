@@ -24,15 +24,15 @@ use std::borrow::Cow;
 /// `dJ/dy(0) = C z - (m z)'` at the beginning.
 ///
 /// # Panics
-/// If the response, the measurements or a function of the device end before the grid does.
+/// If the response, the measurements or a function of the system end before the grid does.
 pub fn continuous_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
 ) -> SystemTangent {
-    let equation = AdjointEquation::new(system, device, trajectory, observed);
+    let equation = AdjointEquation::new(system, nodal, trajectory, observed);
     let adjoint = equation.solve();
     equation.gradients(system, excitation, trajectory, &adjoint)
 }
@@ -54,13 +54,13 @@ pub(crate) struct Adjoint {
 impl<'a> AdjointEquation<'a> {
     pub fn new(
         system: &System,
-        device: &'a NodalCoefficients,
+        nodal: &'a NodalCoefficients,
         trajectory: &'a Trajectory,
         observed: &'a [f64],
     ) -> Self {
         let dt = system.grid.step();
-        let [c, k] = linearised_coefficients(system, device, trajectory);
-        let m = device.mass.as_slice();
+        let [c, k] = linearised_coefficients(system, nodal, trajectory);
+        let m = nodal.mass.as_slice();
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
         let y = trajectory.displacement.as_slice();
         let functions = [
@@ -134,7 +134,7 @@ impl<'a> AdjointEquation<'a> {
         let [m, m1, _, c, ..] = self.functions.each_ref().map(|f| f[0]);
         let momentum_slope = m1 * z[0] + m * adjoint.first_slope;
         SystemTangent {
-            device: NodalCoefficients {
+            nodal: NodalCoefficients {
                 mass: gradient(&acceleration),
                 coefficients: system.terms.iter().map(by_term).collect(),
             },
@@ -155,15 +155,15 @@ fn acceleration(functions: [f64; 8], z: f64, w: f64) -> f64 {
 /// `(C, K)` at the nodes: damping and stiffness of small disturbances of the response.
 fn linearised_coefficients<'a>(
     system: &System,
-    device: &'a NodalCoefficients,
+    nodal: &'a NodalCoefficients,
     trajectory: &Trajectory,
 ) -> [Cow<'a, [f64]>; 2] {
     if system.terms == [Term::Damping, Term::Stiffness] {
-        return [0, 1].map(|j| Cow::Borrowed(device.coefficients[j].as_slice()));
+        return [0, 1].map(|j| Cow::Borrowed(nodal.coefficients[j].as_slice()));
     }
     let nodes = trajectory.nodes();
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
-    for (term, p) in system.terms.iter().zip(&device.coefficients) {
+    for (term, p) in system.terms.iter().zip(&nodal.coefficients) {
         for i in 0..nodes {
             let (phi_y, phi_v) = term.partials(trajectory.displacement[i], trajectory.velocity[i]);
             c[i] += p[i] * phi_v;

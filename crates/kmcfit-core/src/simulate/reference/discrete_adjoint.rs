@@ -10,7 +10,7 @@ use crate::system::{
 /// to the initial state, in the Euclidean inner product of the nodal values.
 ///
 /// `source` holds the derivative of the cost with respect to displacement and velocity at every
-/// node; `trajectory` must be the response of `device` under `excitation`. The result is the transpose of
+/// node; `trajectory` must be the response of `system` under `excitation`. The result is the transpose of
 /// [`tangent`](super::tangent()) applied to `source`, to machine precision.
 ///
 /// Per stage, backwards, with `k̄` the multiplier of the stage's increment:
@@ -18,12 +18,12 @@ use crate::system::{
 /// functions. The stages are computed again from the nodes, so memory is two numbers a node.
 pub fn discrete_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
     match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, source),
         Method::Rk4 => sweep(&RK4, equation, trajectory, source),
@@ -37,7 +37,7 @@ fn sweep<const S: usize>(
     source: &Trajectory,
 ) -> SystemTangent {
     let nodes = trajectory.displacement.len();
-    let mut gradient = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
+    let mut gradient = NodalCoefficients::zeros(equation.nodal.mass.len(), equation.terms.len());
     let mut adjoint = State {
         displacement: source.displacement[nodes - 1],
         velocity: source.velocity[nodes - 1],
@@ -50,7 +50,7 @@ fn sweep<const S: usize>(
         adjoint.velocity += source.velocity[i];
     }
     SystemTangent {
-        device: gradient,
+        nodal: gradient,
         initial: adjoint,
     }
 }

@@ -9,7 +9,7 @@ use super::equation::EquationOfMotion;
 use crate::record::ChannelKind;
 use crate::simulate::Trajectory;
 use crate::system::{
-    Excitation, FUNCTIONS, InputSample, NodalCoefficients, Position, StageSamples, System,
+    Excitation, FUNCTIONS, InputSample, NodalCoefficients, StagePosition, StageSamples, System,
     TimePoint,
 };
 
@@ -53,7 +53,7 @@ impl Observation {
     }
 }
 
-/// The observation of `kind` at `place` of the response `states` of `device`.
+/// The observation of `kind` at `place` of the response `states` of `system`.
 ///
 /// `around` is the force and the base's acceleration at that very time; `excitation` is that of
 /// the whole response. An acceleration is that of `y`, relative to the base.
@@ -63,7 +63,7 @@ impl Observation {
 pub fn observe(
     system: &System,
     kind: ChannelKind,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
     place: TimePoint,
@@ -71,7 +71,7 @@ pub fn observe(
 ) -> Observation {
     let equation = EquationOfMotion {
         terms: &system.terms,
-        device,
+        nodal,
         excitation,
         dt: system.grid.step(),
     };
@@ -121,7 +121,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
         1.0 => Observation::state(3, v[i + 1]),
         x => {
             let at_end = |right: usize| {
-                let position = [Position::Left, Position::Right][right];
+                let position = [StagePosition::Left, StagePosition::Right][right];
                 let part = |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.at(i, position));
                 let around = equation
                     .excitation
@@ -160,14 +160,14 @@ fn acceleration(
         1.0 => f[i + 1],
         x => f[i] * (1.0 - x) + f[i + 1] * x,
     };
-    let mass = blend(&equation.device.mass);
+    let mass = blend(&equation.nodal.mass);
     let mut inertia = around.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
     for (j, (term, p)) in equation
         .terms
         .iter()
-        .zip(&equation.device.coefficients)
+        .zip(&equation.nodal.coefficients)
         .enumerate()
         .rev()
     {

@@ -7,16 +7,16 @@ use crate::system::{
 };
 
 /// Directional derivative of [`forward`](super::forward()) at `trajectory` (which must be the response of
-/// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
+/// `system` under `excitation`) along `direction`: the change of displacement and velocity per unit
 /// step, exact for the discrete response.
 pub fn tangent(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     direction: &SystemTangent,
 ) -> Trajectory {
-    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
     match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, direction),
         Method::Rk4 => sweep(&RK4, equation, trajectory, direction),
@@ -36,7 +36,7 @@ fn sweep<const S: usize>(
     for i in 0..nodes - 1 {
         let (y, v) = (trajectory.displacement[i], trajectory.velocity[i]);
         let base = equation.stages(tableau, i, y, v);
-        let change = stage_changes(tableau, equation, &direction.device, i, &base, dy, dv);
+        let change = stage_changes(tableau, equation, &direction.nodal, i, &base, dy, dv);
         (dy, dv) = advance(tableau, equation.dt, &change, dy, dv);
         (out.displacement[i + 1], out.velocity[i + 1]) = (dy, dv);
     }

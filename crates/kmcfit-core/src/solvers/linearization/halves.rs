@@ -1,4 +1,4 @@
-//! The linearised readings of a long record in two halves, each reduced by itself and at the same time where a processor is
+//! The linearised samples of a long record in two halves, each reduced by itself and at the same time where a processor is
 //! to spare.
 //!
 //! The gradient of the misfit is the product of Jacobian and residuals, so that it needs no adjoint solve.
@@ -17,7 +17,7 @@ pub(in crate::solvers) fn halfway(problem: &Problem) -> Option<usize> {
     problem.middle().filter(|_| is_narrow)
 }
 
-/// The readings from both halves of a record cut at the step `halfway`, and the result of `beside`, which is computed after
+/// The samples from both halves of a record cut at the step `halfway`, and the result of `beside`, which is computed after
 /// the first half.
 pub(in crate::solvers) fn in_halves<T>(
     problem: &Problem,
@@ -32,7 +32,7 @@ pub(in crate::solvers) fn in_halves<T>(
     (first.join(&second), more)
 }
 
-/// The readings of one half of a record, linearised and reduced.
+/// The samples of one half of a record, linearised and reduced.
 pub(super) struct Half {
     triangle: Triangle,
     /// The parameter of each column.

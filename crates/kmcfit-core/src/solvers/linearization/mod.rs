@@ -34,7 +34,7 @@ pub(crate) enum Linearization {
     Reused {
         /// Where the Jacobian was computed.
         at: Vec<f64>,
-        /// The readings with that Jacobian, and residuals and gradient of the iterate.
+        /// The samples with that Jacobian, and residuals and gradient of the iterate.
         reduced: Reduced,
     },
 }
@@ -72,7 +72,7 @@ impl Linearization {
         Some(Self::Reused { at, reduced })
     }
 
-    /// The linearised readings, if they are computed.
+    /// The linearised samples, if they are computed.
     pub fn reduced(&self) -> Option<&Reduced> {
         match self {
             Self::Fresh => None,
@@ -97,7 +97,7 @@ pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
     }
 }
 
-/// The readings linearised and reduced at an evaluated point, a long record in halves.
+/// The samples linearised and reduced at an evaluated point, a long record in halves.
 fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Reduced {
     match halfway(problem) {
         Some(halfway) => timed(&mut timings.tangent, || {
@@ -107,16 +107,16 @@ fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> 
     }
 }
 
-/// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
+/// The linearised samples alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
 /// variables are the change of the parameters; with many of them the changes of the states follow,
 /// tied to them by equalities.
-pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    readings(problem, evaluation, None, &mut Timings::default())
+pub(crate) fn linear_predictions(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    samples(problem, evaluation, None, &mut Timings::default())
 }
 
 /// [`linear_readings`], from the `known` ones if they are computed already, and the time that tangents and linear algebra
 /// took.
-fn readings(
+fn samples(
     problem: &Problem,
     evaluation: &Evaluation,
     known: Option<&Reduced>,
@@ -141,8 +141,8 @@ fn readings(
     })
 }
 
-/// The subproblem at an evaluated point without the proximal term: readings, penalties and constraints; and the number of
-/// residual rows that belong to the readings, which come first.
+/// The subproblem at an evaluated point without the proximal term: samples, penalties and constraints; and the number of
+/// residual rows that belong to the samples, which come first.
 pub(super) fn linearise(
     problem: &Problem,
     parameters: &[f64],
@@ -150,12 +150,12 @@ pub(super) fn linearise(
     linearization: &Linearization,
     timings: &mut Timings,
 ) -> (Subproblem, usize) {
-    let mut sub = readings(problem, evaluation, linearization.reduced(), timings);
-    let readings = sub.residuals.len();
+    let mut sub = samples(problem, evaluation, linearization.reduced(), timings);
+    let samples = sub.residuals.len();
     timed(&mut timings.linear_algebra, || {
         add_the_rest(problem, parameters, evaluation, &mut sub);
     });
-    (sub, readings)
+    (sub, samples)
 }
 
 /// The subproblem in parameters and states about any states, also of no response.
@@ -170,7 +170,7 @@ pub(super) fn linearise_about(
     sub
 }
 
-/// All that the cost and the constraints have beside the readings.
+/// All that the cost and the constraints have beside the samples.
 fn add_the_rest(
     problem: &Problem,
     parameters: &[f64],
@@ -185,7 +185,7 @@ fn add_the_rest(
     sub.constrain(&problem.constraints, parameters);
 }
 
-/// The cost of the readings less the weighted squares that stand for it: none for least squares.
+/// The cost of the samples less the weighted squares that stand for it: none for least squares.
 pub(super) fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let mut surplus = 0.0;
     for (channel, predicted) in problem.predicted(evaluation) {

@@ -1,4 +1,4 @@
-//! Terms of the cost beside the readings, as rows of a subproblem.
+//! Terms of the cost beside the samples, as rows of a subproblem.
 
 use crate::problem::Problem;
 use crate::qp::Subproblem;

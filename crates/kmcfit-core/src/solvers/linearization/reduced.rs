@@ -1,4 +1,4 @@
-//! The readings linearised by tangent solves and reduced to a triangle, for functions with few parameters.
+//! The samples linearised by tangent solves and reduced to a triangle, for functions with few parameters.
 
 use super::residuals::Residuals;
 use crate::host::Instant;
@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Up to so many columns the reduction of a piece of rows takes as long as a look at the clock.
 pub(super) const NARROW: usize = LANES;
 
-/// The readings, linearised and reduced to as many rows as there are parameters:
+/// The samples, linearised and reduced to as many rows as there are parameters:
 /// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
 #[derive(Clone)]
 pub(crate) struct Reduced {
@@ -27,7 +27,7 @@ impl Reduced {
     /// Whether a problem's Jacobian can be reduced piece by piece as it comes ([`Problem::each_piece`]), and
     /// is worth it.
     pub fn comes_in_pieces(problem: &Problem) -> bool {
-        problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
+        problem.comes_in_pieces() && problem.sample_count() > problem.parameters()
     }
 
     /// At an evaluated point, in one pass.
@@ -126,13 +126,13 @@ pub(super) fn of_whole_jacobian(
             let entries = row.iter().map(|a| root * a).enumerate();
             sub.residuals.push(entries.filter(|(_, a)| *a != 0.0), -r);
         }
-        // So that the readings' rows end alike.
+        // So that the samples' rows end alike.
         sub.residuals.push([], 0.0);
         sub
     })
 }
 
-/// `sqrt(w) dz/dtheta` (readings x parameters) for the predictions `z` of all channels.
+/// `sqrt(w) dz/dtheta` (samples x parameters) for the predictions `z` of all channels.
 pub fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
     let Residuals { roots, .. } = Residuals::at(problem, evaluation);
     let mut jacobian = problem.predictions_jacobian(evaluation);

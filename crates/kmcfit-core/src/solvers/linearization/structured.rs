@@ -17,7 +17,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        step_jacobians(view.system, view.device, view.excitation, view.motion)
+        step_jacobians(view.system, view.nodal, view.excitation, view.response)
     });
     each.collect()
 }
@@ -25,9 +25,9 @@ pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian
 /// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
 /// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
 ///
-/// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
+/// Residuals: `sqrt(w) (r + delta z)` for the samples. Equalities: every step, linearised,
 /// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
-/// vanish where the states are a motion. `steps` are those of [`steps`].
+/// vanish where the states are a response. `steps` are those of [`steps`].
 pub fn subproblem(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -45,14 +45,14 @@ pub fn subproblem(
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
         let view = problem.view(evaluation, e);
-        let columns = Columns {
+        let columns = UnknownColumns {
             problem,
             experiment,
             base,
         };
-        columns.add_steps(steps, view.motion, &mut sub.equalities);
+        columns.add_steps(steps, view.response, &mut sub.equalities);
         for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
-            columns.add_readings(channel, predicted, view, &mut sub);
+            columns.add_samples(channel, predicted, view, &mut sub);
         }
         base += 2 * (experiment.nodes - 1);
     }
@@ -60,18 +60,18 @@ pub fn subproblem(
 }
 
 /// Where the unknowns of one experiment stand.
-struct Columns<'a> {
+struct UnknownColumns<'a> {
     problem: &'a Problem,
     experiment: &'a Experiment,
     base: usize,
 }
 
-impl Columns<'_> {
+impl UnknownColumns<'_> {
     /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
     /// first state that is known.
     fn state(&self, i: usize, q: usize) -> Option<usize> {
         match i {
-            0 => Some(self.scalar(self.experiment.sought[q]?)),
+            0 => Some(self.scalar(self.experiment.initial_parameters[q]?)),
             _ => Some(self.base + 2 * (i - 1) + q),
         }
     }
@@ -111,7 +111,7 @@ impl Columns<'_> {
     ) {
         let functions = &self.problem.functions;
         for (place, &f) in functions
-            .assembly(self.experiment.device)
+            .coefficient_set(self.experiment.coefficient_set)
             .iter()
             .enumerate()
         {
@@ -126,7 +126,7 @@ impl Columns<'_> {
         }
     }
 
-    fn add_readings(
+    fn add_samples(
         &self,
         channel: &Channel,
         predicted: &[f64],

@@ -6,10 +6,10 @@ use crate::functions::{
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
-use crate::solvers::counts::Counts;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::{Fit, fit, fit_from};
 use crate::system::{Excitation, Grid, Method, State, System, Term};
 use crate::threads;
@@ -20,7 +20,7 @@ fn fitted(problem: &Problem) -> Fit {
 }
 
 /// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
-/// every one and velocities between them; its velocity at the start is sought as well. The stiffness has so many knots,
+/// every one and velocities between them; its velocity at the start is estimated as well. The stiffness has so many knots,
 /// or is a constant.
 fn long_problem(knots: Option<u32>) -> Problem {
     let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
@@ -57,13 +57,13 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let channel = |kind, times: Vec<f64>| {
         let values = times.iter().map(read).collect();
         let weighting = Weighting::Sigma(0.1);
-        Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+        Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
     };
     let sevenths = times.iter().step_by(7).copied().collect();
     let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
     let between = between.filter(|t| *t < grid.duration()).collect();
     let record = Experiment {
-        sought: [None, Some(0)],
+        initial_parameters: [None, Some(0)],
         ..Experiment::free("driven", State::default(), nodes)
             .with_excitation(Excitation::force_at_nodes(&force))
             .with_channel(channel(ChannelKind::Displacement, sevenths))
@@ -107,14 +107,14 @@ fn halves_of_a_long_record() {
 }
 
 /// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
-/// adjoint, and the linearised readings ask for no further step.
+/// adjoint, and the linearised samples ask for no further step.
 #[test]
 fn after_short_steps_the_jacobian_stays() {
     let mut problem = long_problem(None);
     let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
-    let motion = problem.evaluate(&truth).expect("a motion");
+    let response = problem.evaluate(&truth).expect("a motion");
     let channels = problem.parts_mut().experiments[0].channels.iter_mut();
-    for (channel, predicted) in channels.zip(&motion.predictions[0]) {
+    for (channel, predicted) in channels.zip(&response.predictions[0]) {
         let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
         *channel = channel.clone().with_simulated(predicted, &noise);
     }
@@ -122,7 +122,7 @@ fn after_short_steps_the_jacobian_stays() {
     let fit = fit_from(&problem, &problem.start(), &settings).expect("a motion");
     let points = fit.history.len() as u64 + 1;
     let parameters = problem.parameters() as u64;
-    let Counts {
+    let SolveCounts {
         adjoint, tangent, ..
     } = fit.counts;
     assert!(0 < adjoint && adjoint < points);
@@ -172,7 +172,7 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
         let Step::Moved { point, .. } = method.step(&mut work, &point) else {
             panic!("no step");
         };
-        (point.parameters, Counts::of(&counted))
+        (point.parameters, SolveCounts::of(&counted))
     };
     let (expected, before) = stepped(None);
     let elsewhere = [2.0, 1.0, 3.0, 1.0].iter().zip(&start);
@@ -198,10 +198,10 @@ fn a_long_record_on_two_threads() {
 fn a_long_record_by_the_continuous_gradient() {
     let mut problem = long_problem(None);
     let grid = problem.system.grid;
-    let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
+    let samples = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     problem.parts_mut().experiments[0].channels = vec![channel];
     assert!(problem.supports_continuous() && halfway(&problem).is_some());
     let mut settings = FitSettings {

@@ -10,7 +10,7 @@
 //! argmin runs the loop and counts the solves; its own L-BFGS is not used, as it has no guard
 //! against lost curvature, no step limit, and asks for cost and gradient separately.
 
-use super::line_search::{Line, weak_wolfe};
+use super::line_search::{LineFunction, weak_wolfe};
 use super::{Step, StepRule, difference};
 use crate::functions::{CoefficientKind, Parameterization};
 use crate::objective::Evaluation;
@@ -391,7 +391,7 @@ struct Accepted {
     gradient: Vector,
 }
 
-impl Line for Trials<'_, '_, '_, '_> {
+impl LineFunction for Trials<'_, '_, '_, '_> {
     fn cost(&mut self, length: f64) -> Option<f64> {
         let mut x = self.x.clone();
         add_scaled(&mut x, length, self.direction);

@@ -10,21 +10,26 @@ const TRIALS: u32 = 30;
 const GROWTH: f64 = 4.0;
 
 /// What a line search sees of a trial point.
-pub(super) trait Line {
-    /// Cost at step `a`; `None` if there is no motion at this point.
+pub(super) trait LineFunction {
+    /// Cost at step `a`; `None` if there is no response at this point.
     fn cost(&mut self, a: f64) -> Option<f64>;
-    /// Slope at the step last asked for by [`Line::cost`].
+    /// Slope at the step last asked for by [`LineFunction::cost`].
     fn slope(&mut self) -> f64;
 }
 
 /// Finds a step that satisfies the weak Wolfe conditions, from the first trial `a`; `cost` and
-/// `slope < 0` belong to step 0. Where no motion exists the step is too long. Returns the last step
+/// `slope < 0` belong to step 0. Where no response exists the step is too long. Returns the last step
 /// that lowered the cost enough, which is the last one whose slope was asked for; `None` if there
 /// was none.
 ///
 /// The slope is only asked for where the cost is low enough, so a rejected trial costs one
 /// forward solve and no adjoint.
-pub(super) fn weak_wolfe(line: &mut dyn Line, cost: f64, slope: f64, first: f64) -> Option<f64> {
+pub(super) fn weak_wolfe(
+    line: &mut dyn LineFunction,
+    cost: f64,
+    slope: f64,
+    first: f64,
+) -> Option<f64> {
     let (mut low, mut high) = (0.0, f64::INFINITY);
     let mut low_slope = slope;
     let mut a = first;

@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn states_of_another_length_are_refused() {
         let times: Vec<f64> = (0..21).map(|i| 0.1 * f64::from(i)).collect();
-        let motion: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let response: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let system = [
             CoefficientSpec::constant(2.0),
             CoefficientSpec::constant(0.1),
@@ -113,7 +113,7 @@ mod tests {
         ];
         let record = Record::new("r")
             .from_state(1.0, 0.0)
-            .displacement(&times, &motion);
+            .displacement(&times, &response);
         let problem = Builder::new(system)
             .record(record)
             .build()

@@ -2,9 +2,9 @@
 
 use crate::problem::Problem;
 use crate::solvers::checkpoint::Observer;
-use crate::solvers::counts::Counts;
 use crate::solvers::executor::search;
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 
 /// Parts of the record that are fitted in turn, before all of it.
@@ -18,8 +18,8 @@ pub(in crate::solvers) fn growing_horizon_start(
     from: Vec<f64>,
     settings: &FitSettings,
     watch: &mut Observer,
-) -> (Vec<f64>, Counts, Timings) {
-    let (mut counts, mut timings) = (Counts::default(), Timings::default());
+) -> (Vec<f64>, SolveCounts, Timings) {
+    let (mut counts, mut timings) = (SolveCounts::default(), Timings::default());
     let mut parameters = from;
     let mut short = settings.clone();
     short.stopping.iterations = HORIZON_ITERATIONS;

@@ -10,19 +10,19 @@ use crate::host::Instant;
 use crate::problem::Problem;
 use crate::record::{Experiment, Input, LONG_RECORD_STEPS};
 use crate::solvers::checkpoint::Observer;
-use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
 use std::time::Duration;
 
-/// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
+/// Steps of the beginning, the more if there are too few samples in the fewer: powers of two, so that its grid has
 /// the same step to the last bit.
 const STEPS: [usize; 2] = [1 << 11, 1 << 12];
-/// How many readings there must be for each parameter.
+/// How many samples there must be for each parameter.
 const READINGS: usize = 20;
 /// Most iterations on the beginning.
 const ITERATIONS: u64 = 20;
@@ -30,7 +30,7 @@ const ITERATIONS: u64 = 20;
 const TOLERANCE: f64 = 1e-6;
 
 /// The number of steps of a truncated start; `None` unless they are long, all functions constants, and
-/// there are readings enough in it.
+/// there are samples enough in it.
 pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
     let is_constant = |f: &CoefficientFunction| {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
@@ -42,11 +42,11 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
         && problem.comes_in_pieces()
         && problem.functions.iter().all(is_constant)
         && parameters > 0;
-    let has_readings = |steps: &usize| {
+    let has_samples = |steps: &usize| {
         let count: usize = problem.channels().map(|c| c.count_within(*steps)).sum();
         count >= READINGS * parameters
     };
-    (STEPS.into_iter().find(has_readings)).filter(|_| suits)
+    (STEPS.into_iter().find(has_samples)).filter(|_| suits)
 }
 
 /// The first steps of a problem's records, with the same parameters.
@@ -55,15 +55,20 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let grid = Grid::new(grid.start(), grid.step() * steps as f64, steps + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
-    let devices = functions.assemblies().to_vec();
+    let coefficient_sets = functions.coefficient_sets().to_vec();
     let system = System {
         grid,
         ..problem.system.clone()
     };
     let mut part = Problem::new(
         system,
-        Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
-            .with_scalars(functions.scalars().to_vec()),
+        Parameterization::with_coefficient_sets(
+            list?,
+            coefficient_sets,
+            grid.nodes(),
+            grid.step(),
+        )?
+        .with_scalars(functions.scalars().to_vec()),
         problem
             .experiments
             .iter()
@@ -107,11 +112,11 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     Experiment {
         name: experiment.name.clone(),
         initial: experiment.initial,
-        sought: experiment.sought,
+        initial_parameters: experiment.initial_parameters,
         excitation,
         drive: Input::default(),
         nodes: experiment.nodes.min(steps + 1),
-        device: experiment.device,
+        coefficient_set: experiment.coefficient_set,
         channels: channels.filter_map(|c| c.within(steps)).collect(),
     }
 }
@@ -124,7 +129,7 @@ pub(in crate::solvers) struct TruncatedStart {
     /// Cost and gradient at the start values.
     pub referred: Referred,
     /// Work of the fit of the first steps.
-    pub counts: Counts,
+    pub counts: SolveCounts,
     /// What that work took.
     pub timings: Timings,
     /// Wall-clock time, also of what was done before an interrupt.
@@ -132,7 +137,7 @@ pub(in crate::solvers) struct TruncatedStart {
 }
 
 /// A fit of the first steps and the evaluation of the whole problem where it ended.
-struct Part {
+struct PartialFit {
     fit: Fit,
     better: Option<Prepared>,
     evaluating: Duration,
@@ -156,7 +161,7 @@ pub(in crate::solvers) fn truncated_start(
         return TruncatedStart {
             start: None,
             referred,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             elapsed: Duration::ZERO,
         };
@@ -185,7 +190,7 @@ fn fit_part(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Option<Part> {
+) -> Option<PartialFit> {
     let mut short = settings.clone();
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
     short.stopping.tolerance = Some(TOLERANCE);
@@ -200,7 +205,7 @@ fn fit_part(
         parameters,
         spare: None,
     });
-    Some(Part {
+    Some(PartialFit {
         fit,
         better,
         evaluating: clock.elapsed(),

@@ -20,19 +20,19 @@ use std::f64::consts::PI;
 const CORNER: f64 = 0.5;
 /// Rounds in which the dominant frequency is found.
 const ROUNDS: usize = 3;
-/// Fewest readings.
+/// Fewest samples.
 const FEWEST: usize = 8;
 
-/// The band of a motion.
+/// The band of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct PassBand {
     /// Dominant frequency: root-mean-square velocity over root-mean-square displacement, rad/s.
     pub frequency: f64,
-    /// Spacing of the readings, s.
+    /// Spacing of the samples, s.
     spacing: f64,
 }
 
-/// A series and its integrals through the band's filter, at all readings but the first and the last.
+/// A series and its integrals through the band's filter, at all samples but the first and the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBand {
     /// Integrated twice.
@@ -43,8 +43,8 @@ pub struct InBand {
     pub a: Vec<f64>,
 }
 
-impl Band {
-    /// The band of a motion with these accelerations, `spacing` seconds apart; `None` if they are too
+impl PassBand {
+    /// The band of a response with these accelerations, `spacing` seconds apart; `None` if they are too
     /// few or show no oscillation.
     ///
     /// The search begins with the zero crossings of the acceleration itself.
@@ -60,8 +60,8 @@ impl Band {
         let mut frequency = PI * crossings as f64 / (n as f64 * spacing);
         for _ in 0..ROUNDS {
             let band = Self { frequency, spacing }.oscillating()?;
-            let motion = band.motions(&[accelerations])?.pop()?;
-            frequency = rms(&motion.v) / rms(&motion.y);
+            let response = band.responses(&[accelerations])?.pop()?;
+            frequency = rms(&response.v) / rms(&response.y);
         }
         Self { frequency, spacing }.oscillating()
     }
@@ -77,7 +77,7 @@ impl Band {
 
     /// Each series, without its mean, through the filter, and its integrals; `None` if they cannot
     /// be computed.
-    pub fn motions(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
+    pub fn responses(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
         let n = series.first()?.len();
         let h = self.spacing;
         let mut sub = Subproblem::new(n);
@@ -147,24 +147,24 @@ mod tests {
     fn a_sine_passes_by_the_response_of_the_filter() {
         let (w, h) = (2.0 * PI * 3.0, 0.01);
         let acceleration: Vec<f64> = (0..4000).map(|i| (w * h * f64::from(i)).sin()).collect();
-        let band = Band::of(&acceleration, h).expect("it oscillates");
+        let band = PassBand::of(&acceleration, h).expect("it oscillates");
         // The ends, of which the filter knows one side alone, leave 2e-3.
         assert!(
             (band.frequency / w - 1.0).abs() < 5e-3,
             "{}",
             band.frequency
         );
-        let motion = band.motions(&[&acceleration]).unwrap().pop().unwrap();
+        let response = band.responses(&[&acceleration]).unwrap().pop().unwrap();
         // Of the filter with differences for derivatives, which all three have passed.
         let square = (2.0 / h * (0.5 * w * h).sin()).powi(2);
-        let response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
+        let filter_response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
         for i in 1900..2100 {
             let t = h * (i + 1) as f64;
             let (sine, cosine) = (w * t).sin_cos();
             for (found, expected) in [
-                (motion.a[i], response * sine),
-                (motion.v[i] * w, -response * cosine),
-                (motion.y[i] * w * w, -response * sine),
+                (response.a[i], filter_response * sine),
+                (response.v[i] * w, -filter_response * cosine),
+                (response.y[i] * w * w, -filter_response * sine),
             ] {
                 // (w h)^4/240 = 5e-6.
                 assert!((found - expected).abs() < 2e-5, "{i}: {found} {expected}");
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn what_does_not_oscillate_has_no_band() {
-        assert_eq!(Band::of(&[1.0; 50], 0.1), None);
-        assert_eq!(Band::of(&[1.0, -1.0, 1.0], 0.1), None);
+        assert_eq!(PassBand::of(&[1.0; 50], 0.1), None);
+        assert_eq!(PassBand::of(&[1.0, -1.0, 1.0], 0.1), None);
     }
 }

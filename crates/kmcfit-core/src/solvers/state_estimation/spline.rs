@@ -1,8 +1,8 @@
 //! From channels of any kind at any times: one curve through all of them.
 //!
 //! The displacement at the nodes minimises the distance of its values and differences to the
-//! readings, plus third differences as far as the noise allows. Where no displacement was measured,
-//! the curve is held near zero below the band of the motion, `omega_0^4 |y|^2` beside `|y'' - a|^2`: so an
+//! samples, plus third differences as far as the noise allows. Where no displacement was measured,
+//! the curve is held near zero below the band of the response, `omega_0^4 |y|^2` beside `|y'' - a|^2`: so an
 //! acceleration is integrated twice with the response `omega^4 / (omega^4 + omega_0^4)` and without
 //! a phase.
 
@@ -22,16 +22,16 @@ const POINTS: usize = 6;
 /// Rounds of the search for the smoothing weight, and its decimal exponents.
 const ROUNDS: u32 = 12;
 const EXPONENTS: [f64; 2] = [-12.0, 12.0];
-/// How much more than without smoothing a smooth curve may miss the readings, where that is more than
+/// How much more than without smoothing a smooth curve may miss the samples, where that is more than
 /// their noise.
 const ALLOWED: f64 = 1.05;
-/// How far below the dominant frequency the band ends in which readings are integrated: from readings
+/// How far below the dominant frequency the band ends in which samples are integrated: from samples
 /// full of noise to exact ones. What holds the curve near zero below the band takes a share of
-/// `band^(-2 p)` off the readings, with p the order of their derivative.
+/// `band^(-2 p)` off the samples, with p the order of their derivative.
 const BAND: [f64; 2] = [6.0, 30.0];
 /// What lies lower than the dominant frequency loses a larger share: so many times as much is allowed.
 const SHARE: f64 = 2.0;
-/// Nodes further than so many median spacings from a reading lie in a gap.
+/// Nodes further than so many median spacings from a sample lie in a gap.
 const GAP: f64 = 1.5;
 /// Dominant periods at the ends of an integrated record that are left out: there the integral still
 /// feels its beginning.
@@ -44,7 +44,7 @@ struct Plain<'a> {
     noise: f64,
 }
 
-/// At all nodes that are near readings.
+/// At all nodes that are near samples.
 pub fn kinematics(
     problem: &Problem,
     experiment: &Experiment,
@@ -52,7 +52,7 @@ pub fn kinematics(
 ) -> Option<(Kinematics, Trajectory)> {
     let grid = &problem.system.grid;
     let nodes = experiment.nodes;
-    if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
+    if nodes < 2 * POINTS || experiment.sample_count() < 2 * POINTS {
         return None;
     }
     let channels: Vec<Plain> = (experiment.channels.iter())
@@ -75,7 +75,7 @@ pub fn kinematics(
         })
     };
     let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
-    let near = near_readings(&channels, nodes, grid.start(), step, settling);
+    let near = near_samples(&channels, nodes, grid.start(), step, settling);
     let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
     let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
     let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
@@ -97,14 +97,14 @@ pub fn kinematics(
         weight: weight_of(main.channel),
         nodes: chosen.clone(),
     })?;
-    let motion = Trajectory {
+    let response = Trajectory {
         displacement: y.clone(),
         velocity: v.clone(),
     };
-    Some((near, motion))
+    Some((near, response))
 }
 
-/// A typical weight of a channel's readings.
+/// A typical weight of a channel's samples.
 fn weight_of(channel: &Channel) -> f64 {
     channel.weighting().weight(channel.len() / 2, channel.len())
 }
@@ -128,7 +128,7 @@ impl<'a> Plain<'a> {
         }
     }
 
-    /// Median spacing of the readings, s.
+    /// Median spacing of the samples, s.
     fn spacing(&self) -> f64 {
         let mut spacings: Vec<f64> = (self.channel.times().windows(2))
             .map(|w| w[1] - w[0])
@@ -137,13 +137,13 @@ impl<'a> Plain<'a> {
         spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
     }
 
-    /// Of as many values at equal distances, linear between the readings.
+    /// Of as many values at equal distances, linear between the samples.
     fn spectrum(&self) -> Option<Spectrum> {
         let times = self.channel.times();
         let (first, last) = (times.first()?, times.last()?);
         let spacing = (last - first) / times.len().checked_sub(1)? as f64;
-        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
-        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        let samples = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| samples.value(first + i as f64 * spacing));
         Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
     }
 
@@ -163,7 +163,7 @@ struct Ridge {
     root: f64,
     /// Dominant frequency, Hz.
     frequency: f64,
-    /// What it takes off the readings, in units of their noise.
+    /// What it takes off the samples, in units of their noise.
     bias: f64,
 }
 
@@ -208,9 +208,9 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
             count += 1.0;
         }
     }
-    let readings = sub.residuals.len();
+    let samples = sub.residuals.len();
     if let Some(ridge) = ridge {
-        // As many readings as there are nodes would weigh as the readings do.
+        // As many samples as there are nodes would weigh as the samples do.
         let share = (count / nodes as f64).sqrt();
         for i in 0..nodes {
             sub.residuals.push([(i, ridge.root * share)], 0.0);
@@ -218,7 +218,7 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
     }
     let misfit = |candidate: &[f64]| -> f64 {
         let fitted = sub.residuals.multiply(candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(samples);
         pairs.map(|(a, b)| (a - b) * (a - b)).sum()
     };
     let [mut low, mut high] = EXPONENTS;
@@ -271,8 +271,8 @@ fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
     sub.solve_plain()
 }
 
-/// Which nodes have readings near by, of the channel with the most readings.
-fn near_readings(
+/// Which nodes have samples near by, of the channel with the most samples.
+fn near_samples(
     channels: &[Plain],
     nodes: usize,
     start: f64,

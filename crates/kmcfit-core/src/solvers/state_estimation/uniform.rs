@@ -10,10 +10,10 @@ use crate::system::State;
 const ROUNDS: u32 = 14;
 /// Decimal exponents of the smoothing weight between no smoothing and a parabola.
 const EXPONENTS: [f64; 2] = [-12.0, 16.0];
-/// Readings whose noise is below this share of their size are taken as they are.
+/// Samples whose noise is below this share of their size are taken as they are.
 const NOISELESS: f64 = 1e-6;
 
-/// At the readings but the two at each end.
+/// At the samples but the two at each end.
 pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinematics> {
     let y = smoothed(channel)?;
     let h = step * stride as f64;
@@ -34,7 +34,7 @@ pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinemat
     })
 }
 
-/// The smoothest curve (third differences) whose distance from the readings is their noise.
+/// The smoothest curve (third differences) whose distance from the samples is their noise.
 fn smoothed(channel: &Channel) -> Option<Vec<f64>> {
     let observed = channel.observed();
     if observed.len() < 8 {

@@ -11,7 +11,7 @@ pub struct Distance {
     /// Largest root mean square difference of a ratio `p/m`, relative to its natural size.
     pub ratios: f64,
     /// Root mean square difference of the displacements, relative to their own.
-    pub motions: f64,
+    pub responses: f64,
 }
 
 /// Optima that are one.
@@ -25,7 +25,7 @@ pub struct Cluster {
 
 impl Waterfall {
     /// Clusters by rising cost: a run belongs to the first cluster whose best member is no further
-    /// than `tolerance`, in ratios and motions both. Only converged runs are told apart; the others
+    /// than `tolerance`, in ratios and responses both. Only converged runs are told apart; the others
     /// have not reached an optimum.
     pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
@@ -38,7 +38,7 @@ impl Waterfall {
                 let best = self.runs[cluster.members[0]].found.as_ref();
                 best.is_some_and(|best| {
                     let apart = distance(problem, &best.evaluation, &found.evaluation);
-                    apart.ratios <= tolerance.ratios && apart.motions <= tolerance.motions
+                    apart.ratios <= tolerance.ratios && apart.responses <= tolerance.responses
                 })
             };
             match clusters.iter_mut().find(near) {
@@ -57,8 +57,8 @@ impl Waterfall {
 pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;
-    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
-        let (one, two) = (a.device_of(which), b.device_of(which));
+    for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
+        let (one, two) = (a.nodal_of(which), b.nodal_of(which));
         for (j, (p, q)) in one.coefficients.iter().zip(&two.coefficients).enumerate() {
             let size = natural[assembly[j + 1]] / natural[assembly[0]];
             let changes = (0..p.len()).map(|i| p[i] / one.mass[i] - q[i] / two.mass[i]);
@@ -80,7 +80,7 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let (change, own) = (rms(changes), rms(own));
     Distance {
         ratios,
-        motions: if change > 0.0 { change / own } else { 0.0 },
+        responses: if change > 0.0 { change / own } else { 0.0 },
     }
 }
 

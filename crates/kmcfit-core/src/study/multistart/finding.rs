@@ -11,7 +11,7 @@ const RISE: f64 = 0.05;
 
 /// A finding.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Finding {
+pub enum MultistartFinding {
     /// No starting point led to an optimum.
     Nowhere,
     /// How many starting points led to an optimum, and to how many different ones.
@@ -58,12 +58,17 @@ impl Ranges {
 
 impl Waterfall {
     /// The findings beside a fit with the parameters `theta`.
-    pub fn findings(&self, problem: &Problem, theta: &[f64], clusters: &[Cluster]) -> Vec<Finding> {
+    pub fn findings(
+        &self,
+        problem: &Problem,
+        theta: &[f64],
+        clusters: &[Cluster],
+    ) -> Vec<MultistartFinding> {
         let costs = self.costs();
         let Some(lowest) = costs.first().copied() else {
-            return vec![Finding::Nowhere];
+            return vec![MultistartFinding::Nowhere];
         };
-        let mut findings = vec![Finding::Points {
+        let mut findings = vec![MultistartFinding::Points {
             ended: self.order.len(),
             different: clusters.len().max(1),
             lowest,
@@ -73,7 +78,7 @@ impl Waterfall {
             if let (Some(a), Some(b)) = (of(first), of(second)) {
                 let paths = between(problem, &a.parameters, &b.parameters, PATH);
                 let rise = RISE * second.cost.max(first.cost);
-                findings.push(Finding::OneValley(paths.one_valley(rise)));
+                findings.push(MultistartFinding::OneValley(paths.one_valley(rise)));
             }
         }
         // Below this share of what there is to explain a difference of costs is rounding.
@@ -81,9 +86,9 @@ impl Waterfall {
         let fit = problem.evaluate(theta).map(|here| here.cost);
         findings.extend(fit.ok().and_then(|fit| {
             if lowest < fit * (1.0 - 1e-6) - rounding {
-                Some(Finding::Lower { cost: lowest, fit })
+                Some(MultistartFinding::Lower { cost: lowest, fit })
             } else {
-                (lowest > fit * 1.01 + rounding).then_some(Finding::NotReached(fit))
+                (lowest > fit * 1.01 + rounding).then_some(MultistartFinding::NotReached(fit))
             }
         }));
         findings

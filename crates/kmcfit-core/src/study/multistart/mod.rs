@@ -2,8 +2,8 @@
 //!
 //! Starts are a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, *Technometrics* 21 (1979)
 //! 239-245): each range is cut into as many parts as there are starts, and every part is used once.
-//! Optima are told apart by what free motion can show, the ratios of the functions to the mass, and by
-//! their motions, not by their costs: two different devices may fit alike, and one device may be
+//! Optima are told apart by what free response can show, the ratios of the functions to the mass, and by
+//! their responses, not by their costs: two different systems may fit alike, and one system may be
 //! reached to different accuracy.
 
 mod cluster;
@@ -11,7 +11,7 @@ mod finding;
 mod path;
 
 pub use cluster::{Cluster, Distance, distance};
-pub use finding::Finding;
+pub use finding::MultistartFinding;
 pub use path::{Paths, between};
 
 use super::parallel::map;
@@ -75,11 +75,11 @@ pub struct Multistart {
 
 /// One fit.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct StartRun {
     /// Its start, within the constraints.
     pub start: Vec<f64>,
-    /// Where it led; `None` if the start has no motion, or the constraints no point.
-    pub found: Option<Found>,
+    /// Where it led; `None` if the start has no response, or the constraints no point.
+    pub found: Option<LocalOptimum>,
     /// How it ended, or why there is nothing.
     pub status: Status,
     /// The same in words.
@@ -88,10 +88,10 @@ pub struct Run {
 
 /// The end of one fit.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct LocalOptimum {
     /// Parameters.
     pub parameters: Vec<f64>,
-    /// Cost, devices and motions.
+    /// Cost, systems and responses.
     pub evaluation: Evaluation,
     /// Iterations.
     pub iterations: usize,
@@ -101,7 +101,7 @@ pub struct Found {
 #[derive(Debug, Clone)]
 pub struct Waterfall {
     /// In the order of the starts.
-    pub runs: Vec<Run>,
+    pub runs: Vec<StartRun>,
     /// Indices of the runs that found something, by rising cost.
     pub order: Vec<usize>,
     /// The seed of the starts.
@@ -178,8 +178,8 @@ pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     }
 }
 
-fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
-    let failed = |start: &[f64], reason: String| Run {
+fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> StartRun {
+    let failed = |start: &[f64], reason: String| StartRun {
         start: start.to_vec(),
         found: None,
         status: Status::Failed,
@@ -197,9 +197,9 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
     };
     match result {
         Err(breakdown) => failed(&start, breakdown.to_string()),
-        Ok(fit) => Run {
+        Ok(fit) => StartRun {
             start,
-            found: Some(Found {
+            found: Some(LocalOptimum {
                 parameters: fit.best.parameters,
                 evaluation: fit.best.evaluation,
                 iterations: fit.history.len(),

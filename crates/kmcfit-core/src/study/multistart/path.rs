@@ -3,13 +3,13 @@
 use crate::problem::Problem;
 use crate::system::NodalCoefficients;
 
-/// The cost along two paths between two points; infinite where there is no motion.
+/// The cost along two paths between two points; infinite where there is no response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paths {
     /// Along `(1 - s) a + s b`, both ends included.
     pub straight: Vec<f64>,
     /// Along the gauge: the mass goes from one to the other geometrically, `m_a^(1-s) m_b^s`, and the
-    /// ratios to it go straight, so that between devices with the same ratios nothing but the common
+    /// ratios to it go straight, so that between systems with the same ratios nothing but the common
     /// factor changes. `None` where the functions cannot follow, as when one is fixed.
     pub gauge: Option<Vec<f64>>,
 }
@@ -55,13 +55,13 @@ fn along_gauge(
     straight: Vec<f64>,
 ) -> Option<Vec<f64>> {
     let mut theta = straight;
-    let (one, two) = (problem.functions.device(a), problem.functions.device(b));
+    let (one, two) = (problem.functions.nodal(a), problem.functions.nodal(b));
     if one.mass.iter().chain(&two.mass).any(|m| *m <= 0.0) {
         return None;
     }
     let between = mixed(&one, &two, s);
     let grid = &problem.system.grid;
-    let assembly = problem.functions.assembly(0);
+    let assembly = problem.functions.coefficient_set(0);
     for (&f, values) in assembly.iter().zip(between.functions()) {
         let basis = problem.functions.get(f).basis.as_ref()?;
         let range = problem.functions.ranges()[f].clone();

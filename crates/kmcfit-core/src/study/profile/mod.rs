@@ -4,12 +4,12 @@
 //! constraints. With `J` a chi-square, the values with
 //!
 //! ```text
-//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n readings)
+//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n samples)
 //! ```
 //!
 //! are a confidence interval, 95 % for the quantile 3.841 of chi-square with one degree of freedom.
 //! `J` is the whole cost, penalties and priors included: with penalties the interval is that of the
-//! penalised problem. A profile that never rises is a number that the readings do not see.
+//! penalised problem. A profile that never rises is a number that the samples do not see.
 //!
 //! Sources: S. S. Wilks, *Annals of Mathematical Statistics* 9 (1938) 60-62; A. Raue et al.,
 //! "Structural and practical identifiability analysis of partially observed dynamical models by
@@ -21,7 +21,7 @@ use super::functional::Linear;
 use super::parallel::map;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
-use walk::Walk;
+use walk::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
 pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
@@ -59,7 +59,7 @@ pub enum Interval {
     Identified,
     /// One end is found.
     OneSided,
-    /// None is: the readings do not see it.
+    /// None is: the samples do not see it.
     Flat,
 }
 
@@ -76,13 +76,13 @@ pub enum End {
     Far,
     /// The steps ran out.
     Steps,
-    /// No motion, or no fit, further out.
+    /// No response, or no fit, further out.
     Failed(String),
 }
 
 /// A constraint that becomes active along the profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
+pub struct ActivationPoint {
     /// The value from which on it is, outwards from the optimum.
     pub value: f64,
     /// Its name.
@@ -113,7 +113,7 @@ pub struct Profile {
     /// In one word.
     pub verdict: Interval,
     /// Where other constraints become active.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<ActivationPoint>,
     /// Parameters of a better optimum, if one was met.
     pub better_optimum: Option<Vec<f64>>,
 }
@@ -131,13 +131,13 @@ impl Profile {
             ),
             [Some(low), None] => format!("{name} is only known to be at least {}", number(low)),
             [None, Some(high)] => format!("{name} is only known to be at most {}", number(high)),
-            [None, None] => format!("{name} is not seen by the readings"),
+            [None, None] => format!("{name} is not seen by the samples"),
         };
         for (side, end) in ["below", "above"].iter().zip(&self.ends) {
             let why = match end {
                 End::Rise => continue,
                 End::RiseBy(names) => format!(
-                    "the rise {side} is the work of {}, not of the readings alone",
+                    "the rise {side} is the work of {}, not of the samples alone",
                     names.join(" and ")
                 ),
                 End::Bound => format!("{side} it runs into its bound or limit"),
@@ -160,17 +160,17 @@ impl Profile {
 /// It walks outwards from the optimum, each fit (Gauss–Newton under the constraints) from its
 /// neighbours, until the cost has risen by the quantile or a bound, a limit or the number of steps is
 /// met; the ends are then found by a secant method on the root of the rise, which is a straight line
-/// where the motion is linear in the parameters.
+/// where the response is linear in the parameters.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the optimum has no response.
 pub fn profile(
     problem: &Problem,
     optimum: &[f64],
     of: &Linear,
     how: &ProfileSettings,
 ) -> Result<Profile, SimulationError> {
-    Walk::new(problem, optimum, of, how).map(Walk::run)
+    ProfileSearch::new(problem, optimum, of, how).map(ProfileSearch::run)
 }
 
 /// The profiles of several numbers, on up to `threads` threads; the same bits for any number of them.

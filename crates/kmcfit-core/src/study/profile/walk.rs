@@ -1,6 +1,6 @@
 //! The walk along a profile.
 
-use super::{End, FAR, Interval, Mark, Profile, ProfileSettings};
+use super::{ActivationPoint, End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
@@ -55,7 +55,7 @@ fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
 
 /// One refit.
 #[derive(Clone)]
-struct Sample {
+struct ProfilePoint {
     value: f64,
     cost: f64,
     point: Iterate,
@@ -64,19 +64,19 @@ struct Sample {
 }
 
 /// A walk along one profile.
-pub struct Walk<'a> {
+pub struct ProfileSearch<'a> {
     problem: &'a Problem,
     of: &'a Linear,
     how: &'a ProfileSettings,
     sizes: Vec<f64>,
     base: f64,
-    readings: f64,
+    sample_count: f64,
     sigma: bool,
-    marks: Vec<Mark>,
-    samples: Vec<Sample>,
+    marks: Vec<ActivationPoint>,
+    points: Vec<ProfilePoint>,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> ProfileSearch<'a> {
     /// At the optimum, which is polished first.
     pub fn new(
         problem: &'a Problem,
@@ -92,10 +92,10 @@ impl<'a> Walk<'a> {
             how,
             sizes: sizes(problem, &start.parameters),
             base: cost,
-            readings: problem.reading_count() as f64,
+            sample_count: problem.sample_count() as f64,
             sigma: problem.channels().all(|c| c.weighting().is_sigma()),
             marks: Vec::new(),
-            samples: vec![Sample {
+            points: vec![ProfilePoint {
                 value: of.of(&start.parameters),
                 cost,
                 active: names(problem, &start),
@@ -106,7 +106,7 @@ impl<'a> Walk<'a> {
 
     /// To both sides.
     pub fn run(mut self) -> Profile {
-        let first = self.samples[0].clone();
+        let first = self.points[0].clone();
         let sides = [-1.0, 1.0].map(|side| self.side(side, &first));
         for side in [-1.0, 1.0] {
             self.mark(side, &first);
@@ -118,7 +118,7 @@ impl<'a> Walk<'a> {
     fn rise(&self, cost: f64) -> f64 {
         match self.sigma {
             true => cost - self.base,
-            false => self.readings * (cost / self.base.max(f64::MIN_POSITIVE)).ln(),
+            false => self.sample_count * (cost / self.base.max(f64::MIN_POSITIVE)).ln(),
         }
     }
 
@@ -128,7 +128,7 @@ impl<'a> Walk<'a> {
     }
 
     /// The best fit with the number at `value`, from `guess`.
-    fn fit(&self, problem: &Problem, value: f64, guess: &[f64]) -> Result<Sample, String> {
+    fn fit(&self, problem: &Problem, value: f64, guess: &[f64]) -> Result<ProfilePoint, String> {
         let held = held(problem, self.of, value);
         let start = nearest(&held, guess, &self.sizes)
             .ok_or_else(|| "the constraints do not allow the value".to_owned())?;
@@ -139,7 +139,7 @@ impl<'a> Walk<'a> {
             _ if self.rise(found.best.evaluation.cost) > LOST * self.how.quantile => {
                 Err("no fit near the optimum was found with the number held there".to_owned())
             }
-            _ => Ok(Sample {
+            _ => Ok(ProfilePoint {
                 value,
                 cost: found.best.evaluation.cost,
                 active: names(&held, &found.best),
@@ -200,11 +200,11 @@ impl<'a> Walk<'a> {
         self.how.step.unwrap_or(guess)
     }
 
-    fn side(&mut self, side: f64, start: &Sample) -> (Option<f64>, End) {
+    fn side(&mut self, side: f64, start: &ProfilePoint) -> (Option<f64>, End) {
         let mut step = self.first_step(&start.point);
         let (limit, what) = self.reach(side, &start.point.parameters);
         let mut here = start.clone();
-        let mut behind: Option<Sample> = None;
+        let mut behind: Option<ProfilePoint> = None;
         let mut shortened = 0;
         for _ in 0..self.how.steps {
             if (limit - here.value) * side <= 1e-12 * limit.abs() {
@@ -229,7 +229,7 @@ impl<'a> Walk<'a> {
                 }
             };
             let rise = self.rise(next.cost) - self.rise(here.cost);
-            self.samples.push(next.clone());
+            self.points.push(next.clone());
             if self.distance(next.cost) >= 0.0 {
                 let end = self.end(here, next);
                 let active = end.active.iter();
@@ -251,7 +251,7 @@ impl<'a> Walk<'a> {
 
     /// Where the rise is the quantile, between a sample inside and one outside: the Illinois variant
     /// of the secant method (M. Dowell, P. Jarratt, *BIT* 11 (1971) 168-174).
-    fn end(&mut self, inside: Sample, outside: Sample) -> Sample {
+    fn end(&mut self, inside: ProfilePoint, outside: ProfilePoint) -> ProfilePoint {
         let (mut inside, mut outside) = (inside, outside);
         let root = self.how.quantile.sqrt();
         let (mut low, mut high) = (self.distance(inside.cost), self.distance(outside.cost));
@@ -264,7 +264,7 @@ impl<'a> Walk<'a> {
                 break;
             };
             let distance = self.distance(next.cost);
-            self.samples.push(next.clone());
+            self.points.push(next.clone());
             let done = distance.abs() <= END * root
                 || (outside.value - inside.value).abs() <= 1e-14 * value.abs();
             let is_inside = distance < 0.0;
@@ -286,12 +286,12 @@ impl<'a> Walk<'a> {
 
     /// Marks the constraints that become active on one side, each where it does, by bisection between
     /// the last sample without it and the first one with it.
-    fn mark(&mut self, side: f64, start: &Sample) {
-        let beyond = |s: &&Sample| (s.value - start.value) * side >= 0.0;
-        let mut samples: Vec<Sample> = self.samples.iter().filter(beyond).cloned().collect();
-        samples.sort_by(|a, b| (side * a.value).total_cmp(&(side * b.value)));
+    fn mark(&mut self, side: f64, start: &ProfilePoint) {
+        let beyond = |s: &&ProfilePoint| (s.value - start.value) * side >= 0.0;
+        let mut points: Vec<ProfilePoint> = self.points.iter().filter(beyond).cloned().collect();
+        points.sort_by(|a, b| (side * a.value).total_cmp(&(side * b.value)));
         let mut seen = start.active.clone();
-        for pair in samples.windows(2) {
+        for pair in points.windows(2) {
             for constraint in &pair[1].active {
                 if seen.contains(constraint) {
                     continue;
@@ -307,7 +307,7 @@ impl<'a> Walk<'a> {
                         Err(_) => break,
                     }
                 }
-                self.marks.push(Mark {
+                self.marks.push(ActivationPoint {
                     value: with.value,
                     constraint: constraint.clone(),
                 });
@@ -317,7 +317,7 @@ impl<'a> Walk<'a> {
 
     /// Whether the rise at `end` is the work of the constraints `new`, which are not active at the
     /// optimum: the fit is made again without them.
-    fn blame(&self, end: &Sample, new: Vec<String>) -> End {
+    fn blame(&self, end: &ProfilePoint, new: Vec<String>) -> End {
         if new.is_empty() {
             return End::Rise;
         }
@@ -333,12 +333,12 @@ impl<'a> Walk<'a> {
 
     fn finish(self, optimum: f64, sides: [(Option<f64>, End); 2]) -> Profile {
         let least = BETTER * self.how.quantile;
-        let better = (self.samples.iter())
+        let better = (self.points.iter())
             .filter(|s| self.rise(s.cost) < -least)
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
             .map(|s| s.point.parameters.clone());
-        let mut samples = self.samples;
-        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let mut points = self.points;
+        points.sort_by(|a, b| a.value.total_cmp(&b.value));
         let [(low, below), (high, above)] = sides;
         let verdict = match [low, high] {
             [Some(_), Some(_)] => Interval::Identified,
@@ -350,9 +350,9 @@ impl<'a> Walk<'a> {
             unit: self.of.unit.clone(),
             optimum,
             optimum_cost: self.base,
-            values: samples.iter().map(|s| s.value).collect(),
-            costs: samples.iter().map(|s| s.cost).collect(),
-            parameters: samples.into_iter().map(|s| s.point.parameters).collect(),
+            values: points.iter().map(|s| s.value).collect(),
+            costs: points.iter().map(|s| s.cost).collect(),
+            parameters: points.into_iter().map(|s| s.point.parameters).collect(),
             interval: [low, high],
             ends: [below, above],
             verdict,
@@ -363,7 +363,7 @@ impl<'a> Walk<'a> {
 }
 
 /// The parameters at `value` on the line through two samples; those of the second without a first.
-fn extrapolated(first: Option<&Sample>, second: &Sample, value: f64) -> Vec<f64> {
+fn extrapolated(first: Option<&ProfilePoint>, second: &ProfilePoint, value: f64) -> Vec<f64> {
     let here = &second.point.parameters;
     let Some(first) = first.filter(|f| f.value != second.value) else {
         return here.clone();

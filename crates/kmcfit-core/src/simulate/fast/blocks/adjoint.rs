@@ -1,14 +1,14 @@
 //! The discrete adjoint in blocks.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES, Row};
 use crate::system::State;
 
 /// Everything that one solve needs.
-pub(super) struct Adjoint<'a> {
-    pub device: LinearDevice<'a>,
+pub(super) struct BlockAdjoint<'a> {
+    pub nodal: LinearSystem<'a>,
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
     /// Derivative of the cost with respect to displacement and, if there is any, velocity.
@@ -18,20 +18,20 @@ pub(super) struct Adjoint<'a> {
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Adjoint<'_> {
+impl Kernel for BlockAdjoint<'_> {
     type Output = State;
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> State {
         let Self {
-            device,
+            nodal,
             displacement,
             velocity,
             source,
             mut gradient,
             workspace,
         } = self;
-        let h = device.h;
+        let h = nodal.h;
         let steps = displacement.len() - 1;
         let scale = [1.0, 1.0 / h];
         let at = |i: usize| [0, 1].map(|q: usize| source[q].map_or(0.0, |s| s[i] * scale[q]));
@@ -39,13 +39,13 @@ impl Kernel for Adjoint<'_> {
         gradient.iter_mut().for_each(|g| g[steps] = 0.0);
         let (tiles, rest) = Tile::cut(steps);
         for i in (rest..steps).rev() {
-            let motion = [displacement[i], h * velocity[i]];
-            device.step_back(i, motion, at(i), &mut x, &mut gradient);
+            let response = [displacement[i], h * velocity[i]];
+            nodal.step_back(i, response, at(i), &mut x, &mut gradient);
         }
         for tile in tiles.rev() {
-            device.gather(arithmetic, tile, workspace);
-            tile.gather(arithmetic, displacement, &mut workspace.motion[0]);
-            tile.gather(arithmetic, velocity, &mut workspace.motion[1]);
+            nodal.gather(arithmetic, tile, workspace);
+            tile.gather(arithmetic, displacement, &mut workspace.response[0]);
+            tile.gather(arithmetic, velocity, &mut workspace.response[1]);
             let last = match source {
                 [Some(y), None] => {
                     tile.gather(arithmetic, y, &mut workspace.source[0]);

@@ -1,17 +1,17 @@
-//! Cost and gradient in one go, for readings of the displacement at every node.
+//! Cost and gradient in one go, for samples of the displacement at every node.
 //!
 //! A block's share of the cost is a quadratic function of the state at its start. A first pass, in which no
 //! tile waits for another, finds for every block its map and the derivative of that function; from these
 //! follow the states between the blocks and, from the end back, the adjoint states there. A second pass, in
-//! which again no tile waits for another, computes motion, adjoint and gradient tile by tile and writes
+//! which again no tile waits for another, computes response, adjoint and gradient tile by tile and writes
 //! nothing down but the gradient. Long records are shared by two threads; what a tile gives
 //! does not depend on who computes it.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::adjoint::{collect, ends};
 use super::forward::starts;
 use super::tile::Tile;
-use super::workspace::{Chart, Ends, Workspace, with_workspace};
+use super::workspace::{BlockMap, Ends, Workspace, with_workspace};
 use crate::simd::{self, Arithmetic, Kernel, LANES};
 use crate::system::State;
 use crate::threads;
@@ -22,10 +22,10 @@ const WORTH_A_THREAD: usize = 24;
 /// `J = sum_i w_i (y_i - reading_i)^2` over all nodes.
 #[derive(Clone, Copy)]
 pub(super) struct LeastSquares<'a> {
-    pub device: LinearDevice<'a>,
+    pub nodal: LinearSystem<'a>,
     pub initial: State,
     /// One a node.
-    pub readings: &'a [f64],
+    pub samples: &'a [f64],
     /// `w_i` at the inner nodes, and at both ends.
     pub weights: [f64; 2],
 }
@@ -45,10 +45,10 @@ pub(super) struct Survey<'a> {
 }
 
 impl Kernel for Survey<'_> {
-    type Output = Vec<Chart>;
+    type Output = Vec<BlockMap>;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<Chart> {
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<BlockMap> {
         let Self {
             of,
             tiles,
@@ -56,11 +56,11 @@ impl Kernel for Survey<'_> {
         } = self;
         let mut charts = Vec::with_capacity(tiles.len());
         for tile in tiles {
-            of.device.gather(arithmetic, *tile, workspace);
-            tile.gather(arithmetic, of.readings, &mut workspace.source[0]);
+            of.nodal.gather(arithmetic, *tile, workspace);
+            tile.gather(arithmetic, of.samples, &mut workspace.source[0]);
             charts.push(match tiles.len() {
-                1 => workspace.survey::<A, true>(arithmetic, of.device.h, tile.length),
-                _ => workspace.survey::<A, false>(arithmetic, of.device.h, tile.length),
+                1 => workspace.survey::<A, true>(arithmetic, of.nodal.h, tile.length),
+                _ => workspace.survey::<A, false>(arithmetic, of.nodal.h, tile.length),
             });
         }
         charts
@@ -103,13 +103,13 @@ impl Kernel for Descent<'_> {
         let Some(start) = legs.first().map(|leg| leg.tile.first) else {
             return harvest;
         };
-        let (h, factor) = (of.device.h, of.factor());
+        let (h, factor) = (of.nodal.h, of.factor());
         // From the end: what the first pass has seen last is still near.
         for Leg { tile, starts, ends } in legs.iter().rev() {
             if !at_hand {
-                of.device.gather(arithmetic, *tile, workspace);
+                of.nodal.gather(arithmetic, *tile, workspace);
                 workspace.prepare_rates(arithmetic, h, tile.length);
-                tile.gather(arithmetic, of.readings, &mut workspace.source[0]);
+                tile.gather(arithmetic, of.samples, &mut workspace.source[0]);
             }
             workspace.replay(arithmetic, h, tile.length, starts);
             let squares = workspace.compare(arithmetic, tile.length, factor);
@@ -135,7 +135,7 @@ pub(super) struct Joint {
     squares: f64,
     /// Residual at the last node.
     last: f64,
-    /// Adjoint state at the first node.
+    /// BlockAdjoint state at the first node.
     adjoint: [f64; 2],
 }
 
@@ -187,7 +187,7 @@ impl LeastSquares<'_> {
     }
 
     fn steps(&self) -> usize {
-        self.readings.len() - 1
+        self.samples.len() - 1
     }
 
     /// `2 w`: times the residual it is the derivative of `w r^2`, between the ends.
@@ -197,35 +197,40 @@ impl LeastSquares<'_> {
 
     /// States and adjoint states between all blocks, from their charts; the steps behind the last
     /// tile are done one by one, with their gradient.
-    pub fn join(&self, tiles: &[Tile], charts: &[Chart], gradient: &mut [&mut [f64]; 3]) -> Joint {
+    pub fn join(
+        &self,
+        tiles: &[Tile],
+        charts: &[BlockMap],
+        gradient: &mut [&mut [f64]; 3],
+    ) -> Joint {
         let Self {
-            device,
+            nodal,
             initial,
-            readings,
+            samples,
             weights: [_, outer],
         } = *self;
-        let (h, steps, factor) = (device.h, self.steps(), self.factor());
+        let (h, steps, factor) = (nodal.h, self.steps(), self.factor());
         let mut x = [initial.displacement, h * initial.velocity];
         let starts: Vec<Ends> = charts.iter().map(|c| starts(&c.maps, &mut x)).collect();
 
         let rest = behind(tiles);
-        let mut motion = [[0.0; 2]; 2 * LANES];
+        let mut response = [[0.0; 2]; 2 * LANES];
         let mut squares = 0.0;
         for i in rest..=steps {
-            motion[i - rest] = x;
-            let r = x[0] - readings[i];
+            response[i - rest] = x;
+            let r = x[0] - samples[i];
             squares += r * r;
             if i < steps {
-                x = device.rates(i).forward(x, device.constants());
+                x = nodal.rates(i).forward(x, nodal.constants());
             }
         }
-        let last = x[0] - readings[steps];
+        let last = x[0] - samples[steps];
         let mut x = [2.0 * outer * last, 0.0];
         gradient.iter_mut().for_each(|g| g[steps] = 0.0);
         for i in (rest..steps).rev() {
-            let state = motion[i - rest];
-            let source = [factor * (state[0] - readings[i]), 0.0];
-            device.step_back(i, state, source, &mut x, gradient);
+            let state = response[i - rest];
+            let source = [factor * (state[0] - samples[i]), 0.0];
+            nodal.step_back(i, state, source, &mut x, gradient);
         }
 
         let mut legs = Vec::with_capacity(tiles.len());
@@ -263,13 +268,13 @@ impl LeastSquares<'_> {
         }
         sum += joint.squares;
         let [inner, outer] = self.weights;
-        let first = self.initial.displacement - self.readings[0];
+        let first = self.initial.displacement - self.samples[0];
         // Both ends have been counted like the others.
         let cost = inner * sum + (outer - inner) * (first * first + joint.last * joint.last);
         let [y, w] = joint.adjoint;
         let initial = State {
             displacement: y + 2.0 * (outer - inner) * first,
-            velocity: self.device.h * w,
+            velocity: self.nodal.h * w,
         };
         (cost, initial)
     }

@@ -1,4 +1,4 @@
-//! One step of the midpoint rule for a linear device in free motion.
+//! One step of the midpoint rule for a linear system in free response.
 //!
 //! Time is counted in steps `h` here, so that the velocity is `w = h v`, in m, and a step is
 //!
@@ -14,12 +14,12 @@ use crate::simd::{Arithmetic, Eight};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A number, or eight of them.
-pub(super) trait Number:
+pub(super) trait StepNumber:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
 }
 
-impl<T> Number for T where
+impl<T> StepNumber for T where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T>
 {
 }
@@ -66,7 +66,7 @@ impl Constants<f64> {
 
 /// Mass, damping and `h` times the stiffness at a node.
 #[derive(Clone, Copy)]
-pub(super) struct Coefficients<T> {
+pub(super) struct NodeCoefficients<T> {
     pub m: T,
     pub c: T,
     pub hk: T,
@@ -74,7 +74,7 @@ pub(super) struct Coefficients<T> {
 
 /// What a step does, without units but for the last two.
 #[derive(Clone, Copy)]
-pub(super) struct Rates<T> {
+pub(super) struct StepRates<T> {
     pub alpha: T,
     pub beta: T,
     pub gamma: T,
@@ -83,10 +83,10 @@ pub(super) struct Rates<T> {
     pub mobility: [T; 2],
 }
 
-impl<T: Number> Rates<T> {
+impl<T: StepNumber> StepRates<T> {
     /// Both inverse masses come from one division.
     #[inline(always)]
-    pub fn new(left: Coefficients<T>, right: Coefficients<T>, of: Constants<T>) -> Self {
+    pub fn new(left: NodeCoefficients<T>, right: NodeCoefficients<T>, of: Constants<T>) -> Self {
         let twice = left.m + right.m;
         let both = of.half_h / (left.m * twice);
         let mobility = [twice * both, (left.m + left.m) * both];
@@ -107,7 +107,7 @@ impl<T: Number> Rates<T> {
         [y + w_half, w - (self.delta * y_half + self.gamma * w_half)]
     }
 
-    /// The transpose of [`Rates::forward`].
+    /// The transpose of [`StepRates::forward`].
     #[inline(always)]
     pub fn backward(&self, [y, w]: [T; 2], of: Constants<T>) -> [T; 2] {
         let w_half = y - self.gamma * w;
@@ -132,7 +132,7 @@ impl<T: Number> Rates<T> {
     }
 
     /// What a step gives to the gradient with respect to `m/h`, `c` and `h k`: at its left node, and
-    /// half of what it gives at mid-step. `adjoint` belongs to the right node, `motion` to the
+    /// half of what it gives at mid-step. `adjoint` belongs to the right node, `response` to the
     /// left.
     #[inline(always)]
     pub fn shares(&self, [y, w]: [T; 2], adjoint: [T; 2], of: Constants<T>) -> ([T; 3], [T; 3]) {
@@ -164,7 +164,7 @@ pub(super) struct Increment<T> {
     ww: T,
 }
 
-impl<T: Number> Increment<T> {
+impl<T: StepNumber> Increment<T> {
     /// `x + E x`.
     #[inline(always)]
     pub fn forward(&self, [y, w]: [T; 2]) -> [T; 2] {

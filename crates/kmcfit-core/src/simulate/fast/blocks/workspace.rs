@@ -1,12 +1,12 @@
 //! One tile in lanes: storage that is used again and again, and the passes over it.
 
-use super::step::{Coefficients, Constants, Rates};
+use super::step::{Constants, NodeCoefficients, StepRates};
 use super::tile::LONGEST;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use std::cell::RefCell;
 
 /// One row a node.
-type Rows = [Row; LONGEST + 1];
+type NodeRows = [Row; LONGEST + 1];
 
 /// A state in every lane, at the ends of both halves.
 pub(super) type Ends = [[Row; 2]; 2];
@@ -17,7 +17,7 @@ pub(super) type Maps = [[[Row; 2]; 2]; 2];
 
 /// What becomes of any state at the start of a block: the block's map, and half the derivative of the sum of the
 /// squares of its residuals, `H x - g`, with respect to that state.
-pub(super) struct Chart {
+pub(super) struct BlockMap {
     pub maps: Maps,
     /// `H` of both halves: its diagonal, then what stands beside it.
     curvature: [[Row; 3]; 2],
@@ -25,7 +25,7 @@ pub(super) struct Chart {
     slope: [[Row; 2]; 2],
 }
 
-impl Chart {
+impl BlockMap {
     /// `factor (H x - g)`: the adjoint state at the start of every block that is zero at its end.
     pub fn driven(&self, starts: &Ends, factor: f64) -> Ends {
         let mut driven = [[[0.0; LANES]; 2]; 2];
@@ -44,15 +44,15 @@ impl Chart {
 /// A tile in lanes.
 pub(super) struct Workspace {
     /// Mass, damping, stiffness.
-    pub functions: [Rows; 3],
-    /// The six numbers of every step's [`Rates`].
-    rates: [Rows; 6],
+    pub functions: [NodeRows; 3],
+    /// The six numbers of every step's [`StepRates`].
+    rates: [NodeRows; 6],
     /// Displacement and velocity.
-    pub motion: [Rows; 2],
+    pub response: [NodeRows; 2],
     /// Derivative of the cost with respect to displacement and velocity.
-    pub source: [Rows; 2],
+    pub source: [NodeRows; 2],
     /// Gradient with respect to the functions.
-    pub gradient: [Rows; 3],
+    pub gradient: [NodeRows; 3],
 }
 
 thread_local! {
@@ -65,7 +65,7 @@ impl Default for Workspace {
         Self {
             functions: [empty; 3],
             rates: [empty; 6],
-            motion: [empty; 2],
+            response: [empty; 2],
             source: [empty; 2],
             gradient: [empty; 3],
         }
@@ -84,9 +84,9 @@ impl Workspace {
         arithmetic: A,
         j: usize,
         of: Constants<Eight<A>>,
-    ) -> Coefficients<Eight<A>> {
+    ) -> NodeCoefficients<Eight<A>> {
         let [m, c, k] = &self.functions;
-        Coefficients {
+        NodeCoefficients {
             m: Eight::load(arithmetic, &m[j]),
             c: Eight::load(arithmetic, &c[j]),
             hk: of.h * Eight::load(arithmetic, &k[j]),
@@ -94,9 +94,9 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> Rates<Eight<A>> {
+    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> StepRates<Eight<A>> {
         let [alpha, beta, gamma, delta, left, middle] = &self.rates;
-        Rates {
+        StepRates {
             alpha: Eight::load(arithmetic, &alpha[j]),
             beta: Eight::load(arithmetic, &beta[j]),
             gamma: Eight::load(arithmetic, &gamma[j]),
@@ -109,7 +109,7 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &Rates<Eight<A>>) {
+    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &StepRates<Eight<A>>) {
         let [alpha, beta, gamma, delta, left, middle] = &mut self.rates;
         alpha[j] = rates.alpha.row();
         beta[j] = rates.beta.row();
@@ -123,7 +123,7 @@ impl Workspace {
     #[inline(always)]
     fn backward<A: Arithmetic, const VELOCITY: bool>(
         &self,
-        rates: &Rates<Eight<A>>,
+        rates: &StepRates<Eight<A>>,
         j: usize,
         x: [Eight<A>; 2],
         arithmetic: A,
@@ -140,7 +140,7 @@ impl Workspace {
         }
     }
 
-    /// Rates of all steps from the functions, and the maps of all blocks.
+    /// StepRates of all steps from the functions, and the maps of all blocks.
     #[inline(always)]
     pub fn prepare<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) -> Maps {
         let of = Constants::new(h).in_lanes(arithmetic);
@@ -152,7 +152,7 @@ impl Workspace {
             let mut from_w = [of.zero, of.one];
             for j in first..first + length / 2 {
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left, right, of);
+                let rates = StepRates::new(left, right, of);
                 self.keep_rates(j, &rates);
                 let increment = rates.increment(of);
                 from_y = increment.forward(from_y);
@@ -167,7 +167,7 @@ impl Workspace {
         maps
     }
 
-    /// The charts of all blocks, from the functions and from readings in place of the source. With `KEEP`
+    /// The charts of all blocks, from the functions and from samples in place of the source. With `KEEP`
     /// the rates of all steps are kept as well.
     #[inline(always)]
     pub fn survey<A: Arithmetic, const KEEP: bool>(
@@ -175,7 +175,7 @@ impl Workspace {
         arithmetic: A,
         h: f64,
         length: usize,
-    ) -> Chart {
+    ) -> BlockMap {
         let of = Constants::new(h).in_lanes(arithmetic);
         let half = length / 2;
         let mut left = [
@@ -188,16 +188,16 @@ impl Workspace {
         for i in 0..half {
             for block in 0..2 {
                 let j = block * half + i;
-                let reading = Eight::load(arithmetic, &self.source[0][j]);
+                let sample = Eight::load(arithmetic, &self.source[0][j]);
                 let [from_y, from_w] = &mut map[block];
                 let [yy, ww, yw] = &mut curvature[block];
                 *yy += from_y[0] * from_y[0];
                 *ww += from_w[0] * from_w[0];
                 *yw += from_y[0] * from_w[0];
-                slope[block][0] += from_y[0] * reading;
-                slope[block][1] += from_w[0] * reading;
+                slope[block][0] += from_y[0] * sample;
+                slope[block][1] += from_w[0] * sample;
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left[block], right, of);
+                let rates = StepRates::new(left[block], right, of);
                 if KEEP {
                     self.keep_rates(j, &rates);
                 }
@@ -208,7 +208,7 @@ impl Workspace {
             }
         }
         let empty = [0.0; LANES];
-        let mut chart = Chart {
+        let mut chart = BlockMap {
             maps: [[[empty; 2]; 2]; 2],
             curvature: [[empty; 3]; 2],
             slope: [[empty; 2]; 2],
@@ -227,19 +227,19 @@ impl Workspace {
         chart
     }
 
-    /// Rates of all steps from the functions.
+    /// StepRates of all steps from the functions.
     #[inline(always)]
     pub fn prepare_rates<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) {
         let of = Constants::new(h).in_lanes(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         for j in 0..length {
             let right = self.coefficients(arithmetic, j + 1, of);
-            self.keep_rates(j, &Rates::new(left, right, of));
+            self.keep_rates(j, &StepRates::new(left, right, of));
             left = right;
         }
     }
 
-    /// The motion in all blocks from their starts.
+    /// The response in all blocks from their starts.
     #[inline(always)]
     pub fn replay<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize, starts: &Ends) {
         let of = Constants::new(h).in_lanes(arithmetic);
@@ -247,14 +247,14 @@ impl Workspace {
         for i in 0..length / 2 {
             for (half, x) in x.iter_mut().enumerate() {
                 let j = half * (length / 2) + i;
-                self.motion[0][j] = x[0].row();
-                self.motion[1][j] = (x[1] * of.per_h).row();
+                self.response[0][j] = x[0].row();
+                self.response[1][j] = (x[1] * of.per_h).row();
                 *x = self.rates(arithmetic, j).forward(*x, of);
             }
         }
     }
 
-    /// From readings in place of the source: their residuals `r = y - reading`, the source
+    /// From samples in place of the source: their residuals `r = y - sample`, the source
     /// `factor r`, and the sum of the squares `r^2` in every lane.
     #[inline(always)]
     pub fn compare<A: Arithmetic>(&mut self, arithmetic: A, length: usize, factor: f64) -> Row {
@@ -263,7 +263,7 @@ impl Workspace {
         for i in 0..length / 2 {
             for (odd, sum) in sums.iter_mut().enumerate() {
                 let j = 2 * i + odd;
-                let y = Eight::load(arithmetic, &self.motion[0][j]);
+                let y = Eight::load(arithmetic, &self.response[0][j]);
                 let r = y - Eight::load(arithmetic, &self.source[0][j]);
                 *sum += r * r;
                 self.source[0][j] = (factor * r).row();
@@ -316,11 +316,11 @@ impl Workspace {
             for half in 0..2 {
                 let j = half * (length / 2) + i;
                 let rates = self.rates(arithmetic, j);
-                let motion = [
-                    Eight::load(arithmetic, &self.motion[0][j]),
-                    of.h * Eight::load(arithmetic, &self.motion[1][j]),
+                let response = [
+                    Eight::load(arithmetic, &self.response[0][j]),
+                    of.h * Eight::load(arithmetic, &self.response[1][j]),
                 ];
-                let (node, middle) = rates.shares(motion, x[half], of);
+                let (node, middle) = rates.shares(response, x[half], of);
                 for f in 0..3 {
                     let right = after[half][f] + middle[f];
                     if i + 1 == length / 2 {

@@ -1,7 +1,7 @@
-//! The costs of many devices along a ray, one a lane: the paper's trial steps.
+//! The costs of many systems along a ray, one a lane: the paper's trial steps.
 //!
-//! What is wanted of them is which is lowest, and its motion, with the bits that it would have by itself
-//! ([`forward`](crate::simulate::reference::forward())). So no motion is kept: of each eight states along the record are, from
+//! What is wanted of them is which is lowest, and its response, with the bits that it would have by itself
+//! ([`forward`](crate::simulate::reference::forward())). So no response is kept: of each eight states along the record are, from
 //! which the lowest one's is made again, eight parts at once ([`reconstruct()`]). The costs are sums in another order than that of
 //! the integral; those who may have the lowest cost are told from all others by a margin far above its rounding.
 
@@ -16,7 +16,7 @@ use std::ops::Range;
 
 pub(crate) use reconstruct::reconstruct;
 
-/// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
+/// BatchCoefficients `p - a g` in linear free response by the midpoint rule, seen at every node.
 #[derive(Clone, Copy)]
 pub(crate) struct SearchRay<'a> {
     /// Mass, damping, stiffness at the nodes.
@@ -26,7 +26,7 @@ pub(crate) struct SearchRay<'a> {
     /// State at the first node.
     pub initial: State,
     /// Displacements read at the nodes, m.
-    pub readings: &'a [f64],
+    pub samples: &'a [f64],
     /// Step, s.
     pub step: f64,
 }
@@ -51,7 +51,7 @@ pub(crate) struct LaneLayout {
 }
 
 impl LaneLayout {
-    /// That of the devices at `lengths`, which fall.
+    /// That of the systems at `lengths`, which fall.
     pub fn new(ray: SearchRay, lengths: &[f64]) -> Self {
         let without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[without_mass..];
@@ -63,7 +63,7 @@ impl LaneLayout {
         let row = |part: &[f64]| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0]));
         let first = (!first.is_empty()).then(|| row(first));
         Self {
-            nodes: ray.readings.len(),
+            nodes: ray.samples.len(),
             without_mass,
             in_first,
             rows: first
@@ -88,7 +88,7 @@ impl LaneLayout {
     }
 
     /// The trials that may have the lowest cost `integral (y - y_obs)^2 dt`, by the sums of squares of all rows: those of
-    /// all others are higher, or there is no mass, or the motion leaves the finite numbers.
+    /// all others are higher, or there is no mass, or the response leaves the finite numbers.
     pub fn lowest(&self, costs: &[Row]) -> Vec<usize> {
         let of = |which: &usize| {
             let (row, lane) = self.place(*which);
@@ -153,7 +153,7 @@ impl StepBatch {
     fn of_rows<const R: usize>(&mut self, ray: SearchRay, lengths: &[Row]) {
         let (states, costs) = (self.states.first_chunk_mut(), self.costs.first_chunk_mut());
         if let (Some(lengths), Some(states), Some(costs)) = (lengths.first_chunk(), states, costs) {
-            simd::run(rows::Rows::<R> {
+            simd::run(rows::BatchRows::<R> {
                 ray,
                 lengths,
                 states,
@@ -163,13 +163,13 @@ impl StepBatch {
     }
 }
 
-/// Nodes in each of the eight parts of a motion, the last of which may be shorter, or empty.
+/// Nodes in each of the eight parts of a response, the last of which may be shorter, or empty.
 fn part(nodes: usize) -> usize {
     nodes.div_ceil(LANES)
 }
 
 impl SearchRay<'_> {
-    /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
+    /// The first of `lengths` whose system has mass at all nodes: then so has every shorter one, also
     /// after rounding.
     fn first_with_mass(self, lengths: &[f64]) -> usize {
         // All are looked at: a loop without a way out is the faster one.

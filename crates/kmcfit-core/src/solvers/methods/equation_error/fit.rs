@@ -1,19 +1,19 @@
 //! The equation error as a method of its own: one convex problem, solved once.
 
 use super::measured::{Measured, Measurements};
-use super::{Accuracy, Minimum, add_rows, device, minimise};
+use super::{Accuracy, ConvexMinimum, add_rows, minimise, nodal};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::record::Experiment;
-use crate::solvers::counts::Counts;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
 use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::reason::{Reason, UnsupportedRecord};
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use crate::system::NodalCoefficients;
@@ -21,19 +21,19 @@ use crate::system::NodalCoefficients;
 /// A function that is smaller than its start by this factor is solved for again, up to so many times.
 const FAR: f64 = 1e4;
 const AGAIN: usize = 3;
-/// Relative rounding of a term of the equation of motion: of derivatives of smoothed readings, and of parameters that are known to
+/// Relative rounding of a term of the equation of motion: of derivatives of smoothed samples, and of parameters that are known to
 /// the accuracy of a factorisation.
 const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
-/// Minimises over the readings of all experiments
+/// Minimises over the samples of all experiments
 ///
 /// ```text
 /// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
 /// ```
 ///
-/// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
-/// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
-/// the equation of motion says of the readings there. Scalars keep their values at the start.
+/// with `y`, `y'`, `y''` from the samples ([`Measurements`]) and every sample of the same weight.
+/// Nothing is simulated: the trajectories of the fit are the measured responses, the predictions what
+/// the equation of motion says of the samples there. Scalars keep their values at the start.
 pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationRecord)) -> Fit {
     let clock = Instant::now();
     let mut timings = Timings::default();
@@ -49,14 +49,14 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         measurements: &measurements,
     };
     let first = cost.point(start.to_vec());
-    let mut counts = Counts::default();
+    let mut counts = SolveCounts::default();
     let mut optimality = None;
     let (outcome, found) = match cost.minimise(start, &mut timings) {
         Ok((minimum, programs)) => {
             counts.qp = programs;
             let point = cost.point(minimum.parameters.clone());
-            let device = &point.evaluation.device;
-            let has_mass = device.mass.iter().all(|m| *m > 0.0);
+            let nodal = &point.evaluation.nodal;
+            let has_mass = nodal.mass.iter().all(|m| *m > 0.0);
             let reason = reason(problem, &minimum, has_mass);
             let status = match minimum.program {
                 Some(ConicStatus::Almost) => Status::Stalled,
@@ -101,7 +101,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
     }
 }
 
-fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
+fn reason(problem: &Problem, minimum: &ConvexMinimum, has_mass: bool) -> Reason {
     if problem.functions.iter().all(|f| f.parameters() == 0) {
         return Reason::NoParameters;
     }
@@ -126,12 +126,12 @@ fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     }
 }
 
-/// The end of a fit whose readings tell no motion: the start, without a cost.
+/// The end of a fit whose samples tell no response: the start, without a cost.
 fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
-    evaluation.device = problem.functions.device(start);
-    for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
-        for (predicted, channel) in readings.iter_mut().zip(&experiment.channels) {
+    evaluation.nodal = problem.functions.nodal(start);
+    for (samples, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
+        for (predicted, channel) in samples.iter_mut().zip(&experiment.channels) {
             *predicted = vec![f64::NAN; channel.len()];
         }
     }
@@ -151,7 +151,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
         history: Vec::new(),
         snapshots: Vec::new(),
         outcome: Outcome::new(Status::Failed, Reason::UnsupportedRecord(reason)),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         attempts: Vec::new(),
@@ -179,7 +179,7 @@ impl<'a> Cost<'a> {
         &self,
         start: &[f64],
         timings: &mut Timings,
-    ) -> Result<(Minimum, u64), ConicStatus> {
+    ) -> Result<(ConvexMinimum, u64), ConicStatus> {
         let mut minimum = self.minimise_from(start, timings)?;
         let mut programs = u64::from(minimum.program.is_some());
         let mut from = self.measurements.sizes(self.problem, start);
@@ -205,7 +205,7 @@ impl<'a> Cost<'a> {
     fn optimality(
         &self,
         point: &Iterate,
-        minimum: &Minimum,
+        minimum: &ConvexMinimum,
         timings: &mut Timings,
     ) -> Option<Optimality> {
         let problem = self.problem;
@@ -237,7 +237,11 @@ impl<'a> Cost<'a> {
         2.0 * rounding * point.evaluation.cost.sqrt() + rounding * rounding
     }
 
-    fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+    fn minimise_from(
+        &self,
+        start: &[f64],
+        timings: &mut Timings,
+    ) -> Result<ConvexMinimum, ConicStatus> {
         let problem = self.problem;
         let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
         let sizes = self.measurements.sizes(problem, start);
@@ -292,19 +296,19 @@ impl<'a> Cost<'a> {
         evaluation.misfit = self
             .experiments()
             .map(|(experiment, measured)| {
-                let device = device(problem, experiment, &theta);
-                measured.misfit(&measured.errors(problem, &device))
+                let nodal = nodal(problem, experiment, &theta);
+                measured.misfit(&measured.errors(problem, &nodal))
             })
             .sum();
         evaluation.regularisation = problem.regularisation(&theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
-        self.say_motions(&mut evaluation);
+        self.report_responses(&mut evaluation);
         let gradient = self.gradient(&theta);
         Iterate::new(theta, evaluation, gradient)
     }
 
-    /// The measured motions, and what the model says of the readings there.
-    fn say_motions(&self, evaluation: &mut Evaluation) {
+    /// The measured responses, and what the model says of the samples there.
+    fn report_responses(&self, evaluation: &mut Evaluation) {
         let problem = self.problem;
         for (e, measured) in self.measurements.experiments.iter().enumerate() {
             let Some(measured) = measured else { continue };
@@ -322,9 +326,9 @@ impl<'a> Cost<'a> {
         let problem = self.problem;
         let mut euclidean = problem.penalty_gradient(theta);
         for (experiment, measured) in self.experiments() {
-            let device = device(problem, experiment, theta);
-            let errors = measured.errors(problem, &device);
-            let mut nodal: NodalCoefficients = problem.functions.empty_device();
+            let nodal = nodal(problem, experiment, theta);
+            let errors = measured.errors(problem, &nodal);
+            let mut nodal: NodalCoefficients = problem.functions.empty_nodal();
             for (f, values) in nodal.functions_mut().enumerate() {
                 for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
                     let push = 2.0 * measured.weight * error * measured.response(problem, f, i);
@@ -333,7 +337,7 @@ impl<'a> Cost<'a> {
                 }
             }
             let functions = &problem.functions;
-            functions.add_transpose(&nodal, experiment.device, &mut euclidean);
+            functions.add_transpose(&nodal, experiment.coefficient_set, &mut euclidean);
         }
         let l2 = problem.functions.gram_solve(&euclidean);
         Gradient {

@@ -8,11 +8,11 @@ use crate::signal::zero_phase;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
-use crate::solvers::state_estimation::{Band, Kinematics, unsensed};
+use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
 /// Dominant periods at either end that are left out where a force or the base is known to drive the
-/// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
+/// response: there the filter's transients, which begin as large as the response and fall to a tenth in
 /// a period, are the largest errors there are. Without a known drive the unknown one is larger.
 const SETTLING: f64 = 2.0;
 /// Most of a record that may be left out at either end.
@@ -21,7 +21,7 @@ const MOST_LEFT_OUT: usize = 4;
 /// The state of an experiment at some times, and what drives it there.
 pub(super) struct Measured {
     pub places: Vec<TimePoint>,
-    /// Index of the first time among the readings of the channel, where it is one channel's.
+    /// Index of the first time among the samples of the channel, where it is one channel's.
     first: usize,
     /// Displacement, m.
     pub y: Vec<f64>,
@@ -58,8 +58,8 @@ impl Measured {
         {
             return Err(MissingMeasurement::QuadraticLoss);
         }
-        let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
-        if experiment.channels.iter().any(sought) {
+        let estimated = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
+        if experiment.channels.iter().any(estimated) {
             return Err(MissingMeasurement::KnownSensors);
         }
         if let [channel] = experiment.channels.as_slice()
@@ -73,14 +73,14 @@ impl Measured {
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
             return Err(MissingMeasurement::FilteredDrive);
         }
-        let motion = Kinematics::of(problem, experiment, scalars);
-        let motion = motion.ok_or(MissingMeasurement::Readings)?;
-        let measured = Self::at_nodes(problem, experiment, &motion);
+        let kinematics = Kinematics::of(problem, experiment, scalars);
+        let kinematics = kinematics.ok_or(MissingMeasurement::Readings)?;
+        let measured = Self::at_nodes(problem, experiment, &kinematics);
         let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
 
-    /// From accelerations alone: motion, force and base through the same filter.
+    /// From accelerations alone: response, force and base through the same filter.
     fn in_band(
         experiment: &Experiment,
         channel: &Channel,
@@ -88,34 +88,34 @@ impl Measured {
         scalars: &[f64],
     ) -> Option<Self> {
         let (values, _) = unsensed(channel, scalars);
-        let band = Band::of(&values, spacing)?;
+        let band = PassBand::of(&values, spacing)?;
         let excitation = experiment.excitation.as_ref();
-        let around = (0..channel.len()).map(|i| channel.around_reading(excitation, i));
+        let around = (0..channel.len()).map(|i| channel.around_sample(excitation, i));
         let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();
         let sensed = |part: Vec<f64>| match channel.filter() {
             [] => part,
             filter => zero_phase(filter, &part),
         };
         let (force, base) = (sensed(force), sensed(base));
-        let [motion, force, base] = band
-            .motions(&[&values, &force, &base])?
+        let [response, force, base] = band
+            .responses(&[&values, &force, &base])?
             .try_into()
             .expect("one for each");
         let skipped = match experiment.is_free() {
             true => 1,
             false => {
                 let periods = SETTLING * std::f64::consts::TAU / band.frequency;
-                let readings = (periods / spacing).ceil() as usize;
-                readings.clamp(1, channel.len() / MOST_LEFT_OUT)
+                let samples = (periods / spacing).ceil() as usize;
+                samples.clamp(1, channel.len() / MOST_LEFT_OUT)
             }
         };
         let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
             places: channel.places()[skipped..channel.len() - skipped].to_vec(),
             first: skipped,
-            y: kept(motion.y),
-            v: kept(motion.v),
-            a: kept(motion.a),
+            y: kept(response.y),
+            v: kept(response.v),
+            a: kept(response.a),
             force: kept(force.a),
             base: kept(base.a),
             weight: spacing,
@@ -124,8 +124,8 @@ impl Measured {
         })
     }
 
-    /// At the nodes at which a motion is known.
-    pub fn at_nodes(problem: &Problem, experiment: &Experiment, motion: &Kinematics) -> Self {
+    /// At the nodes at which a response is known.
+    pub fn at_nodes(problem: &Problem, experiment: &Experiment, kinematics: &Kinematics) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
             excitation.and_then(|e| e.force.as_ref()),
@@ -134,25 +134,25 @@ impl Measured {
         let [force, base] = parts.map(|part| {
             let nodes = part.map(StageSamples::at_nodes);
             let at = |node: &usize| nodes.as_ref().map_or(0.0, |f| f[*node]);
-            motion.nodes.iter().map(at).collect::<Vec<f64>>()
+            kinematics.nodes.iter().map(at).collect::<Vec<f64>>()
         });
-        let stride = motion.nodes.windows(2).map(|w| w[1] - w[0]).min();
+        let stride = kinematics.nodes.windows(2).map(|w| w[1] - w[0]).min();
         let place = |node: &usize| TimePoint::node(*node, experiment.nodes);
         Self {
-            places: motion.nodes.iter().map(place).collect(),
+            places: kinematics.nodes.iter().map(place).collect(),
             first: 0,
-            y: motion.y.clone(),
-            v: motion.v.clone(),
-            a: motion.a.clone(),
+            y: kinematics.y.clone(),
+            v: kinematics.v.clone(),
+            a: kinematics.a.clone(),
             force,
             base,
             weight: stride.unwrap_or(1) as f64 * problem.system.grid.step(),
-            frequency: rms(&motion.v) / rms(&motion.y),
+            frequency: rms(&kinematics.v) / rms(&kinematics.y),
             corner: None,
         }
     }
 
-    /// What function `f` of a device multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
+    /// What function `f` of a system multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
@@ -160,10 +160,10 @@ impl Measured {
         }
     }
 
-    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
-    pub fn errors(&self, problem: &Problem, device: &NodalCoefficients) -> Vec<f64> {
+    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a system at all times, N.
+    pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
         let error = |(i, place): (usize, &TimePoint)| {
-            let forces = device.functions().enumerate();
+            let forces = nodal.functions().enumerate();
             let force =
                 |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
             forces
@@ -178,10 +178,10 @@ impl Measured {
         self.weight * errors.iter().map(|e| e * e).sum::<f64>()
     }
 
-    /// The motion on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
+    /// The response on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
     /// where nothing was measured.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
-        let mut motion = Trajectory::zeros(nodes);
+        let mut response = Trajectory::zeros(nodes);
         let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
         let last = self.places.len() - 1;
         let mut i = 0;
@@ -195,10 +195,10 @@ impl Measured {
                 true => self.between(i, since, (at(i + 1) - at(i)) * grid.step()),
                 false => self.swung_on(i, since),
             };
-            motion.displacement[node] = y;
-            motion.velocity[node] = v;
+            response.displacement[node] = y;
+            response.velocity[node] = v;
         }
-        motion
+        response
     }
 
     fn swung_on(&self, i: usize, since: f64) -> (f64, f64) {
@@ -220,19 +220,19 @@ impl Measured {
         (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
     }
 
-    /// What the model says of the readings at this state.
+    /// What the model says of the samples at this state.
     ///
     /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
-    /// the filter took from the reading, so that model less reading is minus the equation's error
-    /// over the mass; the readings at the ends, which are left out, stand for themselves.
+    /// the filter took from the sample, so that model less sample is minus the equation's error
+    /// over the mass; the samples at the ends, which are left out, stand for themselves.
     pub fn predict(&self, problem: &Problem, channel: &Channel, view: SimulatedRecord) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
         }
         let [gain, ..] = channel.sensor().values(view.scalars);
         let mut predicted = channel.observed().to_vec();
-        for (i, error) in self.errors(problem, view.device).iter().enumerate() {
-            predicted[self.first + i] -= gain * error / blend(&view.device.mass, self.places[i]);
+        for (i, error) in self.errors(problem, view.nodal).iter().enumerate() {
+            predicted[self.first + i] -= gain * error / blend(&view.nodal.mass, self.places[i]);
         }
         predicted
     }
@@ -259,21 +259,21 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
 
-/// The motions of all experiments as their readings tell them.
+/// The responses of all experiments as their samples tell them.
 ///
-/// From one channel of equally spaced accelerations the motion is integrated in a band around its
+/// From one channel of equally spaced accelerations the response is integrated in a band around its
 /// dominant frequency, and force and base pass the same filter. From any other channels a smooth
 /// curve through all of them is differentiated, as for the start from the data.
 pub struct Measurements {
-    /// `None` for an experiment without readings.
+    /// `None` for an experiment without samples.
     pub(super) experiments: Vec<Option<Measured>>,
 }
 
 impl Measurements {
-    /// From the readings of a problem, with the scalars at their start.
+    /// From the samples of a problem, with the scalars at their start.
     ///
     /// # Errors
-    /// The first experiment whose readings do not tell a motion.
+    /// The first experiment whose samples do not tell a response.
     pub fn of(problem: &Problem) -> Result<Self, UnsupportedRecord> {
         Self::with_scalars(problem, problem.scalars(&problem.start()))
     }
@@ -300,7 +300,7 @@ impl Measurements {
     }
 
     /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
-    /// only forces proportional to the motion do without.
+    /// only forces proportional to the response do without.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
         let terms = problem.system.terms.iter();
         if terms.clone().all(|term| term.is_linear()) {
@@ -311,7 +311,7 @@ impl Measurements {
             let corner = measured.as_ref()?.corner? / std::f64::consts::TAU;
             Some(format!(
                 "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that are \
-                 not proportional to the motion are seen with an error, and a constant offset is not \
+                 not proportional to the response are seen with an error, and a constant offset is not \
                  seen",
                 experiment.name
             ))
@@ -320,7 +320,7 @@ impl Measurements {
     }
 
     /// The weight of a penalty on derivative `order` of function `index` of the list with which the
-    /// smoother's time constant is one dominant period T where the motion has its mean amplitude:
+    /// smoother's time constant is one dominant period T where the response has its mean amplitude:
     /// `mean(phi^2) T^(2 order)`, summed over the experiments that have the function. T is the mean
     /// of theirs.
     ///
@@ -366,7 +366,7 @@ impl Measurements {
             .collect()
     }
 
-    /// The experiments that have function `index` of the list, and which of their device it is.
+    /// The experiments that have function `index` of the list, and which of their system it is.
     fn with_function<'a>(
         &'a self,
         problem: &'a Problem,
@@ -374,22 +374,24 @@ impl Measurements {
     ) -> impl Iterator<Item = (usize, &'a Measured)> {
         let all = problem.experiments.iter().zip(&self.experiments);
         all.filter_map(move |(experiment, measured)| {
-            let assembly = problem.functions.assembly(experiment.device);
+            let assembly = problem
+                .functions
+                .coefficient_set(experiment.coefficient_set);
             let f = assembly.iter().position(|f| *f == index)?;
             Some((f, measured.as_ref()?))
         })
     }
 }
 
-/// The mass of the first device that has function `index` of the list.
+/// The mass of the first system that has function `index` of the list.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
-    let mut devices = functions.assemblies().iter();
-    let device = devices.find(|assembly| assembly.contains(&index))?;
-    device.first().copied()
+    let mut nodal_sets = functions.coefficient_sets().iter();
+    let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
+    nodal.first().copied()
 }
 
 impl Measured {
-    /// Mean of the squared response of function `f` of the device.
+    /// Mean of the squared response of function `f` of the system.
     fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
         let n = self.places.len();
         let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
@@ -408,7 +410,7 @@ mod tests {
         Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
     }
 
-    /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
+    /// Samples at some nodes and between some, of the response that `state` tells: `y`, `y'`, `y''`.
     fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
         let between = |step| TimePoint {
             step,
@@ -433,15 +435,15 @@ mod tests {
         }
     }
 
-    /// The largest distance of a motion from what `state` tells of displacement and velocity.
+    /// The largest distance of a response from what `state` tells of displacement and velocity.
     fn distance(
-        motion: &Trajectory,
+        response: &Trajectory,
         nodes: impl Iterator<Item = usize>,
         state: impl Fn(f64) -> [f64; 3],
     ) -> f64 {
         let one = |i: usize| {
             let [y, v, _] = state(i as f64 * STEP);
-            let [of_y, of_v] = [motion.displacement[i] - y, motion.velocity[i] - v];
+            let [of_y, of_v] = [response.displacement[i] - y, response.velocity[i] - v];
             of_y.abs() + of_v.abs()
         };
         // What is no number is the largest.
@@ -458,8 +460,8 @@ mod tests {
                 4.2 * t - 4.0,
             ]
         };
-        let motion = measured(1.0, cubic).trajectory(&grid(), NODES);
-        let off = distance(&motion, 3..=18, cubic);
+        let response = measured(1.0, cubic).trajectory(&grid(), NODES);
+        let off = distance(&response, 3..=18, cubic);
         assert!(off < 1e-12, "{off}");
     }
 
@@ -470,8 +472,8 @@ mod tests {
             let (sine, cosine) = (w * t + 0.4).sin_cos();
             [2.0 * cosine, -2.0 * w * sine, -2.0 * w * w * cosine]
         };
-        let motion = measured(w, harmonic).trajectory(&grid(), NODES);
-        let off = distance(&motion, (0..=3).chain(18..NODES), harmonic);
+        let response = measured(w, harmonic).trajectory(&grid(), NODES);
+        let off = distance(&response, (0..=3).chain(18..NODES), harmonic);
         assert!(off < 1e-12, "{off}");
     }
 

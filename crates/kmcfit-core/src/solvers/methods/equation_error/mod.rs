@@ -1,9 +1,9 @@
-//! The equation error: smoothed readings put into the equation of motion.
+//! The equation error: smoothed samples put into the equation of motion.
 //!
-//! With `y`, `y'`, `y''` from the readings, `m y'' + c y' + k y - f` is linear in the parameters, so
+//! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so
 //! penalties and constraints make it one convex problem. It needs no start and knows no local minima
 //! of a wrong period; noise biases it. It is a start ([`equation_error`]) for a fit that removes the
-//! bias, and a method of its own ([`fit`]) for records that no motion from known states and forces
+//! bias, and a method of its own ([`fit`]) for records that no response from known states and forces
 //! explains.
 
 mod fit;
@@ -52,26 +52,26 @@ impl Accuracy {
 /// # Errors
 /// How the convex problem ended, if not with a solution.
 pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, ConicStatus> {
-    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+    let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
         .collect();
-    from_motions(problem, start, &motions)
+    from_kinematics(problem, start, &kinematics)
 }
 
-/// [`equation_error`] with the motion of each experiment.
-pub(in crate::solvers) fn from_motions(
+/// [`equation_error`] with the response of each experiment.
+pub(in crate::solvers) fn from_kinematics(
     problem: &Problem,
     start: &[f64],
-    motions: &[Option<Kinematics>],
+    kinematics: &[Option<Kinematics>],
 ) -> Result<Vec<f64>, ConicStatus> {
-    let start = &with_initial_states(problem, start, motions);
+    let start = &with_initial_states(problem, start, kinematics);
     let mut sub = Subproblem::new(problem.parameters());
     sub.stations = problem.functions.first_nodes();
     let mut experiments = Vec::new();
-    for (experiment, motion) in problem.experiments.iter().zip(motions) {
-        experiments.push(motion.as_ref().map(|motion| {
-            let measured = Measured::at_nodes(problem, experiment, motion);
-            let root = root_weight(problem, experiment, motion, start);
+    for (experiment, states) in problem.experiments.iter().zip(kinematics) {
+        experiments.push(states.as_ref().map(|states| {
+            let measured = Measured::at_nodes(problem, experiment, states);
+            let root = root_weight(problem, experiment, states, start);
             add_rows(problem, experiment, &measured, root, start, &mut sub);
             measured
         }));
@@ -96,7 +96,7 @@ pub(in crate::solvers) fn from_motions(
 }
 
 /// The minimum of a convex problem.
-struct Minimum {
+struct ConvexMinimum {
     parameters: Vec<f64>,
     /// How the quadratic program ended, if one was needed.
     program: Option<ConicStatus>,
@@ -107,7 +107,7 @@ struct Minimum {
     pull: Vec<f64>,
 }
 
-impl Minimum {
+impl ConvexMinimum {
     /// What the pull adds to the cost at `theta`.
     fn pull(&self, theta: &[f64]) -> f64 {
         let steps = theta.iter().zip(&self.from).zip(&self.pull);
@@ -132,7 +132,7 @@ fn minimise(
     accuracy: Accuracy,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
     timings: &mut Timings,
-) -> Result<Minimum, ConicStatus> {
+) -> Result<ConvexMinimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
     sub.constrain(&constraints, start);
     let duration = problem.system.grid.duration();
@@ -154,7 +154,7 @@ fn minimise(
         let enough =
             sub.value(&step) - least <= (1.0 - accuracy.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
-            return Ok(Minimum {
+            return Ok(ConvexMinimum {
                 parameters,
                 program: None,
                 kkt: None,
@@ -173,7 +173,7 @@ fn minimise(
     let z = solution.z.iter_mut().zip(&units);
     z.for_each(|(z, unit)| *z *= unit);
     match solution.status {
-        status if status.is_point() => Ok(Minimum {
+        status if status.is_point() => Ok(ConvexMinimum {
             parameters: moved(&solution.z),
             program: Some(status),
             kkt: solution.kkt,
@@ -184,30 +184,30 @@ fn minimise(
     }
 }
 
-/// Root of the weight of a squared error of the equation, so that it counts as the readings would.
+/// Root of the weight of a squared error of the equation, so that it counts as the samples would.
 fn root_weight(
     problem: &Problem,
     experiment: &Experiment,
-    motion: &Kinematics,
+    kinematics: &Kinematics,
     start: &[f64],
 ) -> f64 {
-    let device = device(problem, experiment, start);
+    let nodal = nodal(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let terms = problem.system.terms.iter().zip(&device.coefficients);
+    let terms = problem.system.terms.iter().zip(&nodal.coefficients);
     let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
-    let springs = springs.map(|(_, k)| size(k) * size(&motion.y));
-    let force_scale = springs.fold(size(&device.mass) * size(&motion.a), f64::max)
-        / motion.size.max(f64::MIN_POSITIVE);
-    motion.weight.sqrt() / force_scale
+    let springs = springs.map(|(_, k)| size(k) * size(&kinematics.y));
+    let force_scale = springs.fold(size(&nodal.mass) * size(&kinematics.a), f64::max)
+        / kinematics.size.max(f64::MIN_POSITIVE);
+    kinematics.weight.sqrt() / force_scale
 }
 
-/// The device of an experiment for the parameters `theta`.
-fn device(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
-    let mut device = problem.functions.empty_device();
+/// The system of an experiment for the parameters `theta`.
+fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
+    let mut nodal = problem.functions.empty_nodal();
     problem
         .functions
-        .device_into(theta, experiment.device, &mut device);
-    device
+        .nodal_into(theta, experiment.coefficient_set, &mut nodal);
+    nodal
 }
 
 /// The equation's errors, each times `root`, as residuals in the steps from `start`.
@@ -220,8 +220,8 @@ fn add_rows(
     sub: &mut Subproblem,
 ) {
     let functions = &problem.functions;
-    let assembly = functions.assembly(experiment.device);
-    let errors = measured.errors(problem, &device(problem, experiment, start));
+    let assembly = functions.coefficient_set(experiment.coefficient_set);
+    let errors = measured.errors(problem, &nodal(problem, experiment, start));
     for (i, (&TimePoint { step, fraction }, error)) in
         measured.places.iter().zip(errors).enumerate()
     {
@@ -241,12 +241,12 @@ fn add_rows(
 }
 
 /// The constraints, and where nothing fixes the common scale of all functions, the mean of the mass
-/// at its start: without it the equation is solved by no device at all.
+/// at its start: without it the equation is solved by no system at all.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
     if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
         let grid = &problem.system.grid;
-        let mut ones = problem.functions.empty_device();
+        let mut ones = problem.functions.empty_nodal();
         ones.mass
             .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
         let row = problem.functions.transpose(&ones);
@@ -291,20 +291,20 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     })
 }
 
-/// `start` with the initial states that are sought taken from the motions, where these begin.
+/// `start` with the initial states that are estimated taken from the responses, where these begin.
 pub(in crate::solvers) fn with_initial_states(
     problem: &Problem,
     start: &[f64],
-    motions: &[Option<Kinematics>],
+    kinematics: &[Option<Kinematics>],
 ) -> Vec<f64> {
     let mut theta = start.to_vec();
     let first = problem.functions.scalar_range().start;
-    for (experiment, motion) in problem.experiments.iter().zip(motions) {
-        let Some(state) = motion.as_ref().and_then(|m| m.initial) else {
+    for (experiment, measured_states) in problem.experiments.iter().zip(kinematics) {
+        let Some(state) = measured_states.as_ref().and_then(|m| m.initial) else {
             continue;
         };
         let values = [state.displacement, state.velocity];
-        for (index, value) in experiment.sought.into_iter().zip(values) {
+        for (index, value) in experiment.initial_parameters.into_iter().zip(values) {
             if let Some(index) = index {
                 theta[first + index] = value;
             }

@@ -18,7 +18,7 @@ use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
-use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
+use proposal::{Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, propose};
 
 /// First weight of the proximal term, relative to J.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -37,7 +37,7 @@ const NO_DECREASE: f64 = 1e-30;
 
 /// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
 const NEARBY: f64 = 1e-2;
-/// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
+/// ... and the decrease is as predicted to this share: where a response remembers long, its phase makes the Jacobian another
 /// one sooner. A step with the old one leaves about that share of the error, which one with its own would square.
 const AS_PREDICTED: f64 = 0.1;
 
@@ -72,11 +72,13 @@ impl StepRule for GaussNewton {
         while self.damping <= MOST_DAMPING {
             linear.damp(self.damping * point.evaluation.cost);
             let proposal = match propose(work, &linear.sub, point) {
-                Answer::Step(proposal) => proposal,
-                Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
+                ProposalOutcome::Step(proposal) => proposal,
+                ProposalOutcome::Unsolved(_)
+                    if Optimality::is_exact(problem, point.evaluation.cost) =>
+                {
                     return Step::Minimum(Reason::NegligibleResiduals);
                 }
-                Answer::Unsolved(status) => {
+                ProposalOutcome::Unsolved(status) => {
                     linear.trouble = Some(status);
                     self.damping *= 10.0;
                     continue;

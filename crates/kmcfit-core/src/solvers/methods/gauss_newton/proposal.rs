@@ -29,7 +29,7 @@ pub(super) struct Proposal {
 }
 
 /// What a subproblem gives.
-pub(super) enum Answer {
+pub(super) enum ProposalOutcome {
     Step(Proposal),
     /// No step: the subproblem could not be solved, for this reason.
     Unsolved(ConicStatus),
@@ -42,7 +42,7 @@ fn least_decrease(problem: &Problem, cost: f64) -> f64 {
 }
 
 /// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
-/// less than the rounding of the cost, or moves less than rounding moves the motion.
+/// less than the rounding of the cost, or moves less than rounding moves the response.
 pub(super) fn at_minimum(
     problem: &Problem,
     point: &Iterate,
@@ -66,7 +66,11 @@ pub(super) fn change(problem: &Problem, point: &Iterate, proposal: &Proposal) ->
 
 /// The best step that the subproblem offers in the constraint set. Staying is a step as well: whatever predicts
 /// a higher cost is no solution, and the next way is tried.
-pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Iterate) -> Answer {
+pub(super) fn propose(
+    work: &mut CountedEvaluator,
+    sub: &Subproblem,
+    point: &Iterate,
+) -> ProposalOutcome {
     let constraints = &work.problem().constraints;
     let cost = point.evaluation.cost;
     let least = least_decrease(work.problem(), cost);
@@ -79,7 +83,7 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
         is_inside.then_some(parameters)
     };
     let exact = |parameters: Vec<f64>, predicted: f64| {
-        Answer::Step(Proposal {
+        ProposalOutcome::Step(Proposal {
             parameters,
             predicted,
             uncertainty: 0.0,
@@ -115,18 +119,18 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
     let iterations = work.program_iterations;
     let solution = work.program(|| sub.solve_within(iterations));
     if !solution.status.is_point() {
-        return Answer::Unsolved(solution.status);
+        return ProposalOutcome::Unsolved(solution.status);
     }
     let Some(parameters) = moved(&solution.z) else {
-        return Answer::Unsolved(ConicStatus::Stalled);
+        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
     };
     // Not the program's own value: its solution satisfies the steps only to its accuracy.
     let model = model_cost(work, sub, point, &parameters);
     let predicted = cost - model;
     if !is_sound(&predicted) {
-        return Answer::Unsolved(ConicStatus::Stalled);
+        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
     }
-    Answer::Step(Proposal {
+    ProposalOutcome::Step(Proposal {
         parameters,
         predicted,
         uncertainty: match (solution.status, &solution.kkt) {
@@ -163,7 +167,7 @@ fn model_cost(
     near + problem.regularisation(parameters) + misfit
 }
 
-/// The cost of the readings with every prediction replaced by its linearisation, and every loss by
+/// The cost of the samples with every prediction replaced by its linearisation, and every loss by
 /// the squares that stand for it.
 fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
     let changes = problem.predictions_tangent(evaluation, delta);

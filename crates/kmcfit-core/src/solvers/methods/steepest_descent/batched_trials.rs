@@ -36,8 +36,8 @@ impl BatchedTrials {
                 let parameters = trial(point, length);
                 let mut evaluation = take(spare, problem);
                 let states = self.states(layout.place(which));
-                let has_motion = move_to(problem, &parameters, states, &mut evaluation);
-                evaluation.misfit = match has_motion {
+                let has_response = move_to(problem, &parameters, states, &mut evaluation);
+                evaluation.misfit = match has_response {
                     true => channel.cost(&evaluation.predictions[0][0]),
                     false => f64::INFINITY,
                 };
@@ -71,26 +71,26 @@ impl BatchedTrials {
     }
 }
 
-/// Device, motion and predictions at `parameters`, from states of the motion; whether it has one.
+/// System, response and predictions at `parameters`, from states of the response; whether it has one.
 fn move_to(
     problem: &Problem,
     parameters: &[f64],
     states: [Row; 2],
     evaluation: &mut Evaluation,
 ) -> bool {
-    (problem.functions).device_into(parameters, 0, &mut evaluation.device);
-    let (system, device) = (&problem.system, &evaluation.device);
-    let motion = &mut evaluation.trajectories[0];
+    (problem.functions).nodal_into(parameters, 0, &mut evaluation.nodal);
+    let (system, nodal) = (&problem.system, &evaluation.nodal);
+    let response = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
-    let is_whole = reconstruct(device, initial, states, system.grid.step(), motion);
-    if !is_whole && reference::forward_into(system, device, initial, None, motion).is_err() {
+    let is_whole = reconstruct(nodal, initial, states, system.grid.step(), response);
+    if !is_whole && reference::forward_into(system, nodal, initial, None, response).is_err() {
         return false;
     }
-    evaluation.predictions[0][0].clone_from(&motion.displacement);
+    evaluation.predictions[0][0].clone_from(&response.displacement);
     true
 }
 
-/// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
+/// The trials' systems as a ray, on the paper's own problem: one free record seen at every node, one
 /// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
 /// any other.
 pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
@@ -112,7 +112,7 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<Search
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,
-        readings: channel.observed(),
+        samples: channel.observed(),
         step: system.grid.step(),
     })
 }

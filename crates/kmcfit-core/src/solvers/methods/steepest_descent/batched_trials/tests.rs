@@ -27,10 +27,10 @@ fn problem() -> Problem {
     ];
     let functions = Parameterization::new(list, NODES, grid.step()).expect("functions");
     let times = grid.times().into_iter();
-    let readings = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
+    let samples = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     let initial = State {
         displacement: 1.0,
         velocity: 0.0,
@@ -86,7 +86,7 @@ fn steps_are_the_best_of_all_trials() {
     }
 }
 
-/// States that are not those of the motion lead to the motion all the same.
+/// States that are not those of the response lead to the response all the same.
 #[test]
 fn a_motion_does_not_depend_on_its_states() {
     let problem = problem();
@@ -96,7 +96,7 @@ fn a_motion_does_not_depend_on_its_states() {
     let mut found = problem.workspace();
     for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {
         assert!(move_to(&problem, &problem.start(), states, &mut found));
-        assert!(found.device == expected.device && found.trajectories == expected.trajectories);
+        assert!(found.nodal == expected.nodal && found.trajectories == expected.trajectories);
         assert!(found.predictions == expected.predictions);
     }
     let mut without_mass = problem.start();

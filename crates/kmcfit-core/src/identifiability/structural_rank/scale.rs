@@ -12,22 +12,22 @@ const MANY_KNOTS: usize = 5;
 const SAME_TIME: f64 = 1e-9;
 
 /// The scale of one component.
-pub(super) struct Scale {
-    space: Space,
+pub(super) struct CommonScale {
+    space: FactorSpace,
     /// Nodes at which a force acts or a function is known.
     forced: Vec<bool>,
     known: Vec<bool>,
     free_functions: usize,
 }
 
-impl Scale {
+impl CommonScale {
     pub fn of(problem: &Problem, component: &Component) -> Self {
         let free: Vec<&CoefficientFunction> = (component.functions.iter())
             .map(|f| problem.functions.get(*f))
             .filter(|f| f.parameters() > 0)
             .collect();
         Self {
-            space: Space::of(problem, &free),
+            space: FactorSpace::of(problem, &free),
             forced: component.forced(problem),
             known: component.known(problem),
             free_functions: free.len(),
@@ -46,11 +46,11 @@ impl Scale {
     pub fn directions(&self, visible: &[bool]) -> usize {
         let free = |i: &usize| self.is_free(*i);
         match &self.space {
-            Space::Nodes => (0..visible.len())
+            FactorSpace::Nodes => (0..visible.len())
                 .filter(free)
                 .filter(|i| visible[*i])
                 .count(),
-            Space::Cells(cells) => {
+            FactorSpace::Cells(cells) => {
                 let last = cells.last().map_or(0, |c| c + 1);
                 let nodes = |c: usize| (0..cells.len()).filter(move |i| cells[*i] == c);
                 let counts = |c: &usize| {
@@ -59,14 +59,14 @@ impl Scale {
                 };
                 (0..last).filter(counts).count()
             }
-            Space::Constant { .. } => usize::from(self.all_free() && visible.contains(&true)),
+            FactorSpace::Constant { .. } => usize::from(self.all_free() && visible.contains(&true)),
         }
     }
 
     pub fn free_on(&self, problem: &Problem) -> Vec<[f64; 2]> {
         let times = problem.system.grid.times();
         match self.space {
-            Space::Constant { .. } if !self.all_free() => Vec::new(),
+            FactorSpace::Constant { .. } if !self.all_free() => Vec::new(),
             _ => spans(&times, |i| self.is_free(i)),
         }
     }
@@ -75,9 +75,9 @@ impl Scale {
     pub fn left(&self, problem: &Problem, component: &Component) -> (Symmetry, RankFinding) {
         let symbols = component.symbols(problem);
         let by_records = match &self.space {
-            Space::Constant { .. } if !self.all_free() => Symmetry::None,
-            Space::Constant { nearly_more: true } => Symmetry::NearlyFunction,
-            Space::Constant { nearly_more: false } => Symmetry::ConstantFactor,
+            FactorSpace::Constant { .. } if !self.all_free() => Symmetry::None,
+            FactorSpace::Constant { nearly_more: true } => Symmetry::NearlyFunction,
+            FactorSpace::Constant { nearly_more: false } => Symmetry::ConstantFactor,
             _ if !(0..self.forced.len()).any(|i| self.is_free(i)) => Symmetry::None,
             _ => Symmetry::Function,
         };
@@ -174,7 +174,7 @@ impl Scale {
 }
 
 /// The factors `s(t)` that keep all functions in their bases.
-enum Space {
+enum FactorSpace {
     Nodes,
     /// Constant on each cell: the cell of every node.
     Cells(Vec<usize>),
@@ -183,7 +183,7 @@ enum Space {
     },
 }
 
-impl Space {
+impl FactorSpace {
     pub fn of(problem: &Problem, free: &[&CoefficientFunction]) -> Self {
         let grid = &problem.system.grid;
         let offset = |f: &&&CoefficientFunction| f.offset.iter().any(|b| *b != 0.0);

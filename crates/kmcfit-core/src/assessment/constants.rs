@@ -55,7 +55,7 @@ pub fn constant_probability(
     let p = match problem.channels().all(is_given) {
         true => ChiSquared::new(degrees).ok()?.sf(distance),
         false => {
-            let left = problem.reading_count().checked_sub(problem.parameters())?;
+            let left = problem.sample_count().checked_sub(problem.parameters())?;
             let law = FisherSnedecor::new(degrees, left as f64).ok()?;
             law.sf(distance / degrees)
         }

@@ -1,13 +1,13 @@
-//! The extreme devices among all that explain the readings as well as stated.
+//! The extreme systems among all that explain the samples as well as stated.
 //!
-//! For a number `q` of the device (a function's value, or `k/m`, at a time)
+//! For a number `q` of the system (a function's value, or `k/m`, at a time)
 //!
 //! ```text
 //! max or min q(theta)   subject to   misfit(theta) <= level,  the model's constraints,
 //!                                    |L_j theta_j - target_j|^2 <= budget_j  (if stated)
 //! ```
 //!
-//! over many times this is the widest tube. `misfit` is that of the readings plus the priors of the
+//! over many times this is the widest tube. `misfit` is that of the samples plus the priors of the
 //! scalars; penalties have no part in it but through the budgets. It is solved by sequential convex
 //! programming: the predictions are linearised, so that the level is one second-order cone
 //! `|W (r + J d)| <= sqrt(level)`, with a box of changing size as trust region; a trial that is
@@ -15,7 +15,7 @@
 //! fresh forward solve. With many parameters the states are unknowns beside them, tied by the
 //! linearised steps.
 //!
-//! The result is a device, so the tube is at least as wide as stated; that it is not wider still is
+//! The result is a system, so the tube is at least as wide as stated; that it is not wider still is
 //! known only as far as the local search goes, and more starts can only widen it.
 //!
 //! The question is that of the pull-apart search of Data2Dynamics. Source of the method: A. R. Conn,
@@ -33,22 +33,22 @@ use crate::functions::Penalty;
 use crate::problem::Problem;
 use search::Search;
 
-/// What bounds the devices beside the problem's own constraints.
+/// What bounds the systems beside the problem's own constraints.
 #[derive(Debug, Clone)]
-pub struct Level {
-    /// Largest misfit, in the unit of the cost: for readings with sigma the best chi-square plus a
+pub struct MisfitLimit {
+    /// Largest misfit, in the unit of the cost: for samples with sigma the best chi-square plus a
     /// quantile, or a stated J.
     pub misfit: f64,
     /// Penalties whose `|L theta - target|^2` must not exceed the number beside it.
     pub budgets: Vec<(Penalty, f64)>,
-    /// No number is pushed beyond so many times its natural size: free motion has no upper end for a
+    /// No number is pushed beyond so many times its natural size: free response has no upper end for a
     /// mass.
     pub reach: f64,
     /// Most convex programs for one extreme.
     pub programs: usize,
 }
 
-impl Level {
+impl MisfitLimit {
     /// A misfit, and nothing else; numbers up to ten times their natural sizes.
     pub fn of(misfit: f64) -> Self {
         Self {
@@ -62,18 +62,18 @@ impl Level {
 
 /// How the search for an extreme ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum ExtremeStatus {
     /// No step of the convex programs gains any more.
-    Settled,
+    Converged,
     /// The stated reach is met: the number has no end before it.
-    Reach,
+    SearchLimit,
     /// No trial could be brought back to the level.
-    Stuck,
+    NoFeasibleStep,
     /// The programs ran out.
-    Programs,
+    ProgramLimit,
 }
 
-/// An extreme device.
+/// An extreme system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extreme {
     /// The number pushed, as in `mass at 3 s`.
@@ -84,18 +84,18 @@ pub struct Extreme {
     pub largest: bool,
     /// Its value.
     pub value: f64,
-    /// The device, and the scalars.
+    /// The system, and the scalars.
     pub parameters: Vec<f64>,
     /// Misfit by a fresh forward solve, at most the level.
     pub misfit: f64,
     /// How the search ended.
-    pub ended: Ended,
+    pub ended: ExtremeStatus,
     /// Convex programs solved.
     pub programs: usize,
 }
 
 impl Extreme {
-    /// Name of the device, as in `largest mass at 3 s`.
+    /// Name of the system, as in `largest mass at 3 s`.
     pub fn name(&self) -> String {
         let way = if self.largest { "largest" } else { "smallest" };
         format!("{way} {}", self.function)
@@ -104,10 +104,10 @@ impl Extreme {
 
 /// Both ends of one number.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Band {
-    /// The device with the smallest value.
+pub struct ExtremePair {
+    /// The system with the smallest value.
     pub low: Extreme,
-    /// The device with the largest.
+    /// The system with the largest.
     pub high: Extreme,
 }
 
@@ -130,13 +130,13 @@ pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) ->
 
 /// Both extremes of every target, each from all `starts` that are within the level, on up to
 /// `threads` threads; `None` if no start is.
-pub fn tube(
+pub fn extreme_pairs(
     problem: &Problem,
     starts: &[Vec<f64>],
     targets: &[Target],
-    level: &Level,
+    level: &MisfitLimit,
     threads: usize,
-) -> Option<Vec<Band>> {
+) -> Option<Vec<ExtremePair>> {
     let search = Search { problem, level };
     let usable: Vec<&Vec<f64>> = starts
         .iter()
@@ -158,7 +158,7 @@ pub fn tube(
     let mut extremes = map(2 * targets.len(), threads, job).into_iter();
     let mut bands = Vec::with_capacity(targets.len());
     while let (Some(low), Some(high)) = (extremes.next(), extremes.next()) {
-        bands.push(Band { low, high });
+        bands.push(ExtremePair { low, high });
     }
     Some(bands)
 }
@@ -169,7 +169,7 @@ pub fn extreme(
     start: &[f64],
     target: &Target,
     largest: bool,
-    level: &Level,
+    level: &MisfitLimit,
 ) -> Option<Extreme> {
     let side = if largest { 1.0 } else { -1.0 };
     Search { problem, level }.extreme(start, target, side)

@@ -1,12 +1,12 @@
-//! Counts of the work of a fit.
+//! SolveCounts of the work of a fit.
 
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// How often the equations were solved; one count is one pass over all experiments, or over the part of them that a
-/// start is sought in.
+/// start is estimated in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
+pub struct SolveCounts {
     /// Forward solves.
     pub forward: u64,
     /// Adjoint solves.
@@ -22,7 +22,7 @@ pub(super) const ADJOINT: &str = "adjoint_count";
 pub(super) const TANGENT: &str = "tangent_count";
 pub(super) const QP: &str = "qp_count";
 
-impl std::ops::Add for Counts {
+impl std::ops::Add for SolveCounts {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -35,13 +35,13 @@ impl std::ops::Add for Counts {
     }
 }
 
-impl std::ops::AddAssign for Counts {
+impl std::ops::AddAssign for SolveCounts {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl Counts {
+impl SolveCounts {
     pub(super) fn of(problem: &argmin::core::Problem<&Problem>) -> Self {
         let count = |key| problem.counts.get(key).copied().unwrap_or(0);
         Self {

@@ -18,11 +18,11 @@ pub struct Refined {
 }
 
 impl Problem {
-    /// The same devices and scalars on a grid of half the step: functions stay linear between the
-    /// old nodes, forces are sampled anew. `None` where readings do not lie on the finer grid.
+    /// The same systems and scalars on a grid of half the step: functions stay linear between the
+    /// old nodes, forces are sampled anew. `None` where samples do not lie on the finer grid.
     ///
     /// # Errors
-    /// A [`SimulationError`] if there is no motion on the finer grid.
+    /// A [`SimulationError`] if there is no response on the finer grid.
     pub fn on_half_step(
         &self,
         evaluation: &Evaluation,
@@ -43,20 +43,20 @@ impl Problem {
             let Some(experiment) = experiment.halved(&grid) else {
                 return Ok(None);
             };
-            let device = halved(evaluation.device_of(experiment.device));
-            let mut motion = Trajectory::zeros(experiment.nodes);
+            let nodal = halved(evaluation.nodal_of(experiment.coefficient_set));
+            let mut response = Trajectory::zeros(experiment.nodes);
             reference::forward_into(
                 &system,
-                &device,
+                &nodal,
                 experiment.initial_state(&evaluation.scalars),
                 experiment.excitation.as_ref(),
-                &mut motion,
+                &mut response,
             )?;
             let view = SimulatedRecord {
                 system: &system,
-                device: &device,
+                nodal: &nodal,
                 excitation: experiment.excitation.as_ref(),
-                motion: &motion,
+                response: &response,
                 scalars: &evaluation.scalars,
             };
             let mut changes = Vec::new();
@@ -73,13 +73,13 @@ impl Problem {
 }
 
 /// Functions that are linear between the old nodes, on the old nodes and half-way between them.
-fn halved(device: &NodalCoefficients) -> NodalCoefficients {
+fn halved(nodal: &NodalCoefficients) -> NodalCoefficients {
     let finer = |f: &[f64]| -> Vec<f64> {
         let pairs = f.windows(2).flat_map(|w| [w[0], 0.5 * (w[0] + w[1])]);
         pairs.chain(f.last().copied()).collect()
     };
     NodalCoefficients {
-        mass: finer(&device.mass),
-        coefficients: device.coefficients.iter().map(|f| finer(f)).collect(),
+        mass: finer(&nodal.mass),
+        coefficients: nodal.coefficients.iter().map(|f| finer(f)).collect(),
     }
 }

@@ -1,6 +1,8 @@
 //! Envelopes of all coefficient functions and of their ratios to the mass, within a misfit that the confidence allows.
 
-use super::{Band, Ended, Extreme, Level, ratios_at, tube, values_at};
+use super::{
+    Extreme, ExtremePair, ExtremeStatus, MisfitLimit, extreme_pairs, ratios_at, values_at,
+};
 use crate::diagnostics::chi_square_one;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
@@ -19,10 +21,10 @@ pub struct Envelope {
     /// Its unit.
     pub unit: &'static str,
     /// The extremes at each time.
-    pub bands: Vec<Band>,
+    pub bands: Vec<ExtremePair>,
 }
 
-impl Level {
+impl MisfitLimit {
     /// The misfit `asked` for, or the one that a confidence allows, with budgets of roughness where the fit has penalties.
     pub fn at(
         problem: &Problem,
@@ -36,7 +38,7 @@ impl Level {
         let mut level = Self::of(asked.unwrap_or_else(|| match has_sigma {
             true => evaluation.misfit + quantile,
             // n ln J rises by the quantile.
-            false => evaluation.misfit * (quantile / problem.reading_count() as f64).exp(),
+            false => evaluation.misfit * (quantile / problem.sample_count() as f64).exp(),
         }));
         level.budgets = (problem.penalties.iter())
             .map(|penalty| {
@@ -51,9 +53,11 @@ impl Level {
 
 impl Extreme {
     /// How the search ended; one that was stuck at the level has nothing left to gain.
-    pub fn ended_at(&self, level: &Level) -> Ended {
+    pub fn ended_at(&self, level: &MisfitLimit) -> ExtremeStatus {
         match self.ended {
-            Ended::Stuck if self.misfit >= AT_LEVEL * level.misfit => Ended::Settled,
+            ExtremeStatus::NoFeasibleStep if self.misfit >= AT_LEVEL * level.misfit => {
+                ExtremeStatus::Converged
+            }
             ended => ended,
         }
     }
@@ -64,11 +68,11 @@ impl Extreme {
 pub fn envelopes(
     problem: &Problem,
     theta: &[f64],
-    level: &Level,
+    level: &MisfitLimit,
     times: &[f64],
     threads: usize,
 ) -> Vec<Envelope> {
-    let main = problem.functions.assembly(0);
+    let main = problem.functions.coefficient_set(0);
     let mut jobs = Vec::new();
     for &f in main {
         let function = problem.functions.get(f);
@@ -92,7 +96,7 @@ pub fn envelopes(
     }
     let starts = [theta.to_vec()];
     let envelopes = jobs.into_iter().filter_map(|(name, unit, targets)| {
-        let bands = tube(problem, &starts, &targets, level, threads)?;
+        let bands = extreme_pairs(problem, &starts, &targets, level, threads)?;
         Some(Envelope { name, unit, bands })
     });
     envelopes.collect()

@@ -1,6 +1,6 @@
-//! Other devices with the very same motion.
+//! Other systems with the very same response.
 //!
-//! Along a known motion `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
+//! Along a known response `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
 //!
 //! ```text
 //! k = (f - m a - c v) / y
@@ -17,7 +17,7 @@
 //! as one quadratic program with both functions as unknowns: at the crossings the equation itself
 //! holds the anchor, and nothing is divided by a small `y`. `C` and `K` are the sizes at which damping
 //! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
-//! a stepper of order two reproduces the motion to the square of its step.
+//! a stepper of order two reproduces the response to the square of its step.
 
 use super::refit::positive_rms;
 use crate::objective::Evaluation;
@@ -27,12 +27,12 @@ use crate::system::quadrature::trapezoid_weights;
 use crate::system::{Grid, NodalCoefficients};
 
 /// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
-/// record, so that the wish comes first between the anchors.
+/// record, so that the options comes first between the anchors.
 const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
 
-/// A motion at the nodes of a grid, and the force that drives it.
+/// A response at the nodes of a grid, and the force that drives it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
+pub struct TargetResponse {
     /// The nodes.
     pub grid: Grid,
     /// `y`, m.
@@ -45,12 +45,12 @@ pub struct Motion {
     pub force: Vec<f64>,
 }
 
-impl Motion {
-    /// The motion of experiment `e` of a fit, its acceleration from the equation itself.
+impl TargetResponse {
+    /// The response of experiment `e` of a fit, its acceleration from the equation itself.
     pub fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Self {
         let experiment = &problem.experiments[e];
-        let device = evaluation.device_of(experiment.device);
-        let motion = &evaluation.trajectories[e];
+        let nodal = evaluation.nodal_of(experiment.coefficient_set);
+        let response = &evaluation.trajectories[e];
         let nodes = experiment.nodes;
         let excitation = experiment.excitation.as_ref();
         let force = excitation
@@ -58,26 +58,26 @@ impl Motion {
             .map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
-            let terms = problem.system.terms.iter().zip(&device.coefficients);
-            let (y, v) = (motion.displacement[i], motion.velocity[i]);
+            let terms = problem.system.terms.iter().zip(&nodal.coefficients);
+            let (y, v) = (response.displacement[i], response.velocity[i]);
             let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
-            (force[i] - resisting) / device.mass[i]
+            (force[i] - resisting) / nodal.mass[i]
         };
         let grid = problem.system.grid;
         let length = grid.step() * (nodes - 1) as f64;
         Self {
             grid: Grid::new(grid.start(), length, nodes).unwrap_or(grid),
-            displacement: motion.displacement.clone(),
-            velocity: motion.velocity.clone(),
+            displacement: response.displacement.clone(),
+            velocity: response.velocity.clone(),
             acceleration: (0..nodes).map(acceleration).collect(),
             force,
         }
     }
 }
 
-/// Which of the devices with the motion is wanted.
+/// Which of the systems with the response is wanted.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wish {
+pub struct EquivalentOptions {
     /// The damping to be near to, N s/m at the nodes.
     pub damping: Vec<f64>,
     /// Least stiffness, N/m.
@@ -88,7 +88,7 @@ pub struct Wish {
     pub smoothness: [f64; 2],
 }
 
-impl Wish {
+impl EquivalentOptions {
     /// Near to `damping`, with a stiffness of at least `least_stiffness` (N/m).
     pub fn near(damping: Vec<f64>, least_stiffness: f64) -> Self {
         Self {
@@ -100,28 +100,32 @@ impl Wish {
     }
 }
 
-/// The device with mass `mass` (kg at the nodes), damping near the wish, and the stiffness that gives
-/// it the motion; `Err` says how the program ended where there is none, as where a crossing asks for
-/// less damping than the wish allows.
+/// The system with mass `mass` (kg at the nodes), damping near the options, and the stiffness that gives
+/// it the response; `Err` says how the program ended where there is none, as where a crossing asks for
+/// less damping than the options allows.
 ///
 /// # Panics
-/// If mass, motion and wish do not have one value per node.
-pub fn equivalent(
+/// If mass, response and options do not have one value per node.
+pub fn equivalent_coefficients(
     mass: &[f64],
-    motion: &Motion,
-    wish: &Wish,
+    response: &TargetResponse,
+    options: &EquivalentOptions,
 ) -> Result<NodalCoefficients, ConicStatus> {
-    let n = motion.grid.nodes();
-    let lengths = [mass.len(), motion.displacement.len(), wish.damping.len()];
+    let n = response.grid.nodes();
+    let lengths = [
+        mass.len(),
+        response.displacement.len(),
+        options.damping.len(),
+    ];
     assert_eq!(lengths, [n; 3], "one value per node");
-    let step = motion.grid.step();
-    let duration = motion.grid.duration();
+    let step = response.grid.step();
+    let duration = response.grid.duration();
     let needed: Vec<f64> = (0..n)
-        .map(|i| motion.force[i] - mass[i] * motion.acceleration[i])
+        .map(|i| response.force[i] - mass[i] * response.acceleration[i])
         .collect();
     let inertia = positive_rms(&needed);
     let over = |f: &[f64]| inertia / positive_rms(f);
-    let [large_c, large_k] = [over(&motion.velocity), over(&motion.displacement)];
+    let [large_c, large_k] = [over(&response.velocity), over(&response.displacement)];
 
     // Unknowns: c/C at the nodes, then k/K.
     let mut sub = Subproblem::new(2 * n);
@@ -129,29 +133,29 @@ pub fn equivalent(
     for (i, w) in weights.iter().enumerate() {
         let root = (w / duration).sqrt();
         sub.residuals
-            .push([(i, root)], root * wish.damping[i] / large_c);
+            .push([(i, root)], root * options.damping[i] / large_c);
     }
-    let slope = (wish.smoothness[0] * duration / step).sqrt();
+    let slope = (options.smoothness[0] * duration / step).sqrt();
     for i in 0..n - 1 {
         sub.residuals.push([(i, -slope), (i + 1, slope)], 0.0);
     }
-    let bend = (wish.smoothness[1] * (duration / step).powi(3)).sqrt();
+    let bend = (options.smoothness[1] * (duration / step).powi(3)).sqrt();
     for i in n + 1..2 * n - 1 {
         sub.residuals
             .push([(i - 1, bend), (i, -2.0 * bend), (i + 1, bend)], 0.0);
     }
     for (i, needed) in needed.iter().enumerate() {
         let row = [
-            (i, large_c * motion.velocity[i] / inertia),
-            (n + i, large_k * motion.displacement[i] / inertia),
+            (i, large_c * response.velocity[i] / inertia),
+            (n + i, large_k * response.displacement[i] / inertia),
         ];
         sub.equalities.push(row, needed / inertia);
         sub.bound(
             [(n + i, 1.0)],
-            wish.least_stiffness / large_k,
+            options.least_stiffness / large_k,
             f64::INFINITY,
         );
-        if let Some(least) = wish.least_damping {
+        if let Some(least) = options.least_damping {
             sub.bound([(i, 1.0)], least / large_c, f64::INFINITY);
         }
     }
@@ -173,30 +177,30 @@ pub fn equivalent(
 
 /// What the crossings of zero anchor: time (s) and damping (N s/m) for the mass `mass`, between
 /// nodes by linear interpolation; as far from `c` as the square of the step.
-pub fn anchors(mass: &[f64], motion: &Motion) -> Vec<(f64, f64)> {
-    let y = &motion.displacement;
+pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
+    let y = &response.displacement;
     let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
     let crossing = |i: usize| {
         (y[i] * y[i + 1] <= 0.0 && y[i] != y[i + 1] && y[i + 1] != 0.0).then(|| {
             let share = y[i] / (y[i] - y[i + 1]);
             let force = at(i, share, &|i| {
-                motion.force[i] - mass[i] * motion.acceleration[i]
+                response.force[i] - mass[i] * response.acceleration[i]
             });
-            let velocity = at(i, share, &|i| motion.velocity[i]);
-            let time = motion.grid.time(i) + share * motion.grid.step();
+            let velocity = at(i, share, &|i| response.velocity[i]);
+            let time = response.grid.time(i) + share * response.grid.step();
             (time, force / velocity)
         })
     };
     (0..y.len() - 1).filter_map(crossing).collect()
 }
 
-/// How far the equation is from holding along the motion for `device`, N at the nodes.
-pub fn imbalance(device: &NodalCoefficients, motion: &Motion) -> Vec<f64> {
+/// How far the equation is from holding along the response for `system`, N at the nodes.
+pub fn imbalance(nodal: &NodalCoefficients, response: &TargetResponse) -> Vec<f64> {
     let at = |i: usize| {
-        device.mass[i] * motion.acceleration[i]
-            + device.coefficients[0][i] * motion.velocity[i]
-            + device.coefficients[1][i] * motion.displacement[i]
-            - motion.force[i]
+        nodal.mass[i] * response.acceleration[i]
+            + nodal.coefficients[0][i] * response.velocity[i]
+            + nodal.coefficients[1][i] * response.displacement[i]
+            - response.force[i]
     };
-    (0..motion.grid.nodes()).map(at).collect()
+    (0..response.grid.nodes()).map(at).collect()
 }

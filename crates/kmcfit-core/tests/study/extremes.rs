@@ -1,14 +1,14 @@
-use crate::common::{INITIAL, csv, paper_device, paper_problem, shared};
+use crate::common::{INITIAL, csv, paper_problem, paper_system, shared};
 use crate::problems::{linear, regular};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::profile::QUANTILE_95;
-use kmcfit_core::internals::study::pull_apart::{
-    Ended, Level, extreme, ratios_at, tube, values_at,
+use kmcfit_core::internals::study::extremes::{
+    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, ratios_at, values_at,
 };
+use kmcfit_core::internals::study::profile::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, ProfileSettings, Target, profile};
 
 fn optimum(problem: &Problem) -> (Vec<f64>, f64) {
@@ -25,7 +25,7 @@ fn the_extremes_of_an_ellipse_are_those_of_its_closed_form() {
     let covariance = problem
         .covariance(&problem.evaluate(&best).unwrap())
         .unwrap();
-    let level = Level::of(misfit + QUANTILE_95);
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
     let mixed = Linear {
         entries: vec![(0, 1.0), (1, -0.5)],
         ..Linear::parameter(0)
@@ -43,7 +43,7 @@ fn the_extremes_of_an_ellipse_are_those_of_its_closed_form() {
                 found.programs
             );
             assert!((found.value - expected).abs() < 1e-6 * half, "{found:?}");
-            assert_eq!(found.ended, Ended::Settled);
+            assert_eq!(found.ended, ExtremeStatus::Converged);
             let fresh = problem.evaluate(&found.parameters).unwrap().misfit;
             assert!(fresh == found.misfit && fresh <= level.misfit);
         }
@@ -55,12 +55,12 @@ fn the_extremes_of_an_ellipse_are_those_of_its_closed_form() {
 fn the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
     let (best, misfit) = optimum(&problem);
-    let level = Level::of(misfit + QUANTILE_95);
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
     for j in 0..2 {
         let q = Linear::parameter(j);
         let profile = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
         let [low, high] = profile.interval.map(Option::unwrap);
-        let bands = tube(
+        let bands = extreme_pairs(
             &problem,
             std::slice::from_ref(&best),
             &[Target::Linear(q)],
@@ -71,14 +71,14 @@ fn the_extremes_are_the_ends_of_the_profile() {
         let found = [bands[0].low.value, bands[0].high.value];
         println!("{found:?} {low} {high}");
         let q = Target::Linear(Linear::parameter(j));
-        let one = tube(&problem, std::slice::from_ref(&best), &[q], &level, 1).unwrap();
+        let one = extreme_pairs(&problem, std::slice::from_ref(&best), &[q], &level, 1).unwrap();
         assert_eq!(one, bands, "the threads change no bit");
         let tolerance = 1e-6 * (high - low);
         assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
     }
 }
 
-/// A robust loss, with readings that are far off: still the same question.
+/// A robust loss, with samples that are far off: still the same question.
 #[test]
 fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
@@ -92,16 +92,16 @@ fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
         .with(|parts| parts.experiments[0].channels[0] = channel)
         .unwrap();
     let (best, misfit) = optimum(&problem);
-    let level = Level::of(misfit + QUANTILE_95);
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
     let q = Linear::parameter(1);
     let how = ProfileSettings::default();
     let profile = profile(&problem, &best, &q, &how).unwrap();
     let [low, high] = profile.interval.map(Option::unwrap);
     let targets = [Target::Linear(q)];
-    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let found = [bands[0].low.value, bands[0].high.value];
     println!("{found:?} {low} {high}");
-    // Few readings change sides of the threshold near the level, so reweighting loses little: 1e-7.
+    // Few samples change sides of the threshold near the level, so reweighting loses little: 1e-7.
     let tolerance = 1e-5 * (high - low);
     assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
 }
@@ -126,21 +126,21 @@ fn positive() -> Problem {
 }
 
 /// 200 nodes, the misfit of the paper's own optimum, 0.0114 m^2 s: the tubes, started at the true
-/// device alone, hold the paper's optimum too.
+/// system alone, hold the paper's optimum too.
 #[test]
 fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
-    let device = paper_device(NODES);
+    let nodal = paper_system(NODES);
     let truth = [
-        &device.mass[..],
-        &device.coefficients[0],
-        &device.coefficients[1],
+        &nodal.mass[..],
+        &nodal.coefficients[0],
+        &nodal.coefficients[1],
     ]
     .concat();
-    let level = Level {
+    let level = MisfitLimit {
         reach: 4.0,
         programs: 25,
-        ..Level::of(0.0114)
+        ..MisfitLimit::of(0.0114)
     };
     let times = [5.0, 15.0];
     let optimum = shared("reference").map(|folder| csv(&folder.join("paper_optimum.csv")));
@@ -148,7 +148,8 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     for f in 0..3 {
         let targets = values_at(&problem, f, &times);
         let clock = std::time::Instant::now();
-        let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
+        let bands =
+            extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
         for (band, time) in bands.iter().zip(times) {
             let [low, high] = [&band.low, &band.high];
             println!(
@@ -186,7 +187,7 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     }
 }
 
-/// k/m, which free motion shows, has a bounded tube where k and m have none.
+/// k/m, which free response shows, has a bounded tube where k and m have none.
 #[test]
 fn ratios_have_tubes_of_their_own() {
     let problem = regular(3);
@@ -199,9 +200,9 @@ fn ratios_have_tubes_of_their_own() {
         .with(|parts| parts.functions = functions.unwrap())
         .unwrap();
     let (best, misfit) = optimum(&problem);
-    let level = Level::of(misfit + QUANTILE_95);
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
     let targets = ratios_at(&problem, 2, 0, &[3.0]);
-    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let (known, start) = (regular(3), best[2] / best[0]);
     let (fixed, _) = optimum(&known);
     let profile = profile(
@@ -229,31 +230,32 @@ fn roughness_budgets_bound_the_tubes() {
     let mut problem = positive();
     let k0 = problem.functions.ranges()[2].start;
     crate::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);
-    let device = paper_device(NODES);
+    let nodal = paper_system(NODES);
     let truth = [
-        &device.mass[..],
-        &device.coefficients[0],
-        &device.coefficients[1],
+        &nodal.mass[..],
+        &nodal.coefficients[0],
+        &nodal.coefficients[1],
     ]
     .concat();
     let grid = problem.system.grid;
     let mut before: Option<[f64; 2]> = None;
     for budget in [1e-3, 1e-5] {
         let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
-        let level = Level {
+        let level = MisfitLimit {
             budgets: (0..3).map(|f| (rows(f), budget)).collect(),
-            ..Level::of(0.0114)
+            ..MisfitLimit::of(0.0114)
         };
         let targets = values_at(&problem, 0, &[15.0]);
         let clock = std::time::Instant::now();
-        let band = &tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap()[0];
+        let band =
+            &extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap()[0];
         let ends = [&band.low, &band.high];
         println!(
             "budget {budget:e}: {:?} in {:.1} s",
             ends.map(|e| (e.value, e.ended, e.programs)),
             clock.elapsed().as_secs_f64()
         );
-        let exact = device.mass[(15.0 / grid.step()) as usize];
+        let exact = nodal.mass[(15.0 / grid.step()) as usize];
         assert!(band.low.value < exact && exact < band.high.value);
         for end in ends {
             assert!(end.misfit <= 0.0114);
@@ -281,9 +283,9 @@ fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
     let problem = paper_problem(n, [2.0, 1.0, 1.0]);
     let column = |c: usize| rows.iter().map(|r| r[c]).collect::<Vec<f64>>();
     let optimum = [column(1), column(3), column(2)].concat();
-    let level = Level {
+    let level = MisfitLimit {
         programs: 4,
-        ..Level::of(0.0114)
+        ..MisfitLimit::of(0.0114)
     };
     let clock = std::time::Instant::now();
     let q = values_at(&problem, 0, &[12.5]).remove(0);

@@ -1,13 +1,13 @@
 //! Sequential convex programming for one extreme.
 
-use super::{Ended, Extreme, Level};
+use super::{Extreme, ExtremeStatus, MisfitLimit};
 use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, Subproblem};
 use crate::record::{Channel, Loss};
-use crate::solvers::{add_priors, linear_readings};
+use crate::solvers::{add_priors, linear_predictions};
 use crate::study::functional::Target;
 use crate::study::refit::{positive_rms, sizes};
 
@@ -26,7 +26,7 @@ const CORRECTIONS: usize = 6;
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.2;
 
-/// The misfit of the readings plus the priors.
+/// The misfit of the samples plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     let scalars = problem.functions.scalars().iter();
     let priors = scalars
@@ -38,18 +38,18 @@ fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
 /// One problem and one level.
 pub struct Search<'a> {
     pub problem: &'a Problem,
-    pub level: &'a Level,
+    pub level: &'a MisfitLimit,
 }
 
 /// Parameters within the level, with their forward solve.
-pub struct Within {
+pub struct FeasiblePoint {
     parameters: Vec<f64>,
     evaluation: Evaluation,
     misfit: f64,
 }
 
 /// A step of the search.
-struct Proposal {
+struct SearchStep {
     trial: Vec<f64>,
     /// What the linearised problem promises.
     gain: f64,
@@ -59,7 +59,7 @@ struct Proposal {
 
 impl Search<'_> {
     /// The forward solve at `theta`, if it is within level, budgets and constraints.
-    pub fn point(&self, theta: &[f64]) -> Option<Within> {
+    pub fn point(&self, theta: &[f64]) -> Option<FeasiblePoint> {
         let evaluation = self.problem.evaluate(theta).ok()?;
         let misfit = measure(self.problem, theta, &evaluation);
         let ranges = self.problem.functions.ranges();
@@ -69,7 +69,7 @@ impl Search<'_> {
         let fits = misfit <= self.level.misfit
             && self.problem.constraints.hold(theta, constraints::TOLERANCE)
             && self.level.budgets.iter().all(rough);
-        fits.then(|| Within {
+        fits.then(|| FeasiblePoint {
             parameters: theta.to_vec(),
             evaluation,
             misfit,
@@ -81,20 +81,20 @@ impl Search<'_> {
         let mut here = self.point(start)?;
         let sizes = sizes(self.problem, start);
         let mut radius = FIRST_RADIUS;
-        let (mut ended, mut programs) = (Ended::Programs, 0);
+        let (mut ended, mut programs) = (ExtremeStatus::ProgramLimit, 0);
         let size = target_size(target, start, &sizes);
         let reach = self.level.reach * size;
         while programs < self.level.programs {
             let value = target.of(&here.parameters);
             if side * value >= reach * (1.0 - 1e-6) {
-                ended = Ended::Reach;
+                ended = ExtremeStatus::SearchLimit;
                 break;
             }
             programs += 1;
             let proposal = self.push(&here, target, side, radius, reach, &sizes);
             let gain = proposal.as_ref().map_or(0.0, |p| p.gain);
             if proposal.as_ref().is_some_and(|p| p.is_largest) && gain <= SETTLED * size {
-                ended = Ended::Settled;
+                ended = ExtremeStatus::Converged;
                 break;
             }
             let next = proposal.and_then(|p| self.restored(p.trial, &sizes));
@@ -113,7 +113,7 @@ impl Search<'_> {
                 _ => radius *= 0.25,
             }
             if radius < RADII[0] {
-                ended = Ended::Stuck;
+                ended = ExtremeStatus::NoFeasibleStep;
                 break;
             }
         }
@@ -132,13 +132,13 @@ impl Search<'_> {
     /// The linearised problem about `theta`: the level as a cone, constraints and budgets, in
     /// variables measured by `units`.
     fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
-        let mut sub = linear_readings(self.problem, evaluation);
+        let mut sub = linear_predictions(self.problem, evaluation);
         let surplus = self.surplus(&sub, evaluation);
         add_priors(self.problem, theta, &mut sub);
-        let readings = std::mem::take(&mut sub.residuals);
+        let samples = std::mem::take(&mut sub.residuals);
         sub.residuals = Rows::new();
         let left = (self.level.misfit - surplus).max(f64::MIN_POSITIVE.sqrt());
-        sub.cones.push(ball(&readings, AIM * left.sqrt()));
+        sub.cones.push(ball(&samples, AIM * left.sqrt()));
         let ranges = self.problem.functions.ranges();
         for (penalty, budget) in &self.level.budgets {
             let range = ranges[penalty.function].clone();
@@ -156,22 +156,22 @@ impl Search<'_> {
 
     /// The misfit less the weighted squares that stand for it, none for least squares. The squares of
     /// a robust loss lie above it and touch it here, so a step that they allow is within the level.
-    fn surplus(&self, readings: &Subproblem, evaluation: &Evaluation) -> f64 {
+    fn surplus(&self, samples: &Subproblem, evaluation: &Evaluation) -> f64 {
         let plain = |c: &Channel| c.loss() == Loss::Squares;
         if self.problem.channels().all(plain) {
             return 0.0;
         }
-        let squares: f64 = readings.residuals.right().iter().map(|r| r * r).sum();
+        let squares: f64 = samples.residuals.right().iter().map(|r| r * r).sum();
         evaluation.misfit - squares
     }
 
-    /// Parameters as units by their sizes, states by those of the motions.
+    /// Parameters as units by their sizes, states by those of the responses.
     fn units(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Vec<f64> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {
-            for motion in &evaluation.trajectories {
-                let pair = [&motion.displacement, &motion.velocity].map(|x| positive_rms(x));
-                units.extend((1..motion.nodes()).flat_map(|_| pair));
+            for response in &evaluation.trajectories {
+                let pair = [&response.displacement, &response.velocity].map(|x| positive_rms(x));
+                units.extend((1..response.nodes()).flat_map(|_| pair));
             }
         }
         units.resize(sub.variables, 1.0);
@@ -181,13 +181,13 @@ impl Search<'_> {
     /// The step that gains most in the linearised problem.
     fn push(
         &self,
-        here: &Within,
+        here: &FeasiblePoint,
         target: &Target,
         side: f64,
         radius: f64,
         reach: f64,
         sizes: &[f64],
-    ) -> Option<Proposal> {
+    ) -> Option<SearchStep> {
         let theta = &here.parameters;
         let slopes = target.slopes(theta);
         let mut sub = self.linearised(theta, &here.evaluation);
@@ -207,7 +207,7 @@ impl Search<'_> {
         sub.absolute_weights.push(1.0);
         let (delta, is_largest) = self.solved(&sub, &here.evaluation, sizes)?;
         let gain: f64 = row.iter().map(|(j, a)| a * delta[*j]).sum();
-        Some(Proposal {
+        Some(SearchStep {
             trial: self.problem.constraints.moved(theta, &delta),
             gain: gain * most,
             is_largest,
@@ -235,7 +235,7 @@ impl Search<'_> {
 
     /// The trial brought back to the level by the smallest changes, each for the linearisation at
     /// the one before; `None` if that does not succeed.
-    fn restored(&self, trial: Vec<f64>, sizes: &[f64]) -> Option<Within> {
+    fn restored(&self, trial: Vec<f64>, sizes: &[f64]) -> Option<FeasiblePoint> {
         let mut theta = trial;
         let mut before = f64::INFINITY;
         for _ in 0..CORRECTIONS {

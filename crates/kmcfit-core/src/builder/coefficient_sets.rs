@@ -4,7 +4,7 @@ use super::{BuildError, Builder, CoefficientSpec};
 use crate::functions::CoefficientKind;
 
 /// A coefficient function of a builder, and its key.
-pub(super) struct Slot<'a> {
+pub(super) struct FunctionEntry<'a> {
     /// Such as `functions.mass` or `experiments[1].functions.damping`.
     pub key: String,
     pub kind: CoefficientKind,
@@ -13,7 +13,7 @@ pub(super) struct Slot<'a> {
     pub owner: Option<usize>,
 }
 
-impl Slot<'_> {
+impl FunctionEntry<'_> {
     /// Speed over which the sign of the velocity is smoothed, m/s: of Coulomb friction only, 0 for others.
     pub fn width(&self) -> Result<f64, BuildError> {
         let key = format!("{}.width", self.key);
@@ -43,37 +43,40 @@ impl Slot<'_> {
 }
 
 /// The sets of functions that make up a system, and the set of each record.
-pub(super) struct Assemblies {
-    /// Indices into the list of [`Builder::slots`], mass first; the shared set comes first.
+pub(super) struct CoefficientSets {
+    /// Indices into the list of [`Builder::entries`], mass first; the shared set comes first.
     pub sets: Vec<Vec<usize>>,
     pub of_record: Vec<usize>,
 }
 
 impl Builder {
     /// All functions in the order of the problem: the shared ones, mass first, then those of single records.
-    pub(super) fn slots(&self) -> Vec<Slot<'_>> {
-        let shared = (self.coefficients.iter()).map(|(kind, spec)| Slot {
+    pub(super) fn entries(&self) -> Vec<FunctionEntry<'_>> {
+        let shared = (self.coefficients.iter()).map(|(kind, spec)| FunctionEntry {
             key: format!("functions.{}", kind.name()),
             kind: *kind,
             spec,
             owner: None,
         });
         let own = self.records.iter().enumerate().flat_map(|(i, record)| {
-            record.coefficients.iter().map(move |(kind, spec)| Slot {
-                key: format!("experiments[{i}].functions.{}", kind.name()),
-                kind: *kind,
-                spec,
-                owner: Some(i),
-            })
+            record
+                .coefficients
+                .iter()
+                .map(move |(kind, spec)| FunctionEntry {
+                    key: format!("experiments[{i}].functions.{}", kind.name()),
+                    kind: *kind,
+                    spec,
+                    owner: Some(i),
+                })
         });
         shared.chain(own).collect()
     }
 
     /// Which functions apply to which record.
-    pub(super) fn assemblies(&self) -> Result<Assemblies, BuildError> {
-        let slots = self.slots();
+    pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
+        let entries = self.entries();
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
-        let mut found = Assemblies {
+        let mut found = CoefficientSets {
             sets: vec![shared.clone()],
             of_record: Vec::new(),
         };
@@ -87,8 +90,12 @@ impl Builder {
                         .expected("the shared functions: they are what is to be tested"),
                 );
             }
-            for (f, slot) in slots.iter().enumerate().filter(|(_, s)| s.owner == Some(i)) {
-                set[self.shared_place(slot)?] = f;
+            for (f, entry) in entries
+                .iter()
+                .enumerate()
+                .filter(|(_, s)| s.owner == Some(i))
+            {
+                set[self.shared_place(entry)?] = f;
             }
             let known = found.sets.iter().position(|s| *s == set);
             found.of_record.push(known.unwrap_or(found.sets.len()));
@@ -96,27 +103,27 @@ impl Builder {
                 found.sets.push(set);
             }
         }
-        check_shared(&slots, &found)?;
+        check_shared(&entries, &found)?;
         Ok(found)
     }
 
     /// The place of the shared function that a record replaces by one of its own.
-    fn shared_place(&self, slot: &Slot) -> Result<usize, BuildError> {
+    fn shared_place(&self, entry: &FunctionEntry) -> Result<usize, BuildError> {
         let mut kinds = self.coefficients.iter().map(|(kind, _)| *kind);
-        let Some(place) = kinds.position(|kind| kind == slot.kind) else {
-            let name = slot.kind.name();
+        let Some(place) = kinds.position(|kind| kind == entry.kind) else {
+            let name = entry.kind.name();
             return Err(
-                BuildError::new(&slot.key, "the device has no such function")
+                BuildError::new(&entry.key, "the system has no such function")
                     .found(format!("`{name}` in one experiment only"))
                     .expected(format!(
                         "`functions.{name}` as well, which the other experiments share; `fixed: 0` where they have none"
                     )),
             );
         };
-        match slot.kind {
+        match entry.kind {
             CoefficientKind::CoulombFriction => {
                 let problem = "Coulomb friction is shared by all experiments";
-                Err(BuildError::new(&slot.key, problem).expected("it under `functions` alone"))
+                Err(BuildError::new(&entry.key, problem).expected("it under `functions` alone"))
             }
             _ => Ok(place),
         }
@@ -124,24 +131,23 @@ impl Builder {
 }
 
 /// Refuses records that share no estimated function, and functions that apply to no record.
-fn check_shared(slots: &[Slot], found: &Assemblies) -> Result<(), BuildError> {
+fn check_shared(entries: &[FunctionEntry], found: &CoefficientSets) -> Result<(), BuildError> {
     let users = |f: usize| {
         let uses = |set: &&usize| found.sets[**set].contains(&f);
         found.of_record.iter().filter(uses).count()
     };
-    let own = (slots.iter()).any(|s| s.owner.is_some() && s.spec.is_estimated());
-    let shared = |(f, slot): (usize, &Slot)| slot.spec.is_estimated() && users(f) > 1;
-    if found.of_record.len() > 1 && own && !slots.iter().enumerate().any(shared) {
+    let own = (entries.iter()).any(|s| s.owner.is_some() && s.spec.is_estimated());
+    let shared = |(f, entry): (usize, &FunctionEntry)| entry.spec.is_estimated() && users(f) > 1;
+    if found.of_record.len() > 1 && own && !entries.iter().enumerate().any(shared) {
         let problem = "the experiments share no function that is fitted";
         return Err(BuildError::new("experiments", problem)
             .found("functions of its own in every experiment")
-            .expected(
-                "a function of the device that several experiments show, or a model for each",
-            ));
+            .expected("a function that several experiments share, or a model for each"));
     }
-    match (slots.iter().enumerate()).find(|(f, _)| users(*f) == 0 && !found.of_record.is_empty()) {
-        Some((_, slot)) => Err(
-            BuildError::new(&slot.key, "no experiment uses this function")
+    match (entries.iter().enumerate()).find(|(f, _)| users(*f) == 0 && !found.of_record.is_empty())
+    {
+        Some((_, entry)) => Err(
+            BuildError::new(&entry.key, "no experiment uses this function")
                 .found("one of its own in every experiment")
                 .expected("at least one experiment without, or `fixed` here"),
         ),

@@ -1,6 +1,6 @@
-//! Refits of both models to simulated readings, by their linearisation.
+//! Refits of both models to simulated samples, by their linearisation.
 
-use super::reduced::Reduced;
+use super::reduced::ConstantModel;
 use crate::identifiability::Factorisation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -10,27 +10,32 @@ use crate::study::simulate::{normal, sigmas, stream};
 use nalgebra::{DMatrix, DVector};
 
 /// Both models, linearised at the constant optimum.
-pub struct Linearised {
+pub struct LinearisedModels {
     /// Orthonormal columns that span what each model can do: constant, varying.
     spans: [DMatrix<f64>; 2],
-    /// Root weight times sigma of each reading.
+    /// Root weight times sigma of each sample.
     noise: Vec<f64>,
     /// What penalties and priors ask for.
     asked: Vec<f64>,
 }
 
-impl Linearised {
-    pub fn new(problem: &Problem, reduced: &Reduced, theta: &[f64], here: &Evaluation) -> Self {
+impl LinearisedModels {
+    pub fn new(
+        problem: &Problem,
+        reduced: &ConstantModel,
+        theta: &[f64],
+        here: &Evaluation,
+    ) -> Self {
         let jacobian = weighted_jacobian(problem, here);
         let n = theta.len();
         let mut rest = Subproblem::new(n);
         add_penalties(problem, theta, &mut rest);
         add_priors(problem, theta, &mut rest);
         let rest = rest.residuals;
-        let readings = jacobian.nrows();
-        let mut varying = jacobian.resize_vertically(readings + rest.len(), 0.0);
+        let samples = jacobian.nrows();
+        let mut varying = jacobian.resize_vertically(samples + rest.len(), 0.0);
         for i in 0..rest.len() {
-            (rest.row(i)).for_each(|(j, a)| varying[(readings + i, j)] += a);
+            (rest.row(i)).for_each(|(j, a)| varying[(samples + i, j)] += a);
         }
         let mut embedding = DMatrix::zeros(n, reduced.problem.parameters());
         for j in 0..n {
@@ -52,7 +57,7 @@ impl Linearised {
         }
     }
 
-    /// Least costs of both models for simulated readings `index`.
+    /// Least costs of both models for simulated samples `index`.
     pub fn costs(&self, seed: u64, index: usize) -> [f64; 2] {
         let mut random = stream(seed, index);
         let unit = normal(&mut random, self.noise.len());

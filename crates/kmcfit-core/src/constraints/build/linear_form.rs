@@ -1,12 +1,12 @@
 //! Affine forms of the parameters, and groups of them.
 
-use super::Impossible;
+use super::ConstraintError;
 use crate::constraints::{RowGroup, TOLERANCE};
 use std::collections::HashMap;
 
 /// `sum entries theta + constant` about a span of time.
 #[derive(Debug, Clone)]
-pub(super) struct Form {
+pub(super) struct LinearForm {
     pub entries: Vec<(usize, f64)>,
     pub constant: f64,
     /// The time at which limits that change with time are read, s.
@@ -14,9 +14,9 @@ pub(super) struct Form {
     pub span: [f64; 2],
 }
 
-impl Form {
+impl LinearForm {
     /// Adds `factor * other`.
-    pub fn add(&mut self, factor: f64, other: &Form) {
+    pub fn add(&mut self, factor: f64, other: &LinearForm) {
         self.constant += factor * other.constant;
         let scaled = other.entries.iter().map(|(j, a)| (*j, factor * a));
         self.entries.extend(scaled);
@@ -29,7 +29,7 @@ impl Form {
 }
 
 /// A row in the making: its bounds are those of all forms that are the same.
-struct Row {
+struct PendingRow {
     entries: Vec<(usize, f64)>,
     limits: [f64; 2],
     span: [f64; 2],
@@ -39,13 +39,13 @@ struct Row {
 /// parameters are checked and left out; forms that are the same become one row.
 pub(super) fn group(
     name: impl Into<String>,
-    forms: &[Form],
+    forms: &[LinearForm],
     bounds: impl Fn(f64) -> [f64; 2],
-) -> Result<RowGroup, Impossible> {
-    let mut rows: Vec<Row> = Vec::new();
+) -> Result<RowGroup, ConstraintError> {
+    let mut rows: Vec<PendingRow> = Vec::new();
     let mut known: HashMap<Vec<(usize, u64)>, usize> = HashMap::new();
     let name = name.into();
-    let broken = |time| Impossible::Broken {
+    let broken = |time| ConstraintError::Broken {
         name: name.clone(),
         time,
     };
@@ -63,7 +63,7 @@ pub(super) fn group(
         let key = entries.iter().map(|(j, a)| (*j, a.to_bits())).collect();
         let place = *known.entry(key).or_insert(rows.len());
         match rows.get_mut(place) {
-            None => rows.push(Row {
+            None => rows.push(PendingRow {
                 entries,
                 limits: [lower, upper],
                 span: form.span,
@@ -76,13 +76,13 @@ pub(super) fn group(
     }
     let mut group = RowGroup::new(name.clone());
     for row in rows {
-        let Row {
+        let PendingRow {
             entries,
             mut limits,
             span,
         } = row;
         if limits[0] > limits[1] {
-            // Two readings of one equality differ by rounding, or they contradict each other.
+            // Two samples of one equality differ by rounding, or they contradict each other.
             if limits[0] - limits[1] > TOLERANCE * finite(limits) {
                 return Err(broken(span[0]));
             }

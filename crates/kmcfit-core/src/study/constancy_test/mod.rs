@@ -5,11 +5,11 @@
 //!
 //! ```text
 //! LR = J(constant) - J(varying)                     with sigma
-//!    = n ln(J(constant) / J(varying))               without, n readings
+//!    = n ln(J(constant) / J(varying))               without, n samples
 //! ```
 //!
 //! on whole costs, penalties and priors included. Its distribution when the function is constant is
-//! not a chi-square once there are penalties, so it is simulated: readings of the constant model
+//! not a chi-square once there are penalties, so it is simulated: samples of the constant model
 //! with seeded normal noise, both models refitted to their linearisation at the constant optimum,
 //! penalties and priors included, inequality constraints left out: bounds that hold the varying model
 //! alone make the test err towards constant, one that holds the constant itself towards varying. The
@@ -28,12 +28,12 @@ use super::refit::{nearest, settings, sizes};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use crate::solvers::fit_from;
-use linearised::Linearised;
-use reduced::Reduced;
+use linearised::LinearisedModels;
+use reduced::ConstantModel;
 
 /// The verdict on one function.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Varies {
+pub struct ConstancyTest {
     /// Its name.
     pub function: String,
     /// Index in the list of functions.
@@ -56,8 +56,8 @@ pub struct Varies {
     pub level: f64,
 }
 
-impl Varies {
-    /// Whether the readings say that it varies.
+impl ConstancyTest {
+    /// Whether the samples say that it varies.
     pub fn varies(&self) -> bool {
         self.p_value <= self.level
     }
@@ -86,7 +86,7 @@ impl Varies {
 
 /// How the question is asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asking {
+pub struct ConstancySettings {
     /// Largest p-value called varying, as 0.05.
     pub level: f64,
     /// Simulated records.
@@ -97,7 +97,7 @@ pub struct Asking {
     pub threads: usize,
 }
 
-impl Default for Asking {
+impl Default for ConstancySettings {
     fn default() -> Self {
         Self {
             level: 0.05,
@@ -111,12 +111,12 @@ impl Default for Asking {
 /// The verdict on every function that could vary, from `optimum`, where the problem was fitted.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum, or a constant in its place, has no motion.
-pub fn variation(
+/// A [`SimulationError`] if the optimum, or a constant in its place, has no response.
+pub fn constancy_tests(
     problem: &Problem,
     optimum: &[f64],
-    how: &Asking,
-) -> Result<Vec<Varies>, SimulationError> {
+    how: &ConstancySettings,
+) -> Result<Vec<ConstancyTest>, SimulationError> {
     let varies = |f: &usize| problem.functions.ranges()[*f].len() > 1;
     let each = (0..problem.functions.ranges().len()).filter(varies);
     each.map(|f| of_function(problem, optimum, f, how))
@@ -131,9 +131,9 @@ pub fn of_function(
     problem: &Problem,
     optimum: &[f64],
     function: usize,
-    how: &Asking,
-) -> Result<Varies, SimulationError> {
-    let reduced = Reduced::new(problem, function);
+    how: &ConstancySettings,
+) -> Result<ConstancyTest, SimulationError> {
+    let reduced = ConstantModel::new(problem, function);
     let start = reduced.mean_of(optimum);
     let sizes_of = sizes(&reduced.problem, &start);
     let start = nearest(&reduced.problem, &start, &sizes_of).unwrap_or(start);
@@ -147,15 +147,15 @@ pub fn of_function(
         .best
         .evaluation
         .cost;
-    let readings = problem.reading_count() as f64;
+    let samples = problem.sample_count() as f64;
     let sigma = problem.channels().all(|c| c.weighting().is_sigma());
     let ratio = |constant: f64, varying: f64| match sigma {
         true => constant - varying,
-        false => readings * (constant / varying.max(f64::MIN_POSITIVE)).ln(),
+        false => samples * (constant / varying.max(f64::MIN_POSITIVE)).ln(),
     };
     let statistic = ratio(constant.evaluation.cost, there.min(here));
     let evaluation = problem.evaluate(&embedded)?;
-    let linear = Linearised::new(problem, &reduced, &embedded, &evaluation);
+    let linear = LinearisedModels::new(problem, &reduced, &embedded, &evaluation);
     let simulated = map(how.simulations, how.threads, |index| {
         let [constant, varying] = linear.costs(how.seed, index);
         ratio(constant, varying)
@@ -163,13 +163,13 @@ pub fn of_function(
     let above = simulated.iter().filter(|s| **s >= statistic).count();
     let list = problem.functions.get(function);
     let extra = (problem.parameters() - reduced.problem.parameters()) as f64;
-    Ok(Varies {
+    Ok(ConstancyTest {
         function: list.name(),
         index: function,
         statistic,
         p_value: (1 + above) as f64 / (1 + how.simulations) as f64,
         simulations: how.simulations,
-        bic: statistic - extra * readings.ln(),
+        bic: statistic - extra * samples.ln(),
         constant: constant.parameters[reduced.place],
         unit: list.quantity.unit().to_owned(),
         level: how.level,

@@ -1,20 +1,20 @@
-//! Columns: which parameters act on a reading at all.
+//! Columns: which parameters act on a sample at all.
 
 use crate::problem::Problem;
 use crate::record::ChannelKind;
 use crate::system::{Method, TimePoint};
 
-/// The nodes whose values act on some reading.
+/// The nodes whose values act on some sample.
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
     let nodes = problem.functions.nodes();
     let mut last = None;
-    for (kind, place) in readings(problem).map(|(_, kind, place)| (kind, place)) {
+    for (kind, place) in samples(problem).map(|(_, kind, place)| (kind, place)) {
         last = last.max(last_acting(problem, kind, place));
     }
     (0..nodes).map(|i| last.is_some_and(|l| i <= l)).collect()
 }
 
-/// The last node whose values act on a reading; `None` if none does.
+/// The last node whose values act on a sample; `None` if none does.
 pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint) -> Option<usize> {
     match (kind, place.as_node(), problem.system.method) {
         (ChannelKind::Acceleration, Some(node), _) => Some(node),
@@ -26,7 +26,7 @@ pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint
     }
 }
 
-fn readings(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimePoint)> + '_ {
+fn samples(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimePoint)> + '_ {
     let experiments = problem.experiments.iter().enumerate();
     experiments.flat_map(|(e, experiment)| {
         let channels = experiment.channels.iter();

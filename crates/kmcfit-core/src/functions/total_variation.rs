@@ -6,7 +6,7 @@ use crate::rows::Rows;
 /// one knot, cell or node to the next: the total variation of the function. Unlike squared
 /// smoothness it does not charge a jump more than a slow change of the same height.
 #[derive(Debug, Clone)]
-pub struct Variation {
+pub struct TotalVariation {
     /// Index of the function, mass 0.
     pub function: usize,
     /// Weight, in the unit of J per unit of the function.
@@ -15,7 +15,7 @@ pub struct Variation {
     pub rows: Rows,
 }
 
-impl Variation {
+impl TotalVariation {
     /// The changes `D theta`.
     pub fn changes(&self, theta: &[f64]) -> Vec<f64> {
         self.rows.multiply(theta)

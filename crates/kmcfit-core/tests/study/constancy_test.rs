@@ -3,20 +3,22 @@ use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::variation::{Asking, Varies, variation};
+use kmcfit_core::internals::study::constancy_test::{
+    ConstancySettings, ConstancyTest, constancy_tests,
+};
 
-fn asked(problem: &Problem) -> Varies {
+fn asked(problem: &Problem) -> ConstancyTest {
     let settings = crate::common::synthetic::settings();
     let best = fit_from(problem, &problem.start(), &settings)
         .unwrap()
         .best
         .parameters;
-    let how = Asking {
+    let how = ConstancySettings {
         simulations: 199,
         threads: 2,
-        ..Asking::default()
+        ..ConstancySettings::default()
     };
-    let mut all = variation(problem, &best, &how).unwrap();
+    let mut all = constancy_tests(problem, &best, &how).unwrap();
     assert_eq!(all.len(), 1, "the damping is constant by its basis");
     all.pop().unwrap()
 }
@@ -25,7 +27,7 @@ fn asked(problem: &Problem) -> Varies {
 /// than seven have a probability of 0.2 %, and a p-value below one half half of them: 20 +- 3.2.
 #[test]
 fn a_constant_is_called_constant_at_the_nominal_rate() {
-    let found: Vec<Varies> = (0..40)
+    let found: Vec<ConstancyTest> = (0..40)
         .map(|seed| asked(&knots(&|_| 2.0, 6, 0.05, 100 + seed)))
         .collect();
     let varying = found.iter().filter(|v| v.varies()).count();

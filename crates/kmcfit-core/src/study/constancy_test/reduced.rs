@@ -5,7 +5,7 @@ use crate::functions::{CoefficientFunction, Parameterization, Penalty};
 use crate::problem::Problem;
 
 /// The problem with one function constant, and how its parameters become those of the whole one.
-pub struct Reduced {
+pub struct ConstantModel {
     pub problem: Problem,
     function: usize,
     /// Where the constant stands.
@@ -14,7 +14,7 @@ pub struct Reduced {
     one: Vec<f64>,
 }
 
-impl Reduced {
+impl ConstantModel {
     pub fn new(problem: &Problem, function: usize) -> Self {
         let grid = &problem.system.grid;
         let whole = problem.functions.get(function);
@@ -31,10 +31,11 @@ impl Reduced {
             ..CoefficientFunction::constant(whole.quantity, 0.0, nodes)
         };
         list[function] = constant;
-        let devices = problem.functions.assemblies().to_vec();
-        let functions = Parameterization::with_devices(list, devices, nodes, grid.step())
-            .expect("a constant instead of a function stays independent")
-            .with_scalars(problem.functions.scalars().to_vec());
+        let coefficient_sets = problem.functions.coefficient_sets().to_vec();
+        let functions =
+            Parameterization::with_coefficient_sets(list, coefficient_sets, nodes, grid.step())
+                .expect("a constant instead of a function stays independent")
+                .with_scalars(problem.functions.scalars().to_vec());
         let mut own = problem.clone();
         own.parts_mut().functions = functions;
         let mut reduced = Self {
@@ -158,13 +159,13 @@ impl Reduced {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::constraints::Statement;
+    use crate::constraints::Constraint;
     use crate::functions::CoefficientKind;
 
     fn whole() -> Problem {
         let times: Vec<f64> = (0..=80).map(|i| 0.1 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
-        let record = Record::new("decay").displacement(&times, &readings);
+        let samples: Vec<f64> = times.iter().map(|t| (1.3 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
         let parts = [
             CoefficientSpec::piecewise_linear(5, 1.0)
                 .tikhonov(1, 0.3)
@@ -174,12 +175,12 @@ mod tests {
                 .tikhonov(2, 0.2),
             CoefficientSpec::piecewise_constant(6, 1.7).total_variation(0.4),
         ];
-        let value = |of, value| Statement::Mean { of, value };
+        let value = |of, value| Constraint::Mean { of, value };
         Builder::new(parts)
             .record(record)
             .constrain(value(CoefficientKind::Mass, 1.1))
-            .constrain(Statement::DampingRatio { max: 0.8 })
-            .constrain(Statement::Slope {
+            .constrain(Constraint::DampingRatio { max: 0.8 })
+            .constrain(Constraint::Slope {
                 of: CoefficientKind::Damping,
                 min: Some(-0.5),
                 max: None,
@@ -191,12 +192,12 @@ mod tests {
     }
 
     /// With one function constant the problem is the whole one where that function is constant: of every function the
-    /// motion, the penalties, the soft rows and the constraints.
+    /// response, the penalties, the soft rows and the constraints.
     #[test]
     fn the_reduced_problem_is_the_whole_one_at_constants() {
         let whole = whole();
         for function in 0..3 {
-            let reduced = Reduced::new(&whole, function);
+            let reduced = ConstantModel::new(&whole, function);
             let count = reduced.problem.parameters();
             let own = whole.functions.ranges()[function].len();
             assert_eq!(count, whole.parameters() + 1 - own);
@@ -237,9 +238,9 @@ mod tests {
             of_slopes.map(|group| group.rows.len()).sum::<usize>()
         };
         assert_eq!(slopes(&whole), 3);
-        assert_eq!(slopes(&Reduced::new(&whole, 1).problem), 0);
-        assert_eq!(slopes(&Reduced::new(&whole, 0).problem), 3);
-        assert!(Reduced::new(&whole, 2).problem.variations.is_empty());
-        assert_eq!(Reduced::new(&whole, 1).problem.penalties.len(), 2);
+        assert_eq!(slopes(&ConstantModel::new(&whole, 1).problem), 0);
+        assert_eq!(slopes(&ConstantModel::new(&whole, 0).problem), 3);
+        assert!(ConstantModel::new(&whole, 2).problem.variations.is_empty());
+        assert_eq!(ConstantModel::new(&whole, 1).problem.penalties.len(), 2);
     }
 }

@@ -21,7 +21,7 @@ pub const LEAST: f64 = 0.05;
 
 /// What is known of a function or ratio.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Verdict {
+pub enum Classification {
     /// Known at (nearly) all times.
     Identified {
         /// Largest half-width of the 95 % band there, relative to that size.
@@ -37,15 +37,15 @@ pub enum Verdict {
     Fixed,
 }
 
-impl Verdict {
+impl Classification {
     /// Its kind.
-    pub fn kind(&self) -> VerdictKind {
+    pub fn kind(&self) -> ClassificationKind {
         match self {
-            Self::Identified { .. } => VerdictKind::Identified,
-            Self::OnlyRatio(_) => VerdictKind::OnlyRatio,
-            Self::PartlyIdentified(_) => VerdictKind::PartlyIdentified,
-            Self::NotIdentified => VerdictKind::NotIdentified,
-            Self::Fixed => VerdictKind::Fixed,
+            Self::Identified { .. } => ClassificationKind::Identified,
+            Self::OnlyRatio(_) => ClassificationKind::OnlyRatio,
+            Self::PartlyIdentified(_) => ClassificationKind::PartlyIdentified,
+            Self::NotIdentified => ClassificationKind::NotIdentified,
+            Self::Fixed => ClassificationKind::Fixed,
         }
     }
 
@@ -61,11 +61,11 @@ impl Verdict {
     }
 }
 
-/// The kind of a [`Verdict`].
+/// The kind of a [`Classification`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
-pub enum VerdictKind {
+pub enum ClassificationKind {
     Identified,
     OnlyRatio,
     PartlyIdentified,
@@ -75,23 +75,25 @@ pub enum VerdictKind {
 
 /// A verdict on one function or ratio.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judgement {
+pub struct FunctionClassification {
     /// Name of the function or ratio.
     pub name: String,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: Classification,
     /// The same as a sentence.
     pub sentence: String,
     /// Smallest and largest value at the nodes where it is known; `None` where there is no such node.
     pub identified_range: Option<[f64; 2]>,
 }
 
-impl Judgement {
+impl FunctionClassification {
     /// Whether it says what stays open, and not what is known or given.
     pub fn is_open(&self) -> bool {
         match self.verdict {
-            Verdict::Identified { .. } | Verdict::Fixed => false,
-            Verdict::OnlyRatio(_) | Verdict::PartlyIdentified(_) | Verdict::NotIdentified => true,
+            Classification::Identified { .. } | Classification::Fixed => false,
+            Classification::OnlyRatio(_)
+            | Classification::PartlyIdentified(_)
+            | Classification::NotIdentified => true,
         }
     }
 }
@@ -141,16 +143,20 @@ fn is_known(band: &Band, size: f64, i: usize) -> bool {
 }
 
 /// Verdicts on every function of the list, then on `k/m` and `c/m`.
-pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Vec<Judgement> {
+pub fn classify_functions(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    bands: &Bands,
+) -> Vec<FunctionClassification> {
     let sizes = problem.median_scales(evaluation);
-    let assembly = problem.functions.assembly(0);
-    let mass = median_size(&evaluation.device.mass);
+    let assembly = problem.functions.coefficient_set(0);
+    let mass = median_size(&evaluation.nodal.mass);
     let of = |term: Term| {
         let place = problem.system.terms.iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
     let named = [("k/m", of(Term::Stiffness)), ("c/m", of(Term::Damping))];
-    let ratios: Vec<(&str, usize, f64, Verdict)> = (named.into_iter())
+    let ratios: Vec<(&str, usize, f64, Classification)> = (named.into_iter())
         .filter_map(|(name, function)| {
             let (band, f) = (bands.ratio(name)?, function?);
             let size = median_size(&band.values).max(sizes[f] / mass);
@@ -158,8 +164,9 @@ pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Ve
         })
         .collect();
     let known = |f: usize| {
-        let with = |(_, function, _, verdict): &&(&str, usize, f64, Verdict)| {
-            (*function == f || f == assembly[0]) && matches!(verdict, Verdict::Identified { .. })
+        let with = |(_, function, _, verdict): &&(&str, usize, f64, Classification)| {
+            (*function == f || f == assembly[0])
+                && matches!(verdict, Classification::Identified { .. })
         };
         ratios
             .iter()
@@ -168,52 +175,57 @@ pub fn verdicts(problem: &Problem, evaluation: &Evaluation, bands: &Bands) -> Ve
     };
     let functions = bands.functions.iter().enumerate().map(|(f, band)| {
         let verdict = match problem.functions.get(f).parameters() {
-            0 => Verdict::Fixed,
+            0 => Classification::Fixed,
             _ => match judge(&bands.times, band, sizes[f]) {
-                identified @ Verdict::Identified { .. } => identified,
-                other => known(f).map_or(other, Verdict::OnlyRatio),
+                identified @ Classification::Identified { .. } => identified,
+                other => known(f).map_or(other, Classification::OnlyRatio),
             },
         };
         judgement(&band.name, verdict, band, sizes[f])
     });
-    let functions: Vec<Judgement> = functions.collect();
+    let functions: Vec<FunctionClassification> = functions.collect();
     let ratios = (ratios.into_iter())
         .filter_map(|(name, _, size, v)| Some(judgement(name, v, bands.ratio(name)?, size)));
     functions.into_iter().chain(ratios).collect()
 }
 
-fn judge(times: &[f64], band: &Band, size: f64) -> Verdict {
+fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
     let known = |i: usize| is_known(band, size, i);
     let count = (0..times.len()).filter(|i| known(*i)).count();
     let share = count as f64 / times.len() as f64;
     if share >= MOST {
         let relative = |i: usize| NORMAL_975 * band.standard_error[i] / size;
         let known = (0..times.len()).filter(|i| known(*i));
-        return Verdict::Identified {
+        return Classification::Identified {
             relative: known.map(relative).fold(0.0, f64::max),
         };
     }
     match share < LEAST {
-        true => Verdict::NotIdentified,
-        false => Verdict::PartlyIdentified(spans(times, known)),
+        true => Classification::NotIdentified,
+        false => Classification::PartlyIdentified(spans(times, known)),
     }
 }
 
-fn judgement(name: &str, verdict: Verdict, band: &Band, size: f64) -> Judgement {
+fn judgement(
+    name: &str,
+    verdict: Classification,
+    band: &Band,
+    size: f64,
+) -> FunctionClassification {
     let sentence = match &verdict {
-        Verdict::Identified { .. } => identified(name, band, size),
-        Verdict::OnlyRatio(ratio) => {
+        Classification::Identified { .. } => identified(name, band, size),
+        Classification::OnlyRatio(ratio) => {
             format!("{name} itself is not identifiable; the ratio {ratio} is identified")
         }
-        Verdict::PartlyIdentified(spans) => {
+        Classification::PartlyIdentified(spans) => {
             format!("{name} is identified only on {}", span_words(spans))
         }
-        Verdict::NotIdentified => format!("{name} is not identifiable from these records"),
-        Verdict::Fixed => format!("{name} is fixed by the model"),
+        Classification::NotIdentified => format!("{name} is not identifiable from these records"),
+        Classification::Fixed => format!("{name} is fixed by the model"),
     };
     let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));
     let identified_range = known.map(|i| [band.values[i]; 2]);
-    Judgement {
+    FunctionClassification {
         name: name.to_owned(),
         verdict,
         sentence,

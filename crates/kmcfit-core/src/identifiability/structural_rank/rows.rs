@@ -1,4 +1,4 @@
-//! Rows: the independent equations of the readings.
+//! Rows: the independent equations of the samples.
 
 use super::super::components::force_of;
 use super::columns::last_acting;
@@ -12,18 +12,18 @@ use std::collections::BTreeMap;
 /// Two inputs are independent if this share of one is left beside the others.
 const INDEPENDENT: f64 = 1e-9;
 
-/// Readings of one kind at one place.
-type Key = (usize, ChannelKind, usize, u64);
+/// Samples of one kind at one place.
+type SampleKey = (usize, ChannelKind, usize, u64);
 
 /// The number of independent equations, and what is to be said of them.
 pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
-    let mut groups: BTreeMap<Key, (TimePoint, Vec<usize>)> = BTreeMap::new();
+    let mut groups: BTreeMap<SampleKey, (TimePoint, Vec<usize>)> = BTreeMap::new();
     let mut others = 0;
     for (e, experiment) in problem.experiments.iter().enumerate() {
         for channel in &experiment.channels {
             if !superposes(problem, experiment, channel) {
-                // A reading of a known initial state says nothing of the parameters.
-                let known = experiment.sought == [None; 2]
+                // A sample of a known initial state says nothing of the parameters.
+                let known = experiment.initial_parameters == [None; 2]
                     && channel.sensor().indices() == [None; 3]
                     && channel.filter().is_empty();
                 let acts = |p: &&TimePoint| last_acting(problem, channel.kind(), **p).is_some();
@@ -39,7 +39,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
                     None => (place.step, place.fraction),
                 };
                 let key = (
-                    experiment.device,
+                    experiment.coefficient_set,
                     channel.kind(),
                     node,
                     f64::to_bits(fraction),
@@ -77,14 +77,14 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     (total, combinations.into_iter().collect())
 }
 
-/// Whether a channel's readings are linear in the record's inputs, with no numbers sought besides.
+/// Whether a channel's samples are linear in the record's inputs, with no numbers estimated besides.
 fn superposes(
     problem: &Problem,
     experiment: &Experiment,
     channel: &crate::record::Channel,
 ) -> bool {
     problem.system.terms.iter().all(|t| t.is_linear())
-        && experiment.sought == [None; 2]
+        && experiment.initial_parameters == [None; 2]
         && channel.sensor().indices() == [None; 3]
         && channel.filter().is_empty()
 }
@@ -137,7 +137,7 @@ impl Inputs {
             base.is_none_or(|b| b.is_zero())
         };
         let nodal = records.iter().all(|r| {
-            let assembly = problem.functions.assembly(r.device).iter();
+            let assembly = problem.functions.coefficient_set(r.coefficient_set).iter();
             let mut functions = assembly.map(|f| problem.functions.get(*f));
             functions.all(|f| f.parameters() == 0 || f.basis == Some(Basis::Nodal))
         });
@@ -159,7 +159,7 @@ impl Inputs {
         }
     }
 
-    /// Independent inputs that act on a reading.
+    /// Independent inputs that act on a sample.
     fn rank(&self, kind: ChannelKind, place: TimePoint, last: usize) -> usize {
         let stage = |step: Option<usize>, s: usize| match step {
             Some(step) => self.after[step.min(self.after.len() - 1)][s],

@@ -5,18 +5,18 @@ use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
 
-/// The functions of an experiment's device that have parameters, and where these stand.
+/// The functions of an experiment's system that have parameters, and where these stand.
 pub(super) struct Moving<'a> {
-    parts: Vec<Part<'a>>,
+    parts: Vec<FunctionLayout<'a>>,
     slots: Vec<Slot>,
     groups: usize,
-    /// Initial states that are sought: which, and their places.
+    /// Initial states that are estimated: which, and their places.
     seeds: Vec<(usize, usize)>,
     /// How many places there are.
     places: usize,
 }
 
-struct Part<'a> {
+struct FunctionLayout<'a> {
     design: &'a Design,
     /// The slots of its groups.
     slots: Vec<usize>,
@@ -33,9 +33,9 @@ impl<'a> Moving<'a> {
             places[*j] = place;
         }
         let scalars = functions.scalar_range().start;
-        let sought = experiment.sought.into_iter().enumerate();
-        let seeds = sought.filter_map(|(state, index)| Some((state, places[scalars + index?])));
-        let assembly = functions.assembly(experiment.device);
+        let estimated = experiment.initial_parameters.into_iter().enumerate();
+        let seeds = estimated.filter_map(|(state, index)| Some((state, places[scalars + index?])));
+        let assembly = functions.coefficient_set(experiment.coefficient_set);
         let slot_of = |function: usize, j: usize| Slot {
             group: places[j] / LANES,
             function,
@@ -53,7 +53,7 @@ impl<'a> Moving<'a> {
             let design = &functions.get(f).design;
             let lane = |j: usize| (find(slot_of(function, j)), places[j] % LANES);
             let own = (0..slots.len()).filter(|s| slots[*s].function == function);
-            Part {
+            FunctionLayout {
                 design,
                 slots: own.collect(),
                 lanes: functions.ranges()[f].clone().map(lane).collect(),
@@ -99,7 +99,7 @@ impl<'a> Moving<'a> {
     }
 }
 
-impl Part<'_> {
+impl FunctionLayout<'_> {
     /// A constant changes along its one parameter, everywhere by the same.
     fn hold(&self, tangents: &mut Tangents) {
         for ((_, value), &(slot, lane)) in self.design.row(0).zip(&self.lanes) {

@@ -1,8 +1,8 @@
-//! The tangents of one channel's readings, tile by tile.
+//! The tangents of one channel's samples, tile by tile.
 
 use crate::objective::SimulatedRecord;
 use crate::record::Channel;
-use crate::simd::tall_qr::Piece;
+use crate::simd::tall_qr::RowBlock;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::Observation;
 use crate::simulate::fast::nodal_observations::Accelerations;
@@ -10,32 +10,32 @@ use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
 use crate::system::FUNCTIONS;
 use std::ops::Range;
 
-/// Takes the tangents of one channel's readings, tile by tile.
-pub(super) struct Reader<'a> {
+/// Takes the tangents of one channel's samples, tile by tile.
+pub(super) struct JacobianRows<'a> {
     channel: &'a Channel,
     view: SimulatedRecord<'a>,
-    /// Reading to go on with.
+    /// Sample to go on with.
     next: usize,
     gain: f64,
-    kind: Kind,
-    glance: Glance,
+    kind: ObservationKind,
+    batch: SampleBatch,
 }
 
-/// How a channel's readings answer to the states.
+/// How a channel's samples answer to the states.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum ObservationKind {
     /// Displacements, each at a node.
     Displacements,
-    /// Accelerations, reading `i` on node `i`.
+    /// Accelerations, sample `i` on node `i`.
     Accelerations,
     /// Anything.
     Any,
 }
 
-/// Up to eight readings, a reading after the other.
-struct Glance {
+/// Up to eight samples, a sample after the other.
+struct SampleBatch {
     count: usize,
-    /// Each reading's node or, for any reading, the left node of its step, from the start of the tile.
+    /// Each sample's node or, for any sample, the left node of its step, from the start of the tile.
     nodes: [usize; LANES],
     states: [[f64; 4]; LANES],
     functions: [[[f64; FUNCTIONS]; 2]; LANES],
@@ -45,7 +45,7 @@ struct Glance {
     seen: Accelerations,
 }
 
-impl Glance {
+impl SampleBatch {
     const NOTHING: Self = Self {
         count: 0,
         nodes: [0; LANES],
@@ -61,27 +61,27 @@ impl Glance {
     }
 }
 
-impl<'a> Reader<'a> {
-    /// From reading `next` on.
+impl<'a> JacobianRows<'a> {
+    /// From sample `next` on.
     pub fn new(channel: &'a Channel, view: SimulatedRecord<'a>, next: usize) -> Self {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
             kind: match () {
-                () if channel.is_displacement_at_nodes() => Kind::Displacements,
-                () if channel.is_acceleration_on_nodes() => Kind::Accelerations,
-                () => Kind::Any,
+                () if channel.is_displacement_at_nodes() => ObservationKind::Displacements,
+                () if channel.is_acceleration_on_nodes() => ObservationKind::Accelerations,
+                () => ObservationKind::Any,
             },
             channel,
             view,
             next,
             gain,
-            glance: Glance::NOTHING,
+            batch: SampleBatch::NOTHING,
         }
     }
 
-    /// Takes the readings in the steps `steps`, over which the tangents have just gone, until the `piece` is
+    /// Takes the samples in the steps `steps`, over which the tangents have just gone, until the `piece` is
     /// full: whether there may be more.
-    pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut Piece) -> bool {
+    pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut RowBlock) -> bool {
         simd::run(Read {
             reader: self,
             tangents,
@@ -91,49 +91,49 @@ impl<'a> Reader<'a> {
         piece.is_full()
     }
 
-    /// Takes at most so many next readings within the steps `steps`: how many they are and where they stand.
+    /// Takes at most so many next samples within the steps `steps`: how many they are and where they stand.
     #[inline(always)]
-    fn glance<A: Arithmetic>(&mut self, arithmetic: A, steps: &Range<usize>, most: usize) {
-        let glance = &mut self.glance;
+    fn batch<A: Arithmetic>(&mut self, arithmetic: A, steps: &Range<usize>, most: usize) {
+        let batch = &mut self.batch;
         let most = most.min(LANES).min(self.channel.len() - self.next);
-        if self.channel.is_on_every_node() && self.kind != Kind::Any {
-            // The last node of the motion belongs to its last step.
-            let last = steps.end + 1 == self.view.motion.nodes();
+        if self.channel.is_on_every_node() && self.kind != ObservationKind::Any {
+            // The last node of the response belongs to its last step.
+            let last = steps.end + 1 == self.view.response.nodes();
             let end = steps.end + usize::from(last);
-            glance.count = most.min(end.saturating_sub(self.next));
+            batch.count = most.min(end.saturating_sub(self.next));
             let from = self.next.saturating_sub(steps.start);
-            for (l, node) in glance.nodes.iter_mut().enumerate() {
+            for (l, node) in batch.nodes.iter_mut().enumerate() {
                 *node = (from + l).min(TILE);
             }
         } else {
-            glance.count = 0;
+            batch.count = 0;
             let places = &self.channel.places()[self.next..];
             for (l, place) in places.iter().take(most).enumerate() {
                 if place.step >= steps.end {
                     break;
                 }
-                glance.count = l + 1;
-                glance.nodes[l] = place.step - steps.start;
-                if self.kind == Kind::Displacements {
-                    glance.nodes[l] += usize::from(place.fraction == 1.0);
+                batch.count = l + 1;
+                batch.nodes[l] = place.step - steps.start;
+                if self.kind == ObservationKind::Displacements {
+                    batch.nodes[l] += usize::from(place.fraction == 1.0);
                 } else {
-                    glance.at_left[l] = place.fraction == 0.0;
-                    glance.set(l, &self.channel.sensed(self.view, self.next + l));
+                    batch.at_left[l] = place.fraction == 0.0;
+                    batch.set(l, &self.channel.sensed(self.view, self.next + l));
                 }
             }
         }
-        if self.kind == Kind::Accelerations && glance.count > 0 {
-            (self.channel).accelerations(arithmetic, self.view, self.next, &mut glance.seen);
+        if self.kind == ObservationKind::Accelerations && batch.count > 0 {
+            (self.channel).accelerations(arithmetic, self.view, self.next, &mut batch.seen);
         }
     }
 }
 
-/// The readings of a channel within a tile.
+/// The samples of a channel within a tile.
 struct Read<'a, 'c> {
-    reader: &'a mut Reader<'c>,
+    reader: &'a mut JacobianRows<'c>,
     tangents: &'a Tangents,
     steps: Range<usize>,
-    piece: &'a mut Piece,
+    piece: &'a mut RowBlock,
 }
 
 impl Kernel for Read<'_, '_> {
@@ -143,36 +143,36 @@ impl Kernel for Read<'_, '_> {
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let reader = self.reader;
         loop {
-            reader.glance(arithmetic, &self.steps, self.piece.room());
-            if reader.glance.count == 0 {
+            reader.batch(arithmetic, &self.steps, self.piece.room());
+            if reader.batch.count == 0 {
                 return;
             }
-            let answer = Answer {
+            let answer = BatchSensitivity {
                 tangents: self.tangents,
-                glance: &reader.glance,
+                batch: &reader.batch,
                 kind: reader.kind,
                 gain: reader.gain,
             };
             answer.write(arithmetic, self.piece);
-            reader.next += reader.glance.count;
+            reader.next += reader.batch.count;
         }
     }
 }
 
-/// The answers of up to eight readings to all directions.
-struct Answer<'a> {
+/// The answers of up to eight samples to all directions.
+struct BatchSensitivity<'a> {
     tangents: &'a Tangents,
-    glance: &'a Glance,
-    kind: Kind,
+    batch: &'a SampleBatch,
+    kind: ObservationKind,
     gain: f64,
 }
 
-impl Answer<'_> {
+impl BatchSensitivity<'_> {
     /// Writes them behind the rows of a piece that has room for them.
     #[inline(always)]
-    fn write<A: Arithmetic>(&self, arithmetic: A, piece: &mut Piece) {
+    fn write<A: Arithmetic>(&self, arithmetic: A, piece: &mut RowBlock) {
         let gain = Eight::splat(arithmetic, self.gain);
-        let count = self.glance.count;
+        let count = self.batch.count;
         let begun = self.tangents.begun_groups() * LANES;
         let (row, places) = (piece.count, begun.min(piece.places()));
         piece.widen(places);
@@ -180,28 +180,28 @@ impl Answer<'_> {
         for (g, first) in (0..places).step_by(LANES).enumerate() {
             let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
-                // Of lanes without a reading nobody wants to know.
+                // Of lanes without a sample nobody wants to know.
                 match self.kind {
-                    Kind::Displacements => {
+                    ObservationKind::Displacements => {
                         let states = self.tangents.states(g);
-                        for (answer, node) in answers.iter_mut().zip(self.glance.nodes) {
+                        for (answer, node) in answers.iter_mut().zip(self.batch.nodes) {
                             *answer = Eight::load(arithmetic, &states[node][0]);
                         }
                     }
-                    Kind::Accelerations => {
+                    ObservationKind::Accelerations => {
                         let varies = self.tangents.changes(g).any(|change| change.varies());
                         for (l, answer) in answers.iter_mut().enumerate() {
                             *answer = self.at_acceleration(arithmetic, g, l, varies);
                         }
                     }
-                    Kind::Any => {
+                    ObservationKind::Any => {
                         for (l, answer) in answers.iter_mut().enumerate().take(count) {
                             *answer = self.at_step(arithmetic, g, l);
                         }
                     }
                 }
                 answers = Eight::transpose(arithmetic, answers);
-                if self.kind == Kind::Accelerations {
+                if self.kind == ObservationKind::Accelerations {
                     self.add_constants(arithmetic, g, &mut answers);
                 }
             }
@@ -227,7 +227,7 @@ impl Answer<'_> {
     ) {
         for change in self.tangents.changes(g) {
             if let Some(Steady { lane, value }) = change.steady {
-                let slopes = Eight::load(arithmetic, &self.glance.seen.functions[change.function]);
+                let slopes = Eight::load(arithmetic, &self.batch.seen.functions[change.function]);
                 answers[lane] += slopes * Eight::splat(arithmetic, value);
             }
         }
@@ -242,7 +242,7 @@ impl Answer<'_> {
         l: usize,
         varies: bool,
     ) -> Eight<A> {
-        let (node, seen) = (self.glance.nodes[l], &self.glance.seen);
+        let (node, seen) = (self.batch.nodes[l], &self.batch.seen);
         let mut answer = Eight::splat(arithmetic, 0.0);
         for (by, tangent) in seen.states.iter().zip(&self.tangents.states(g)[node]) {
             answer += Eight::splat(arithmetic, by[l]) * Eight::load(arithmetic, tangent);
@@ -256,20 +256,20 @@ impl Answer<'_> {
         answer
     }
 
-    /// The answer of reading `l` to the directions of a group, before the gain.
+    /// The answer of sample `l` to the directions of a group, before the gain.
     #[inline(always)]
     fn at_step<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
-        let Glance {
+        let SampleBatch {
             nodes,
             states,
             functions,
             ..
-        } = self.glance;
+        } = self.batch;
         let (node, by) = (nodes[l], &states[l]);
         let tangent = self.tangents.states(g);
         let mut answer = Eight::splat(arithmetic, 0.0);
         for side in 0..2 {
-            if side == 1 && self.glance.at_left[l] {
+            if side == 1 && self.batch.at_left[l] {
                 return answer;
             }
             let at = node + side;

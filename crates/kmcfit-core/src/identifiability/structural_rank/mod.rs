@@ -1,16 +1,16 @@
-//! What records can show at most, from the problem alone: no motion is computed.
+//! What records can show at most, from the problem alone: no response is computed.
 //!
-//! **Rows.** A reading gives one equation. Where every term is linear in the motion (damping and
-//! stiffness), the motion is linear in `(y(0), v(0), f, b'')`: of the readings of one kind at one time only as
+//! **Rows.** A sample gives one equation. Where every term is linear in the response (damping and
+//! stiffness), the response is linear in `(y(0), v(0), f, b'')`: of the samples of one kind at one time only as
 //! many are independent as the records' inputs up to that time. So a third free record adds nothing, and
 //! neither does a forced one before its force sets in.
 //!
-//! **Silent nodes.** With one value per node and one reading per step, a step of the midpoint rule
+//! **Silent nodes.** With one value per node and one sample per step, a step of the midpoint rule
 //! without a force, and without one half a step before, moves states of two dimensions: it adds at most
 //! two equations.
 //!
-//! **Columns.** A parameter that acts after the last reading is not seen, and neither is the common
-//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the motion unchanged where no force acts. For functions
+//! **Columns.** A parameter that acts after the last sample is not seen, and neither is the common
+//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the response unchanged where no force acts. For functions
 //! that are closed under multiplication by `s(t)` that is one direction per node (or cell) without a
 //! force and without a known function that is not zero, for others the constant factor, if there
 //! is neither anywhere.
@@ -27,7 +27,7 @@ use super::components::components;
 use crate::problem::Problem;
 use columns::{parameter_is_visible, visible_nodes};
 use rows::equations;
-use scale::Scale;
+use scale::CommonScale;
 use serde::{Deserialize, Serialize};
 
 /// Which factor of all functions nothing in the problem fixes.
@@ -39,18 +39,18 @@ pub enum Symmetry {
     ConstantFactor,
     /// One factor for all times exactly, and nearly any slow `s(t)`: the bases have many knots.
     NearlyFunction,
-    /// Any function `s(t)`, on [`Count::free_on`].
+    /// Any function `s(t)`, on [`StructuralRank::free_on`].
     Function,
 }
 
 /// What can be seen at most.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Count {
-    /// Upper bound of the number of directions that the readings see.
+pub struct StructuralRank {
+    /// Upper bound of the number of directions that the samples see.
     pub seen_at_most: usize,
     /// Number of parameters.
     pub of: usize,
-    /// Independent equations of the readings.
+    /// Independent equations of the samples.
     pub equations: usize,
     /// The gauge that is left by records, functions, penalties and equality constraints together.
     pub symmetry: Symmetry,
@@ -60,7 +60,7 @@ pub struct Count {
     pub findings: Vec<RankFinding>,
 }
 
-impl Count {
+impl StructuralRank {
     /// The headline and the sentences of all findings.
     pub fn sentences(&self) -> Vec<String> {
         let all = self.findings.iter().map(|s| s.sentence.clone());
@@ -114,7 +114,7 @@ impl RankFinding {
 }
 
 /// Counts what the records of `problem` can show.
-pub fn count(problem: &Problem) -> Count {
+pub fn structural_rank(problem: &Problem) -> StructuralRank {
     let (equations, mut findings) = equations(problem);
     let visible = visible_nodes(problem);
     let mut seen = (0..problem.parameters())
@@ -123,7 +123,7 @@ pub fn count(problem: &Problem) -> Count {
     let mut worst = Symmetry::None;
     let mut free_on = Vec::new();
     for component in components(problem) {
-        let scale = Scale::of(problem, &component);
+        let scale = CommonScale::of(problem, &component);
         seen -= scale.directions(&visible).min(seen);
         let (left, finding) = scale.left(problem, &component);
         if left > worst {
@@ -132,7 +132,7 @@ pub fn count(problem: &Problem) -> Count {
         }
         findings.push(finding);
     }
-    Count {
+    StructuralRank {
         seen_at_most: seen.min(equations),
         of: problem.parameters(),
         equations,
