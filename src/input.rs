@@ -100,7 +100,7 @@ pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
 }
 
 /// What stands at a path in the place of a file. A device may never end, and a pipe never begin; but the
-/// program's own (`/dev/stdin`) was begun by whoever started it.
+/// program's own (`/dev/stdin`) belongs to the process that started it.
 fn no_file(path: &Path, metadata: &Metadata) -> Option<&'static str> {
     let is_own = ["/dev", "/proc"].iter().any(|own| path.starts_with(own));
     match () {

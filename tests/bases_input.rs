@@ -2,7 +2,7 @@
 //! cannot mean.
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::functions::{Basis, Parameterization};
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ functions:
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(&path, text).map_err(said)?;
-    build(&file, Purpose::Simulate { nodes: None }).map_err(said)
+    build(&file, BuildMode::Simulate { nodes: None }).map_err(said)
 }
 
 fn message(mass: &str) -> String {

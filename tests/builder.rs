@@ -1,6 +1,6 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
@@ -23,7 +23,7 @@ fn columns<const N: usize>(file: &str, names: [&str; N]) -> [Vec<f64>; N] {
 
 fn from_file(yaml: &str) -> (Problem, kmcfit_core::internals::solvers::FitSettings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/built-by-the-test.yaml");
-    let model = build(&ModelFile::parse(&path, yaml).unwrap(), Purpose::Fit).unwrap();
+    let model = build(&ModelFile::parse(&path, yaml).unwrap(), BuildMode::Fit).unwrap();
     (model.problem, model.settings)
 }
 

@@ -3,7 +3,7 @@
 mod common;
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::report::{CostKind, cost_definition};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
@@ -286,7 +286,7 @@ fit: {{method: equation-error}}
     );
     let file = ModelFile::parse("dropbear.yaml", text).unwrap();
     let clock = std::time::Instant::now();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     assert!(model.warnings.is_empty(), "{:?}", model.warnings);
     let found = run(&model.problem);
     let seconds = clock.elapsed().as_secs_f64();
@@ -532,7 +532,7 @@ fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, Str
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), model).map_err(said)?;
-    build(&file, Purpose::Fit).map_err(said)
+    build(&file, BuildMode::Fit).map_err(said)
 }
 
 fn model(damping: &str, fit: &str) -> String {

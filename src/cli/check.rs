@@ -1,7 +1,7 @@
 //! `kmcfit check`
 
 use super::{Failure, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
-use crate::config::{Model, Purpose, build};
+use crate::config::{BuildMode, Model, build};
 use crate::report::{CsvTable, figures, render};
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
@@ -36,7 +36,7 @@ const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     announce(&model);
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         print(&describe(&model));
@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     // Errors in the input come before any output.
     let refined = node_counts(arguments)
         .into_iter()
-        .map(|nodes| build(&file, Purpose::Check { nodes }))
+        .map(|nodes| build(&file, BuildMode::Check { nodes }))
         .collect::<Result<Vec<_>, _>>()?;
     let problem = &model.problem;
     let steps = problem.check_steps(&problem.functions.start());

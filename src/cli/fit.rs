@@ -4,7 +4,7 @@ use super::progress::Progress;
 use super::{
     Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
 use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
@@ -95,7 +95,7 @@ fn fit(
     printed: &Printed,
     is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let mut model = build(file, Purpose::Fit)?;
+    let mut model = build(file, BuildMode::Fit)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
     if !is_resumed {

@@ -1,7 +1,7 @@
 //! `kmcfit simulate`
 
 use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
-use crate::config::{ModelFile, Purpose, build};
+use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
 use crate::input::{one_of, quote, read_text};
@@ -49,7 +49,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
-    let purpose = Purpose::Simulate {
+    let purpose = BuildMode::Simulate {
         nodes: arguments.nodes,
     };
     let problem = build(&file, purpose)?.problem;

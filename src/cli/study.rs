@@ -7,7 +7,7 @@ use super::{
     Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
     unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
 use crate::report::study::{
     self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
@@ -105,7 +105,7 @@ fn run_in(
     threads: usize,
     is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let mut model = build(file, Purpose::Fit)?;
+    let mut model = build(file, BuildMode::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
     announce(&model);

@@ -261,7 +261,7 @@ impl Table {
         }
     }
 
-    /// Adds a data row; a field that is no number spoils its column, for whoever asks for it.
+    /// Adds a data row; a field that is not a number makes its column unusable.
     fn push(
         &mut self,
         line: usize,

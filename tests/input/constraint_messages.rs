@@ -1,7 +1,7 @@
 //! Constraints in model files: what they mean, and every message about what they cannot mean.
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::finding::Finding;
 use kmcfit_core::internals::solvers::{Initial, Solver};
 
@@ -39,7 +39,7 @@ fn read(text: &str) -> Result<Model, String> {
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
-    build(&file, Purpose::Fit).map_err(said)
+    build(&file, BuildMode::Fit).map_err(said)
 }
 
 fn message(constraints: &str) -> String {

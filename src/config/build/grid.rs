@@ -3,7 +3,7 @@
 mod auto;
 mod per_node;
 
-use super::Purpose;
+use super::BuildMode;
 use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
@@ -17,7 +17,7 @@ const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,
-    purpose: Purpose,
+    purpose: BuildMode,
     records: &[Option<Record>],
     notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
@@ -54,7 +54,7 @@ pub(super) fn build(
     })
 }
 
-fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError {
+fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputError {
     match purpose.nodes() {
         Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
@@ -62,12 +62,12 @@ fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError 
 }
 
 /// Memory that a run of the model on so many nodes may need, bytes.
-pub(super) fn memory_of(file: &ModelFile, purpose: Purpose, nodes: usize) -> f64 {
+pub(super) fn memory_of(file: &ModelFile, purpose: BuildMode, nodes: usize) -> f64 {
     nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
 }
 
 /// Refuses a grid that the machine has no memory for, before any is taken.
-fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<(), InputError> {
+fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Result<(), InputError> {
     let needed = memory_of(file, purpose, nodes);
     let Err(available) = memory::check(needed as u64) else {
         return Ok(());

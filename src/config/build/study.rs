@@ -103,8 +103,8 @@ const MOST_REPLICATES: usize = 1_000_000;
 const FEWEST_REPLICATES: usize = 40;
 /// Ratios and motions that differ by less are those of one optimum.
 const SAME: f64 = 1e-3;
-/// Tubes are sought at so many times unless the model names some.
-const TUBES: usize = 5;
+/// Number of times of the extremes, unless the model names them.
+const EXTREME_TIMES: usize = 5;
 
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
     let none = StudySpec::default();
@@ -246,8 +246,9 @@ fn within(
 fn extremes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
     let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
-        let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
-        return Ok((0..TUBES).map(time).collect());
+        let time =
+            |i: usize| grid.start() + grid.duration() * i as f64 / (EXTREME_TIMES - 1) as f64;
+        return Ok((0..EXTREME_TIMES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
         on_grid(
