@@ -42,7 +42,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let pair = Builder::new(parts()).record(free).record(forced).build()?;
     Ok([alone, pair].map(|problem| {
         let seen = structural_rank(&problem);
-        (seen.seen_at_most, seen.symmetry != Symmetry::None)
+        (seen.rank_bound, seen.symmetry != Symmetry::None)
     }))
 }
 

@@ -29,7 +29,7 @@ impl FittedModel<'_> {
             return summary;
         };
         let count = structural_rank(problem);
-        summary.rank_bound = count.seen_at_most;
+        summary.rank_bound = count.rank_bound;
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
             summary.warnings.push(findings::unidentified(reason));
@@ -39,10 +39,12 @@ impl FittedModel<'_> {
         // Constraints and penalties may determine what the records do not.
         let all_identified =
             !judgements.is_empty() && !judgements.iter().any(FunctionClassification::is_open);
-        if count.seen_at_most < count.of && !all_identified {
+        if count.rank_bound < count.parameters && !all_identified {
             let finding = Finding::new("rank_bound", count.headline());
-            let finding = finding.with("rank_bound", count.seen_at_most);
-            summary.warnings.push(finding.with("parameters", count.of));
+            let finding = finding.with("rank_bound", count.rank_bound);
+            summary
+                .warnings
+                .push(finding.with("parameters", count.parameters));
         }
         let mut add = |is_warning: bool, finding: Finding| match is_warning {
             true => summary.warnings.push(finding),

@@ -41,8 +41,9 @@ pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, FunctionClassification, Gain, Gauge, RankFinding, RankFindingKind,
-        Ranked, Seen, Sensitivity, Side, SingularSpectrum, Symmetry, anchors, classify_functions,
-        is_rounding, is_unhindered, rank_experiments, residual_spread, structural_rank,
+        Ranked, ResolvedDirection, Sensitivity, Side, SingularSpectrum, Symmetry, anchors,
+        classify_functions, is_rounding, is_unhindered, rank_experiments, residual_spread,
+        structural_rank,
     };
 }
 pub mod objective {

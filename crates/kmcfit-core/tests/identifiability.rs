@@ -160,7 +160,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         );
         assert_eq!((seen.rank(), seen.of()), (expected, 600), "{words}");
         assert_eq!(
-            (counted.seen_at_most, counted.of),
+            (counted.rank_bound, counted.parameters),
             (expected, 600),
             "{words}"
         );
@@ -178,7 +178,7 @@ fn a_force_that_pauses_sees_less_while_it_does() {
     force[30..50].fill(0.0);
     let problem = nodal_problem(&system, &nodal, &[free(0), free(1), (state, Some(force))]);
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
-    assert_eq!(structural_rank(&problem).seen_at_most, 3 * 79 - 19);
+    assert_eq!(structural_rank(&problem).rank_bound, 3 * 79 - 19);
     assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
 }
 
@@ -193,7 +193,7 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
         let problem = linear_mass(&system, record);
         let counted = structural_rank(&problem);
         println!("{}", counted.sentences().join("; "));
-        assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
+        assert_eq!((counted.rank_bound, counted.parameters), (expected, 4));
         assert_eq!(spectrum(&problem).rank(), expected);
         assert_eq!(counted.symmetry, symmetry);
     }
@@ -229,7 +229,7 @@ proptest! {
             (state(y, v), drive.then_some(force))
         }).collect();
         let problem = nodal_problem(&system, &nodal, &records);
-        let (counted, seen) = (structural_rank(&problem).seen_at_most, spectrum(&problem).rank());
+        let (counted, seen) = (structural_rank(&problem).rank_bound, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
             prop_assert_eq!(seen, counted);
@@ -821,7 +821,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         })
         .unwrap();
     // Half of the knots are beyond the last sample.
-    assert_eq!(structural_rank(&problem).seen_at_most, 7);
+    assert_eq!(structural_rank(&problem).rank_bound, 7);
     assert_eq!(spectrum(&problem).rank(), 7);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
@@ -970,7 +970,7 @@ fn the_scale_by_bases_and_drives() {
             counted.sentences().join("; ")
         );
         assert_eq!(
-            (counted.seen_at_most, counted.symmetry),
+            (counted.rank_bound, counted.symmetry),
             (expected, symmetry),
             "{name}"
         );

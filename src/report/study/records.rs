@@ -38,8 +38,8 @@ const DRAWS: usize = 10_000;
 pub fn structural_rank(problem: &Problem) -> Vec<Finding> {
     let count = identifiability::structural_rank(problem);
     let bound = Finding::new("rank_bound", count.headline());
-    let bound = bound.with("rank_bound", count.seen_at_most);
-    let bound = bound.with("parameters", count.of);
+    let bound = bound.with("rank_bound", count.rank_bound);
+    let bound = bound.with("parameters", count.parameters);
     let others = count.findings.iter().map(findings::rank);
     std::iter::once(bound).chain(others).collect()
 }
@@ -65,8 +65,8 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
     let unseen = Gauge::at(at.problem, at.theta).unseen(&spectrum);
     let unseen = unseen.into_iter().take(NAMED);
-    let records = |list: Vec<identifiability::Seen>| {
-        let record = |seen: identifiability::Seen| DirectionRecord {
+    let records = |list: Vec<identifiability::ResolvedDirection>| {
+        let record = |seen: identifiability::ResolvedDirection| DirectionRecord {
             singular_value: seen.singular_value,
             functions: seen.functions,
         };

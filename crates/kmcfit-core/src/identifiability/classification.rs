@@ -9,25 +9,24 @@ use crate::problem::Problem;
 use crate::system::Term;
 use serde::{Deserialize, Serialize};
 
-/// A function is identified where the half-width of its 95 % band is at most this share of its
-/// size at most times ([`Problem::natural_scales`] with the median of its values in place of the largest): a quarter
-/// tells half of it from the whole.
+/// Largest half-width of the 95 % band of an identified function, as a share of its size ([`Problem::natural_scales`] with
+/// the median of its values in place of the largest).
 pub const IDENTIFIED: f64 = 0.25;
-/// It is identified on the whole if it is so at this share of the nodes: the ends of a record are
-/// always seen less.
+/// Share of the nodes at which a function must be identified to be identified as a whole; the ends of a record carry less
+/// information.
 pub const MOST: f64 = 0.95;
-/// Below this share of the nodes it is not seen.
+/// Share of the nodes below which a function is not identified.
 pub const LEAST: f64 = 0.05;
 
-/// What is known of a function or ratio.
+/// Identifiability of a function or ratio.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Classification {
-    /// Known at (nearly) all times.
+    /// Identified at (nearly) all times.
     Identified {
-        /// Largest half-width of the 95 % band there, relative to that size.
+        /// Largest half-width of the 95 % band, relative to the function's size.
         relative: f64,
     },
-    /// Not identified itself; its ratio to the mass is.
+    /// Not identified itself; the named ratio to the mass is.
     OnlyRatio(String),
     /// Identified on these spans of time, s.
     PartlyIdentified(Vec<[f64; 2]>),
@@ -38,7 +37,7 @@ pub enum Classification {
 }
 
 impl Classification {
-    /// Its kind.
+    /// Kind without values.
     pub fn kind(&self) -> ClassificationKind {
         match self {
             Self::Identified { .. } => ClassificationKind::Identified,
@@ -49,7 +48,7 @@ impl Classification {
         }
     }
 
-    /// Its name in files.
+    /// Name in files.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Identified { .. } => "identified",
@@ -61,7 +60,7 @@ impl Classification {
     }
 }
 
-/// The kind of a [`Classification`].
+/// Kind of a [`Classification`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
@@ -73,21 +72,21 @@ pub enum ClassificationKind {
     Fixed,
 }
 
-/// A verdict on one function or ratio.
+/// Classification of one function or ratio.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FunctionClassification {
     /// Name of the function or ratio.
     pub name: String,
-    /// The verdict.
+    /// Classification.
     pub verdict: Classification,
-    /// The same as a sentence.
+    /// Classification as a sentence.
     pub sentence: String,
-    /// Smallest and largest value at the nodes where it is known; `None` where there is no such node.
+    /// Smallest and largest value over the nodes where it is identified; `None` where there is no such node.
     pub identified_range: Option<[f64; 2]>,
 }
 
 impl FunctionClassification {
-    /// Whether it says what stays open, and not what is known or given.
+    /// True where the classification limits what is known: partly, not, or only as a ratio identified.
     pub fn is_open(&self) -> bool {
         match self.verdict {
             Classification::Identified { .. } | Classification::Fixed => false,
@@ -98,17 +97,16 @@ impl FunctionClassification {
     }
 }
 
-/// Beside the size at which a function would matter, less than this is rounding.
+/// Values below this share of a function's size are rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// Whether a value is zero but for rounding, beside the size at which it would matter.
+/// True where `value` is zero to machine precision, relative to `size`.
 pub fn is_rounding(value: f64, size: f64) -> bool {
     value.abs() <= ROUNDING * size
 }
 
-/// By how much a number of this size is known where it is known at all: as a share of its own largest value
-/// there, or where that is within the band, as a number beside which the value cannot be told from zero. In between it
-/// is small beside the size at which it would matter, and that is what is known of it.
+/// Sentence on the accuracy of an identified function. The half-width is given relative to the function's largest value, or
+/// as a number where the band contains zero or the function is small relative to `size`.
 fn identified(name: &str, band: &Band, size: f64) -> String {
     let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
     let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
@@ -137,12 +135,12 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
     format!("{name} is identified: 95 % CI half-width at most {share} of its largest value")
 }
 
-/// Whether a function of this size is known at a node.
+/// True where the half-width of the band at node `i` is small enough for a function of this size.
 fn is_known(band: &Band, size: f64, i: usize) -> bool {
     band.values[i].is_finite() && NORMAL_975 * band.standard_error[i] / size <= IDENTIFIED
 }
 
-/// Verdicts on every function of the list, then on `k/m` and `c/m`.
+/// Classifies every function of the list, then `k/m` and `c/m`.
 pub fn classify_functions(
     problem: &Problem,
     evaluation: &Evaluation,

@@ -1,9 +1,9 @@
-//! The directions in which the response cannot change: the common scale of the functions.
+//! Scaling ambiguity: directions in parameter space that leave the response unchanged.
 //!
-//! With `f = 0` the response of `s(t) (m, c, k)` is that of `(m, c, k)`. At a point, `s = 1 + epsilon sigma(t)`
-//! changes the functions by `delta p_j = epsilon sigma(t) p_j`, for all `j` alike. A gauge direction is a
-//! `delta theta` that does this in every basis, with `sigma = 0` where a force acts or a function that
-//! is known is not zero, and that no equality constraint forbids.
+//! For `f = 0` the response of `s(t) (m, c, k)` equals that of `(m, c, k)`. To first order, `s = 1 + epsilon sigma(t)`
+//! changes all functions by `delta p_j = epsilon sigma(t) p_j`. A scaling direction is a `delta theta` that represents
+//! this change in every basis, with `sigma = 0` where a force acts or a fixed function is nonzero, and that satisfies all
+//! equality constraints.
 
 use super::components::{Component, components};
 use super::directions::Directions;
@@ -14,47 +14,47 @@ use crate::problem::Problem;
 use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 
-/// What is left of a relation that holds, relative to the functions' sizes.
+/// Relative residual below which a relation holds, relative to the functions' sizes.
 const HOLDS: f64 = 1e-8;
-/// A direction is named after the gauge if this share of its squared norm lies there.
+/// Share of the squared norm in the space of scaling directions above which an undetermined direction is named a scaling.
 pub const MOSTLY: f64 = 0.9;
-/// Up to so many nodes the scale over time is written node by node, beyond by so many hats.
+/// Number of nodes up to which the factor over time is represented node by node; beyond it, by so many hats.
 const MOST_FACTORS: usize = 200;
 
-/// One gauge direction.
+/// One scaling direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GaugeDirection {
     /// `scale of (m, c, k)`, or `scale over time s(t) of (m, c, k)`.
     pub name: String,
-    /// Whether the factor is the same at all times.
+    /// True for a factor constant in time.
     pub constant: bool,
-    /// The factor `sigma` at the nodes, without unit.
+    /// Factor `sigma` at the nodes, dimensionless.
     pub factor: Vec<f64>,
-    /// The change of the parameters.
+    /// Change of the parameters.
     pub change: Vec<f64>,
 }
 
-/// All gauge directions at a point.
+/// All scaling directions at a point.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Gauge {
-    /// For each set of functions with one scale: the constant factor first, where it is free, then a
-    /// basis of the factors over time (whose span contains it).
+    /// For each group of functions with a common scale: the constant factor first, where it is free, then a basis of the
+    /// factors over time, whose span contains the constant one.
     pub directions: Vec<GaugeDirection>,
 }
 
-/// A direction that the samples do not see, with the name of what it does.
+/// An undetermined direction that is mostly a scaling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
-    /// The gauge it belongs to.
+    /// Name of the scaling.
     pub name: String,
-    /// The share of its squared norm that lies in the gauge space.
+    /// Share of the squared norm in the space of scaling directions.
     pub share: f64,
-    /// Its change of the parameters.
+    /// Change of the parameters.
     pub change: Vec<f64>,
 }
 
 impl Gauge {
-    /// The gauge directions at the parameters `theta`.
+    /// Scaling directions at the parameters `theta`.
     pub fn at(problem: &Problem, theta: &[f64]) -> Self {
         let values = problem.functions.values(theta);
         let mut directions = Vec::new();
@@ -81,7 +81,7 @@ impl Gauge {
             let constant = (constant)
                 .then(|| make(&vec![1.0; nodes], true))
                 .filter(|c| obeying(problem, vec![c.clone()]).len() == 1);
-            // Nothing but the constant: said once.
+            // The factors over time contain no more than the constant one.
             if constant.is_some() && free.len() == 1 {
                 directions.extend(constant);
             } else {
@@ -91,37 +91,35 @@ impl Gauge {
         Self { directions }
     }
 
-    /// Whether nothing is free.
+    /// True if the scale of all functions is determined.
     pub fn is_empty(&self) -> bool {
         self.directions.is_empty()
     }
 
-    /// The constant factors.
+    /// Constant factors.
     pub fn constant(&self) -> impl Iterator<Item = &GaugeDirection> {
         self.directions.iter().filter(|d| d.constant)
     }
 
-    /// The factors over time; none where only a constant one is free.
+    /// Factors over time; empty where only constant factors are free.
     pub fn over_time(&self) -> impl Iterator<Item = &GaugeDirection> {
         self.directions.iter().filter(|d| !d.constant)
     }
 
-    /// An orthonormal basis of the gauge space in the scaled directions, as columns.
+    /// Orthonormal basis of the scaling directions in scaled directions, as columns.
     pub fn basis(&self, directions: &Directions) -> DMatrix<f64> {
         basis_of(self.directions.iter(), directions)
     }
 
-    /// The share of the squared norm of a change of the parameters that lies in the gauge space, in
-    /// scaled directions.
+    /// Share of the squared norm of a parameter change in the space of scaling directions, in scaled directions.
     pub fn share(&self, change: &[f64], directions: &Directions) -> f64 {
         let z = DVector::from_vec(directions.nearest(change));
         let inside = self.basis(directions).tr_mul(&z);
         inside.norm_squared() / z.norm_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// The directions that the samples do not see and that are mostly gauge: constant factors
-    /// first, then those over time, orthogonal to them. The rest of [`SingularSpectrum::unseen`] has other
-    /// reasons.
+    /// Undetermined directions that are mostly scalings: constant factors first, then factors over time, orthogonal to them.
+    /// The remaining directions of [`SingularSpectrum::unseen`] have other causes.
     pub fn unseen(&self, spectrum: &SingularSpectrum) -> Vec<Named> {
         let directions = spectrum.directions();
         let mut named = Vec::new();
@@ -159,8 +157,7 @@ fn basis_of<'a>(
     }
 }
 
-/// The directions of the space `basis` (orthonormal columns) that are not seen: principal directions
-/// between it and the null space.
+/// Undetermined directions in the space `basis` (orthonormal columns): principal directions between it and the null space.
 fn unseen_in(spectrum: &SingularSpectrum, basis: &DMatrix<f64>, name: Option<&str>) -> Vec<Named> {
     let Some(name) = name else {
         return Vec::new();
@@ -186,7 +183,7 @@ fn unseen_in(spectrum: &SingularSpectrum, basis: &DMatrix<f64>, name: Option<&st
     found
 }
 
-/// The combinations of `directions` that no equality constraint forbids.
+/// Combinations of `directions` that satisfy all equality constraints.
 fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirection> {
     let Some(first) = directions.first() else {
         return directions;
@@ -200,7 +197,7 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
                     group.rows.row(i).map(|(j, a)| a * d.change[j]).sum()
                 };
                 let answers: Vec<f64> = directions.iter().map(answer).collect();
-                // Against the row's own terms, so that a rounded zero is one.
+                // Relative to the terms of the row, so that rounding errors count as zero.
                 let size = directions.iter().fold(0.0f64, |most, d| {
                     let terms = group.rows.row(i).map(|(j, a)| (a * d.change[j]).abs());
                     most.max(terms.sum())
@@ -233,8 +230,8 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
     each.collect()
 }
 
-/// An orthonormal basis of the factors at the nodes that every function of the component can follow
-/// and that vanish where the scale is fixed; `None` if there are none.
+/// Orthonormal basis of the factors at the nodes that the bases of all functions of the component represent and that vanish
+/// where the scale is determined; `None` if there are none.
 fn factors(problem: &Problem, component: &Component, values: &[Vec<f64>]) -> Option<DMatrix<f64>> {
     let (forced, known) = (component.forced(problem), component.known(problem));
     let nodes = forced.len();
@@ -286,7 +283,7 @@ fn factors(problem: &Problem, component: &Component, values: &[Vec<f64>]) -> Opt
     (kept.ncols() > 0).then(|| space * kept)
 }
 
-/// One factor per node at which the scale is open, or hats over time where these are many.
+/// One factor per node with a free scale, or hats over time for many nodes.
 fn nodal_factors(open: &[bool]) -> DMatrix<f64> {
     let nodes = open.len();
     let free: Vec<usize> = (0..nodes).filter(|i| open[*i]).collect();
@@ -309,7 +306,7 @@ fn dense(design: &Design, nodes: usize) -> DMatrix<f64> {
     }
 }
 
-/// The change of all parameters that multiplies the component's functions by `factor`.
+/// Change of all parameters that multiplies the functions of the component by `factor`.
 fn change(
     problem: &Problem,
     component: &Component,
@@ -329,7 +326,7 @@ fn change(
             design @ Design::Sparse(_) => {
                 let gram = functions.gram(f);
                 let mut step = vec![0.0; part.len()];
-                // Twice: the second pass removes what the normal equations lose.
+                // A second pass removes the error of the normal equations.
                 for _ in 0..2 {
                     let now = design.multiply(part, functions.nodes());
                     let rest = product.iter().zip(&now).zip(&weights);

@@ -1,13 +1,11 @@
-//! What the samples can show of the functions, before a fit and after it, and which experiment would
-//! show more.
+//! Identifiability: the parameters and functions that records determine, before a fit and at its optimum.
 //!
-//! * [`count`]: from the problem alone, how many directions of the parameters can be seen at most, and
-//!   which scale stays free;
-//! * [`Sensitivity`] and [`SingularSpectrum`]: how well each direction is seen at a point;
-//! * [`Gauge`]: the directions that leave the response unchanged, and whether an unseen direction is one;
-//! * [`Bands`]: how far each function and ratio may be off;
-//! * [`verdicts`]: the same in words; [`anchors`]: the instants at which a ratio is fixed;
-//! * [`rank_experiments`]: which further record adds most.
+//! * [`structural_rank()`]: upper bound of the number of identifiable parameter combinations, without a simulation;
+//! * [`Sensitivity`] and [`SingularSpectrum`]: singular values of the weighted Jacobian;
+//! * [`Gauge`]: scaling ambiguity, directions that leave the response unchanged;
+//! * [`Bands`]: confidence bands of functions and ratios; [`classify_functions`]: their classification;
+//! * [`anchors()`]: instants at which a response determines one ratio;
+//! * [`rank_experiments`]: experiment design.
 
 mod active;
 mod anchors;
@@ -28,7 +26,7 @@ pub use classification::is_rounding;
 
 use crate::problem::Problem;
 
-/// Whether the samples alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
+/// True if the samples alone determine a point: the cost has no penalties, and no constraint is active.
 pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
 }
@@ -44,5 +42,5 @@ pub use experiments::{
 };
 pub(crate) use factorisation::Factorisation;
 pub use gauge::Gauge;
-pub use sensitivity::{Seen, Sensitivity, SingularSpectrum};
+pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
 pub use structural_rank::{RankFinding, RankFindingKind, Symmetry, structural_rank};

@@ -1,22 +1,22 @@
-//! The cost of a parameter vector and its derivatives, from one trajectory per point.
+//! Cost function of a problem and its derivatives, from one simulation per point.
 
 mod cost_and_gradient;
 mod gradient;
 mod gradient_check;
+mod gradient_error;
 mod jacobian;
 mod node_aligned;
 mod prediction;
 mod scales;
 mod simulated_record;
 mod step_halving;
-mod verify;
 
 pub use gradient::{Gradient, GradientKind};
 pub use gradient_check::GradientCheck;
+pub use gradient_error::GradientError;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
 pub use step_halving::Refined;
-pub use verify::GradientError;
 
 use crate::problem::Problem;
 use crate::record::Channel;
@@ -24,29 +24,30 @@ use crate::simulate::reference::tangent;
 use crate::simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
-/// The cost at one point and everything that it was computed from.
+/// Cost at one point, with the simulation it was computed from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// Cost `J`, the sum of the next two.
+    /// Cost `J`, the sum of misfit and regularisation.
     pub cost: f64,
-    /// Part of the samples.
+    /// Misfit of the samples.
     pub misfit: f64,
-    /// Part of the penalties.
+    /// Penalties, soft constraints and priors.
     pub regularisation: f64,
-    /// The shared coefficient set at this point.
+    /// Nodal values of the shared coefficient set.
     pub nodal: NodalCoefficients,
-    /// The other systems of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    /// Nodal values of the other coefficient sets of
+    /// [`Parameterization::coefficient_sets`](crate::functions::Parameterization::coefficient_sets).
     pub own_nodal: Vec<NodalCoefficients>,
-    /// The scalars at this point.
+    /// Scalar parameters.
     pub scalars: Vec<f64>,
-    /// The response in each experiment.
+    /// Response of each experiment.
     pub trajectories: Vec<Trajectory>,
-    /// What the model says of the samples, for each experiment and each of its channels.
+    /// Predicted samples of each experiment and channel.
     pub predictions: Vec<Vec<Vec<f64>>>,
 }
 
 impl Evaluation {
-    /// System `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
+    /// Nodal values of coefficient set `which`.
     pub fn nodal_of(&self, which: usize) -> &NodalCoefficients {
         match which {
             0 => &self.nodal,
@@ -56,7 +57,7 @@ impl Evaluation {
 }
 
 impl Problem {
-    /// Storage for evaluations, used again and again by [`Problem::evaluate_into`].
+    /// Storage for evaluations by [`Problem::evaluate_into`].
     pub fn workspace(&self) -> Evaluation {
         let nodal_sets = self.functions.coefficient_sets().len();
         Evaluation {
@@ -75,25 +76,22 @@ impl Problem {
         }
     }
 
-    /// Cost, systems and responses for the parameters `theta`.
+    /// Evaluates the cost at the parameters `theta`.
     ///
-    /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
-    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
-    /// of `weight sum |D theta|` ([`crate::functions::TotalVariation`]) plus the price of the soft
-    /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
-    /// ([`crate::functions::ScalarParameter::price`]).
+    /// The cost is the sum of [`Channel::cost`](crate::record::Channel::cost) over the channels, of
+    /// `weight |L theta - target|^2` over the penalties ([`crate::functions::Penalty`]), of `weight sum |D theta|` over the
+    /// total-variation penalties ([`crate::functions::TotalVariation`]), of the soft constraints
+    /// ([`crate::constraints::RowGroup::price`]) and of the priors ([`crate::functions::ScalarParameter::price`]).
     ///
     /// # Errors
-    /// A [`SimulationError`] if a response does not exist (the mass is not positive, or it overflows), or the
-    /// cost overflows.
+    /// A [`SimulationError`] if the mass is not positive at some node, or the response or the cost overflows.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, SimulationError> {
         let mut evaluation = self.workspace();
         self.evaluate_into(theta, &mut evaluation)?;
         Ok(evaluation)
     }
 
-    /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
-    /// error.
+    /// [`Problem::evaluate`] into existing storage, whose contents are undefined after an error.
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
@@ -105,7 +103,7 @@ impl Problem {
         self.evaluate_for(Purpose::Estimation, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] by the engine of a [`Purpose`].
+    /// [`Problem::evaluate_into`] with the engine for a [`Purpose`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
@@ -125,7 +123,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Functions and scalars for the parameters `theta`.
+    /// Sets functions and scalars to those of the parameters `theta`.
     pub(crate) fn set_parameters(&self, theta: &[f64], evaluation: &mut Evaluation) {
         self.functions.nodal_into(theta, 0, &mut evaluation.nodal);
         for (i, own) in evaluation.own_nodal.iter_mut().enumerate() {
@@ -134,7 +132,7 @@ impl Problem {
         evaluation.scalars.copy_from_slice(self.scalars(theta));
     }
 
-    /// The channels of all experiments, each with its predictions.
+    /// Channels of all experiments, each with its predictions.
     pub(crate) fn predicted<'a>(
         &'a self,
         evaluation: &'a Evaluation,
@@ -177,7 +175,7 @@ impl Problem {
         Ok(())
     }
 
-    /// What the channels of experiment `e` look at, at an evaluated point.
+    /// Simulated record of experiment `e` at an evaluated point.
     pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> SimulatedRecord<'a> {
         let experiment = &self.experiments[e];
         SimulatedRecord {
@@ -189,8 +187,7 @@ impl Problem {
         }
     }
 
-    /// The change of all predictions along a direction of the parameters, for each experiment and
-    /// each of its channels: one tangent solve.
+    /// Directional derivative of all predictions, for each experiment and channel, by one tangent solve.
     pub fn predictions_tangent(
         &self,
         evaluation: &Evaluation,
@@ -223,7 +220,7 @@ impl Problem {
         each.collect()
     }
 
-    /// Where the largest residual stands, for a cost that has left the finite numbers.
+    /// Error with the location of the largest residual, for a cost that is not finite.
     fn cost_overflow(&self, evaluation: &Evaluation) -> SimulationError {
         let mut worst = (
             TimePoint {
@@ -248,8 +245,8 @@ impl Problem {
         }
     }
 
-    /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
-    /// `weight sum |D theta|` plus soft constraints `weight mean excess^2` plus priors of scalars.
+    /// Regularisation at `theta`: penalties `weight |L theta - target|^2`, total variation `weight sum |D theta|`, soft
+    /// constraints `weight mean excess^2` and priors of scalars.
     pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
         let smooth = self.penalties.iter().map(|penalty| {

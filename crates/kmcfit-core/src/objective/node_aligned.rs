@@ -1,4 +1,4 @@
-//! Accelerations read on every node, eight at a time.
+//! Predicted accelerations at nodes and their transpose, eight nodes at a time.
 
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
@@ -9,13 +9,12 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
-    /// Whether sample `i` is the acceleration at node `i`.
+    /// True if sample `i` of every `i` is the acceleration at node `i`.
     pub(super) fn is_acceleration_on_nodes(&self) -> bool {
         self.is_on_every_node() && self.kind() == ChannelKind::Acceleration
     }
 
-    /// Force and acceleration of the base at eight samples from sample `i` on; beyond the last one they mean
-    /// nothing.
+    /// Force and acceleration of the base at eight samples from sample `i`; undefined beyond the last sample.
     #[inline(always)]
     fn around_eight<A: Arithmetic>(
         &self,
@@ -38,7 +37,7 @@ impl Channel {
         rows.map(|row| Eight::load(arithmetic, &row))
     }
 
-    /// The accelerations on eight nodes from node `i` on.
+    /// Accelerations at eight nodes from node `i`.
     #[inline(always)]
     pub(super) fn accelerations<A: Arithmetic>(
         &self,
@@ -57,7 +56,7 @@ impl Channel {
     }
 }
 
-/// Appends what the model says of the samples of `channel`.
+/// Appends the predicted samples of `channel` to `out`.
 pub(super) struct Predict<'a> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -94,7 +93,7 @@ impl Kernel for Predict<'_> {
     }
 }
 
-/// [`Channel::add_transpose`] of such samples, after the filter.
+/// [`Channel::add_transpose`] for accelerations at nodes, after the filter.
 pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -143,7 +142,7 @@ impl Kernel for AddTranspose<'_, '_> {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
-                // Lanes without a sample have no slope.
+                // Lanes without a sample have zero slope.
                 CoefficientGradient::Summed(_) => {
                     for (sums, by) in sums.iter_mut().zip(&seen.functions) {
                         add_products(arithmetic, push, by, sums);

@@ -1,4 +1,4 @@
-//! Predictions of a channel, their tangent and its transpose.
+//! Predicted samples of a channel, their tangent and its transpose.
 
 use super::node_aligned::{AddTranspose, Predict};
 use super::{RecordTangent, SimulatedRecord};
@@ -10,7 +10,7 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::TimePoint;
 
 impl Channel {
-    /// What the sensor sees at sample `i`, before gain, offset and drift, and its derivatives.
+    /// Observation at sample `i` with its derivatives, before gain, offset and drift.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
             view.system,
@@ -27,7 +27,7 @@ impl Channel {
         sensed
     }
 
-    /// The value alone of [`Channel::sensed`].
+    /// Value of [`Channel::sensed`].
     fn seen(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
@@ -39,14 +39,14 @@ impl Channel {
         }
     }
 
-    /// What the model says of the samples.
+    /// Predicted samples.
     pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
         self.predict_into(view, &mut out);
         out
     }
 
-    /// [`Channel::predict`] into storage that is used again.
+    /// [`Channel::predict`] into existing storage.
     pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
         if self.is_on_every_node() && self.is_plain() {
@@ -69,7 +69,7 @@ impl Channel {
         }
     }
 
-    /// The change of [`Channel::predict`] along a direction.
+    /// Directional derivative of [`Channel::predict`].
     pub fn predict_tangent(&self, view: SimulatedRecord, along: RecordTangent) -> Vec<f64> {
         let [gain, ..] = self.sensor().values(view.scalars);
         let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
@@ -89,9 +89,8 @@ impl Channel {
         }
     }
 
-    /// Transpose of [`Channel::predict_tangent`]: takes derivatives of a cost with respect to the
-    /// predictions to `source` (with respect to the states), `direct` (with respect to the functions,
-    /// at fixed states) and `scalars`, adding to each.
+    /// Transpose of [`Channel::predict_tangent`]. Given derivatives of a cost with respect to the predictions, adds those with
+    /// respect to the states to `source`, to the functions at fixed states to `direct`, and to the scalars to `scalars`.
     pub fn add_transpose(
         &self,
         view: SimulatedRecord,
@@ -139,7 +138,7 @@ impl Channel {
         }
     }
 
-    /// Whether the predictions depend on the functions also at fixed states.
+    /// True if the predictions depend on the functions also at fixed states, as accelerations do.
     pub fn sees_functions(&self) -> bool {
         match self.kind() {
             ChannelKind::Displacement => false,
@@ -149,7 +148,7 @@ impl Channel {
     }
 }
 
-/// The change of what is sensed when the response and the system change.
+/// Directional derivative of an observation.
 fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
     let (y, v) = (&along.response.displacement, &along.response.velocity);
     let by_states = sensed.states[0] * y[step]

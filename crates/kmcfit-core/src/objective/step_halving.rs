@@ -1,28 +1,27 @@
-//! The optimum on a grid of half the step: how much of it is the stepper's.
+//! Step-size check: simulation on a grid with half the step, at unchanged functions.
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::simulate::{SimulationError, Trajectory, reference};
 use crate::system::{NodalCoefficients, System};
 
-/// What half the step changes, with the functions and scalars as they are.
+/// Results on half the step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refined {
     /// Half the step, s.
     pub step: f64,
-    /// Misfit there.
+    /// Misfit on half the step.
     pub misfit: f64,
-    /// Largest change of a prediction, for each experiment and each of its channels, in the SI unit
-    /// of the channel.
+    /// Largest change of a prediction for each experiment and channel, in the SI unit of the channel.
     pub changes: Vec<Vec<f64>>,
 }
 
 impl Problem {
-    /// The same systems and scalars on a grid of half the step: functions stay linear between the
-    /// old nodes, forces are sampled anew. `None` where samples do not lie on the finer grid.
+    /// Simulates the same functions and scalars on a grid of half the step. Functions are linear between the old nodes,
+    /// forces are sampled anew. `None` where samples do not lie on the finer grid.
     ///
     /// # Errors
-    /// A [`SimulationError`] if there is no response on the finer grid.
+    /// A [`SimulationError`] if the simulation on the finer grid fails.
     pub fn on_half_step(
         &self,
         evaluation: &Evaluation,
@@ -72,7 +71,7 @@ impl Problem {
     }
 }
 
-/// Functions that are linear between the old nodes, on the old nodes and half-way between them.
+/// Functions on the refined grid, linear between the old nodes.
 fn halved(nodal: &NodalCoefficients) -> NodalCoefficients {
     let finer = |f: &[f64]| -> Vec<f64> {
         let pairs = f.windows(2).flat_map(|w| [w[0], 0.5 * (w[0] + w[1])]);

@@ -2,12 +2,12 @@
 
 use crate::system::NodalCoefficients;
 
-/// Where derivatives with respect to the functions of a system are added.
+/// Storage for derivatives with respect to the functions.
 #[derive(Debug)]
 pub enum CoefficientGradient<'a> {
-    /// To those with respect to the values at the nodes.
+    /// Derivatives with respect to nodal values.
     AtNodes(&'a mut NodalCoefficients),
-    /// To their sums over the nodes, one a function, mass first: all that a constant asks for.
+    /// Sums over the nodes, one per function, mass first: the derivatives with respect to constant functions.
     Summed(&'a mut [f64]),
 }
 

@@ -1,23 +1,23 @@
-//! Other systems with the very same response.
+//! Coefficients with the same response as a given system: for a chosen mass, damping and stiffness by a quadratic program.
 //!
-//! Along a known response `y, v, a` under the force `f` every mass `m(t)` has dampings `c(t)` for which
+//! Given a response `y, v, a` (m, m/s, m/s^2) under the force `f` (N), every mass `m(t)` and damping `c(t)` define a
+//! stiffness
 //!
 //! ```text
 //! k = (f - m a - c v) / y
 //! ```
 //!
-//! is a stiffness. Where `y` crosses zero, `k` stays finite only if `c = (f - m a)/v` there, so the
-//! crossings anchor the damping and leave it free in between. Of all pairs this takes
+//! At a zero crossing of `y`, `k` is finite only if `c = (f - m a)/v`: the crossings fix the damping there. Among all pairs
+//! `(c, k)` the program selects
 //!
 //! ```text
-//! min  1/T integral ((c - c_wish)^2/C^2 + s_c T^2 c'^2/C^2 + s_k T^4 k''^2/K^2) dt
+//! min  1/T integral ((c - c_target)^2/C^2 + s_c T^2 c'^2/C^2 + s_k T^4 k''^2/K^2) dt
 //! s.t. c v + k y = f - m a at every node,   k >= k_min,   c >= c_min (if stated)
 //! ```
 //!
-//! as one quadratic program with both functions as unknowns: at the crossings the equation itself
-//! holds the anchor, and nothing is divided by a small `y`. `C` and `K` are the sizes at which damping
-//! and stiffness force are as large as the mass's. The pair is that of the continuous equation, so
-//! a stepper of order two reproduces the response to the square of its step.
+//! Both functions are unknowns, so nothing is divided by a small `y`. `C` and `K` are the damping and stiffness whose
+//! forces have the size of the inertia force. The pair satisfies the continuous equation of motion; a second-order stepper
+//! reproduces the response with an error proportional to the square of its step.
 
 use super::refit::positive_rms;
 use crate::objective::Evaluation;
@@ -26,8 +26,8 @@ use crate::qp::{ConicStatus, Subproblem};
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{Grid, NodalCoefficients};
 
-/// Default weights of the slope of c and of the curvature of k: smooth within some thousandths of the
-/// record, so that the options comes first between the anchors.
+/// Default `s_c` and `s_k`: smoothing over some thousandths of the record, so that the target damping dominates between
+/// zero crossings.
 const SMOOTHNESS: [f64; 2] = [1e-5, 1e-9];
 
 /// A response at the nodes of a grid, and the force that drives it.
@@ -39,14 +39,14 @@ pub struct TargetResponse {
     pub displacement: Vec<f64>,
     /// `y'`, m/s.
     pub velocity: Vec<f64>,
-    /// `y''`, with that of the base where it moves, m/s^2.
+    /// `y''`, with the acceleration of the base added under base excitation, m/s^2.
     pub acceleration: Vec<f64>,
     /// `f`, N.
     pub force: Vec<f64>,
 }
 
 impl TargetResponse {
-    /// The response of experiment `e` of a fit, its acceleration from the equation itself.
+    /// The response of experiment `e` of a fit; accelerations follow from the equation of motion.
     pub fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Self {
         let experiment = &problem.experiments[e];
         let nodal = evaluation.nodal_of(experiment.coefficient_set);
@@ -75,21 +75,21 @@ impl TargetResponse {
     }
 }
 
-/// Which of the systems with the response is wanted.
+/// Selection among the systems with the same response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EquivalentOptions {
-    /// The damping to be near to, N s/m at the nodes.
+    /// Target damping, N s/m at the nodes.
     pub damping: Vec<f64>,
-    /// Least stiffness, N/m.
+    /// Lower bound of the stiffness, N/m.
     pub least_stiffness: f64,
-    /// Least damping, N s/m, if any.
+    /// Lower bound of the damping, N s/m, if any.
     pub least_damping: Option<f64>,
-    /// `s_c` and `s_k`, without unit.
+    /// Weights `s_c` and `s_k`, dimensionless.
     pub smoothness: [f64; 2],
 }
 
 impl EquivalentOptions {
-    /// Near to `damping`, with a stiffness of at least `least_stiffness` (N/m).
+    /// Target `damping` and a stiffness of at least `least_stiffness` (N/m).
     pub fn near(damping: Vec<f64>, least_stiffness: f64) -> Self {
         Self {
             damping,
@@ -100,9 +100,9 @@ impl EquivalentOptions {
     }
 }
 
-/// The system with mass `mass` (kg at the nodes), damping near the options, and the stiffness that gives
-/// it the response; `Err` says how the program ended where there is none, as where a crossing asks for
-/// less damping than the options allows.
+/// Coefficients with mass `mass` (kg at the nodes), damping close to the target, and the stiffness that reproduces the
+/// response; `Err` holds the status of the program where none exist, for example where a zero crossing requires a damping
+/// below its lower bound.
 ///
 /// # Panics
 /// If mass, response and options do not have one value per node.
@@ -175,8 +175,8 @@ pub fn equivalent_coefficients(
     }
 }
 
-/// What the crossings of zero anchor: time (s) and damping (N s/m) for the mass `mass`, between
-/// nodes by linear interpolation; as far from `c` as the square of the step.
+/// Zero crossings of the displacement: time (s) and the damping (N s/m) that the mass `mass` requires there, by linear
+/// interpolation between nodes; second-order accurate in the step.
 pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
     let y = &response.displacement;
     let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
@@ -194,7 +194,7 @@ pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
     (0..y.len() - 1).filter_map(crossing).collect()
 }
 
-/// How far the equation is from holding along the response for `system`, N at the nodes.
+/// Residual of the equation of motion along the response, `m a + c v + k y - f`, N at the nodes.
 pub fn imbalance(nodal: &NodalCoefficients, response: &TargetResponse) -> Vec<f64> {
     let at = |i: usize| {
         nodal.mass[i] * response.acceleration[i]

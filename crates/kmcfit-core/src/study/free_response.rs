@@ -1,11 +1,11 @@
-//! Free responses of a system from other initial states, beside those of the true system.
+//! Free responses of the identified system from given initial states, compared with those of the true system.
 
 use crate::simulate::{SimulationError, Trajectory};
 use crate::system::quadrature::trapezoid;
 use crate::system::{NodalCoefficients, State, System};
 use serde::{Deserialize, Serialize};
 
-/// The response of the found system from one initial state, against the true system's. Of a rotation rad stands for m.
+/// Key numbers of one free response, compared with that of the true system. Rotations are in rad in place of m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PredictionSummary {
     /// Initial displacement, m.
@@ -18,33 +18,33 @@ pub struct PredictionSummary {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
-    /// Largest distance of the response from zero, m; `None` where there is no response.
+    /// Peak displacement, m; `None` where the simulation fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest: Option<f64>,
-    /// Displacement at the last node, m; `None` where there is no response.
+    /// Displacement at the last node, m; `None` where the simulation fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last: Option<f64>,
-    /// Why there is no response from there, if there is none.
+    /// Reason for a failed simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// A prediction and the responses that it sums up.
+/// A free response and its key numbers.
 #[derive(Debug, Clone)]
 pub struct PredictedResponse {
-    /// In numbers.
+    /// Key numbers.
     pub summary: PredictionSummary,
-    /// The found system's response.
+    /// Response of the identified system.
     pub response: Trajectory,
-    /// The true system's response, where the truth is known.
+    /// Response of the true system, where known.
     pub truth: Option<Trajectory>,
 }
 
-/// The free response of `system` from each of `states`; `truth` is the true system, where known. The
-/// cost is `integral (y - y_true)^2 dt`, the energy `integral y_true^2 dt`, by the trapezoid rule.
+/// Free responses of `system` with coefficients `nodal` from each of `states`, compared with those of the coefficients
+/// `truth`, where known. Integrals use the trapezoid rule.
 ///
 /// # Errors
-/// A [`SimulationError`] if a response does not exist.
+/// A [`SimulationError`] if a simulation fails.
 pub fn predict(
     system: &System,
     nodal: &NodalCoefficients,

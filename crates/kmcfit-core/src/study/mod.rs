@@ -1,16 +1,16 @@
-//! What the samples say beyond one fit.
+//! Further analyses of a fit.
 //!
-//! * [`Linear`]: a number that is linear in the parameters, the thing asked about;
-//! * [`profile()`]: which values of it the samples allow, by fits with it held fixed;
-//! * [`extremes`]: the extreme systems among all that explain the samples as well as stated;
-//! * [`equivalent`]: other systems with the very same response; [`equivalent_systems`] finds and checks those of a fit;
-//! * [`multistart`]: fits from many starts, their clusters, and whether two optima share a valley;
-//! * [`variation`]: whether a function varies at all;
+//! * [`Linear`]: a quantity that is linear in the parameters;
+//! * [`profile()`]: its likelihood profile, by fits with the quantity fixed at a series of values;
+//! * [`extremes`]: its smallest and largest values over all parameters compatible with the data;
+//! * [`equivalent_coefficients`]: other coefficients with the same response; [`equivalent_systems`] computes and confirms
+//!   those of a fit;
+//! * [`multistart`]: fits from many starting points, their clusters, and paths between minima;
+//! * [`constancy_test`]: likelihood-ratio test of a constant against a time-varying function;
 //! * [`bootstrap`]: intervals from fits to simulated samples;
-//! * [`prediction`]: what an optimum says of an unseen run, and how surely.
+//! * [`prediction`]: response to another excitation or initial state, with its uncertainty.
 //!
-//! What is random is seeded, and what runs on several threads gives the same bits on any number of
-//! them.
+//! Random numbers are seeded, and results do not depend on the number of threads.
 
 pub mod bootstrap;
 pub mod constancy_test;

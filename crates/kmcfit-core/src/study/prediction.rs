@@ -1,9 +1,8 @@
-//! Prediction of an unseen run, with its uncertainty.
+//! Prediction of the response to another excitation or initial state, with its uncertainty.
 //!
-//! The band is that of the linearised response, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
-//! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
-//! envelope of the responses of given extreme systems ([`super::extremes`]): the samples rule
-//! none of them out, however unlikely the linearisation calls them.
+//! The 95 % confidence band is that of the linearised response, `y(t) +- z sqrt(J(t) C J(t)^T)`, with the covariance `C`
+//! of the parameters and `z = 1.96` (delta method); displacements only. The envelope is that of the responses of given
+//! data-consistent extreme systems ([`super::extremes`]).
 
 use super::extremes::Extreme;
 use crate::problem::Problem;
@@ -12,59 +11,58 @@ use crate::simulate::{SimulationError, Trajectory};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
-/// Half width of a 95 % band of a normal number, in standard deviations.
+/// Half-width of the 95 % interval of a normal variable, in standard deviations.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// An unseen run.
+/// Initial state and excitation of a prediction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictionCase {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// State at the first node.
     pub initial: State,
-    /// What drives it, on the problem's grid; `None` for free response.
+    /// Excitation on the grid of the problem; `None` for a free response.
     pub excitation: Option<Excitation>,
-    /// Which system of the problem moves.
-    pub nodal: usize,
+    /// Index of the coefficient set.
+    pub coefficient_set: usize,
 }
 
 impl PredictionCase {
-    /// Free response of the shared coefficient set.
+    /// A free response with the shared coefficient set.
     pub fn free(name: impl Into<String>, initial: State) -> Self {
         Self {
             name: name.into(),
             initial,
             excitation: None,
-            nodal: 0,
+            coefficient_set: 0,
         }
     }
 }
 
-/// The prediction of one run.
+/// Predicted response of one case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Name of the run.
+    /// Name of the case.
     pub name: String,
     /// Times of the nodes, s.
     pub times: Vec<f64>,
-    /// The optimum's response.
+    /// Response at the optimum.
     pub response: Trajectory,
     /// 95 % band of the displacement at each node, m; `None` without a covariance.
     pub band: Option<Vec<[f64; 2]>>,
-    /// Envelope of the displacements of the optimum and the extreme systems, m; `None` without
-    /// extreme systems that have a response.
+    /// Envelope of the displacements of the optimum and the extreme systems, m; `None` if no extreme system could be
+    /// simulated.
     pub worst: Option<Vec<[f64; 2]>>,
-    /// The extreme system that is furthest from the optimum, and the largest distance, m.
+    /// Name of the extreme system with the largest difference from the optimum, and the difference, m.
     pub furthest: Option<(String, f64)>,
-    /// Extreme systems without a response in this run.
+    /// Extreme systems whose simulation fails.
     pub no_response: Vec<String>,
 }
 
-/// Predicts `run` from the parameters `theta`, with the band of `covariance` and the worst case over
-/// `extremes`.
+/// Predicts `run` at the parameters `theta`, with the confidence band of `covariance` and the envelope of `extremes`.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no response in the run.
+/// A [`SimulationError`] if the simulation at the optimum fails.
 ///
 /// # Panics
 /// If the covariance is not one of the parameters.
@@ -128,7 +126,7 @@ pub fn predict(
     })
 }
 
-/// The problem with the run as its only experiment, its displacement read at all nodes.
+/// The problem with the case as its only experiment and displacements at all nodes.
 fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let mut seen = problem.clone();
     let grid = problem.system.grid;
@@ -137,7 +135,7 @@ fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
-    experiment.coefficient_set = run.nodal;
+    experiment.coefficient_set = run.coefficient_set;
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

@@ -1,10 +1,10 @@
-//! Columns: which parameters act on a sample at all.
+//! Columns of the structural rank: parameters that affect at least one sample.
 
 use crate::problem::Problem;
 use crate::record::ChannelKind;
 use crate::system::{Method, TimePoint};
 
-/// The nodes whose values act on some sample.
+/// Nodes whose values affect a sample.
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
     let nodes = problem.functions.nodes();
     let mut last = None;
@@ -14,12 +14,12 @@ pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
     (0..nodes).map(|i| last.is_some_and(|l| i <= l)).collect()
 }
 
-/// The last node whose values act on a sample; `None` if none does.
+/// Last node whose values affect a sample; `None` if none does.
 pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint) -> Option<usize> {
     match (kind, place.as_node(), problem.system.method) {
         (ChannelKind::Acceleration, Some(node), _) => Some(node),
         (_, Some(0), _) => None,
-        // The midpoint rule takes the displacement at the end from the velocity half-way.
+        // The midpoint rule computes the displacement at the end from the velocity half-way.
         (ChannelKind::Displacement, Some(node), Method::Midpoint) => Some(node - 1),
         (_, Some(node), _) => Some(node),
         (_, None, _) => Some(place.step + 1),

@@ -1,23 +1,22 @@
-//! What records can show at most, from the problem alone: no response is computed.
+//! Structural rank: upper bound of the number of identifiable parameter combinations, from the problem alone, without a
+//! simulation.
 //!
-//! **Rows.** A sample gives one equation. Where every term is linear in the response (damping and
-//! stiffness), the response is linear in `(y(0), v(0), f, b'')`: of the samples of one kind at one time only as
-//! many are independent as the records' inputs up to that time. So a third free record adds nothing, and
-//! neither does a forced one before its force sets in.
+//! **Rows.** Each sample is one equation. If every term is linear in the response (damping and stiffness), the response
+//! is linear in `(y(0), v(0), f, b'')`: among the samples of one kind at one time, at most as many are independent as the
+//! inputs of the records up to that time. A third free record adds no equations, nor does a forced one before its force
+//! starts.
 //!
-//! **Silent nodes.** With one value per node and one sample per step, a step of the midpoint rule
-//! without a force, and without one half a step before, moves states of two dimensions: it adds at most
-//! two equations.
+//! **Force-free nodes.** With one value per node and one sample per step, a step of the midpoint rule without a force in
+//! it or half a step before maps states of two dimensions: it adds at most two equations.
 //!
-//! **Columns.** A parameter that acts after the last sample is not seen, and neither is the common
-//! scale: `(m, c, k) -> s(t) (m, c, k)` leaves the response unchanged where no force acts. For functions
-//! that are closed under multiplication by `s(t)` that is one direction per node (or cell) without a
-//! force and without a known function that is not zero, for others the constant factor, if there
-//! is neither anywhere.
+//! **Columns.** Parameters that act after the last sample are not identifiable, and neither is the common scale:
+//! `(m, c, k) -> s(t) (m, c, k)` leaves the response unchanged where no force acts. If all bases are closed under
+//! multiplication by `s(t)`, this is one direction per node (or cell) without a force and without a nonzero fixed
+//! function; otherwise it is the constant factor, if neither a force nor a nonzero fixed function exists.
 //!
-//! The constant factor is exact; `s(t)` holds to the order of the stepper: with displacements alone it
-//! is not seen at all; further channels, or cells whose values jump within a step, may give it singular
-//! values that fall with the step, so that a rank by a relative 1e-12 finds more than is counted here.
+//! The constant factor is exact. Invariance under `s(t)` holds to the order of the stepper: exactly for displacements
+//! alone; with further channels, or cells whose values jump within a step, the singular values fall with the step, and a
+//! rank with a relative threshold of 1e-12 may exceed this bound.
 
 mod columns;
 mod rows;
@@ -30,38 +29,38 @@ use rows::equations;
 use scale::CommonScale;
 use serde::{Deserialize, Serialize};
 
-/// Which factor of all functions nothing in the problem fixes.
+/// Common factor of all functions that the problem leaves undetermined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Symmetry {
     /// None.
     None,
     /// One factor for all times.
     ConstantFactor,
-    /// One factor for all times exactly, and nearly any slow `s(t)`: the bases have many knots.
+    /// Exactly one factor for all times, and approximately any slowly varying `s(t)`: the bases have many knots.
     NearlyFunction,
     /// Any function `s(t)`, on [`StructuralRank::free_on`].
     Function,
 }
 
-/// What can be seen at most.
+/// Structural rank of a problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructuralRank {
-    /// Upper bound of the number of directions that the samples see.
-    pub seen_at_most: usize,
+    /// Upper bound of the rank: number of identifiable parameter combinations.
+    pub rank_bound: usize,
     /// Number of parameters.
-    pub of: usize,
+    pub parameters: usize,
     /// Independent equations of the samples.
     pub equations: usize,
-    /// The gauge that is left by records, functions, penalties and equality constraints together.
+    /// Scaling ambiguity that records, functions, penalties and equality constraints leave together.
     pub symmetry: Symmetry,
-    /// The spans of time on which the scale is free, s.
+    /// Intervals of time on which the scale is free, s.
     pub free_on: Vec<[f64; 2]>,
     /// Findings on the rank and on the scale of the functions.
     pub findings: Vec<RankFinding>,
 }
 
 impl StructuralRank {
-    /// The headline and the sentences of all findings.
+    /// Headline and sentences of all findings.
     pub fn sentences(&self) -> Vec<String> {
         let all = self.findings.iter().map(|s| s.sentence.clone());
         std::iter::once(self.headline()).chain(all).collect()
@@ -70,9 +69,11 @@ impl StructuralRank {
     /// The rank bound as a sentence.
     pub fn headline(&self) -> String {
         let Self {
-            seen_at_most, of, ..
+            rank_bound,
+            parameters,
+            ..
         } = self;
-        format!("at most {seen_at_most} of {of} parameter combinations are identifiable")
+        format!("at most {rank_bound} of {parameters} parameter combinations are identifiable")
     }
 }
 
@@ -97,14 +98,14 @@ pub enum RankFindingKind {
 /// A finding on the structural rank, with its sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RankFinding {
-    /// Its kind.
+    /// Kind.
     pub kind: RankFindingKind,
-    /// The sentence.
+    /// Sentence.
     pub sentence: String,
 }
 
 impl RankFinding {
-    /// Whether the finding limits what is identifiable.
+    /// True if the finding limits what is identifiable.
     pub fn is_warning(&self) -> bool {
         !matches!(
             self.kind,
@@ -113,7 +114,7 @@ impl RankFinding {
     }
 }
 
-/// Counts what the records of `problem` can show.
+/// Computes the structural rank of `problem`.
 pub fn structural_rank(problem: &Problem) -> StructuralRank {
     let (equations, mut findings) = equations(problem);
     let visible = visible_nodes(problem);
@@ -133,8 +134,8 @@ pub fn structural_rank(problem: &Problem) -> StructuralRank {
         findings.push(finding);
     }
     StructuralRank {
-        seen_at_most: seen.min(equations),
-        of: problem.parameters(),
+        rank_bound: seen.min(equations),
+        parameters: problem.parameters(),
         equations,
         symmetry: worst,
         free_on,

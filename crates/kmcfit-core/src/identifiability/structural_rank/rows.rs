@@ -1,4 +1,4 @@
-//! Rows: the independent equations of the samples.
+//! Rows of the structural rank: the number of independent equations of the samples.
 
 use super::super::components::force_of;
 use super::columns::last_acting;
@@ -9,20 +9,20 @@ use crate::record::{ChannelKind, Experiment};
 use crate::system::{Method, TimePoint};
 use std::collections::BTreeMap;
 
-/// Two inputs are independent if this share of one is left beside the others.
+/// Smallest share of an input that is orthogonal to the others, for independent inputs.
 const INDEPENDENT: f64 = 1e-9;
 
-/// Samples of one kind at one place.
+/// Coefficient set, kind, node and fraction of a step of a sample.
 type SampleKey = (usize, ChannelKind, usize, u64);
 
-/// The number of independent equations, and what is to be said of them.
+/// Number of independent equations, and findings about them.
 pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     let mut groups: BTreeMap<SampleKey, (TimePoint, Vec<usize>)> = BTreeMap::new();
     let mut others = 0;
     for (e, experiment) in problem.experiments.iter().enumerate() {
         for channel in &experiment.channels {
             if !superposes(problem, experiment, channel) {
-                // A sample of a known initial state says nothing of the parameters.
+                // A sample of the known initial state does not depend on the parameters.
                 let known = experiment.initial_parameters == [None; 2]
                     && channel.sensor().indices() == [None; 3]
                     && channel.filter().is_empty();
@@ -77,7 +77,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     (total, combinations.into_iter().collect())
 }
 
-/// Whether a channel's samples are linear in the record's inputs, with no numbers estimated besides.
+/// True if the samples of a channel are linear in the inputs of the record and depend on no scalar parameters.
 fn superposes(
     problem: &Problem,
     experiment: &Experiment,
@@ -89,14 +89,14 @@ fn superposes(
         && channel.filter().is_empty()
 }
 
-/// The inputs of records: how many are independent, as time goes on.
+/// Number of independent inputs of a group of records over time.
 struct Inputs {
-    /// Independent inputs when left, middle and right stage of each step have been reached.
+    /// Number of independent inputs up to the left, middle and right stage of each step.
     after: Vec<[usize; 3]>,
     initially: usize,
     method: Method,
-    /// One value per node for all functions, one displacement per step of the midpoint rule, no base
-    /// that moves: the steps may be counted one by one.
+    /// True if the equations of single steps can be counted: nodal functions, one displacement per step of the midpoint rule,
+    /// no base excitation.
     stepwise: bool,
     silent: Vec<bool>,
 }
@@ -126,8 +126,7 @@ impl Inputs {
                 span.len()
             });
             after.push(stages);
-            // The displacement after the step also answers to the node through the middle of the step
-            // before it.
+            // The displacement after the step also depends on the node through the middle of the previous step.
             let before = |r: &&Experiment| i == 0 || force(r, i - 1, 1) == 0.0;
             let at_node = |r: &&Experiment| force(r, i, 0) == 0.0;
             silent.push(records.iter().all(|r| before(r) && at_node(r)));
@@ -159,7 +158,7 @@ impl Inputs {
         }
     }
 
-    /// Independent inputs that act on a sample.
+    /// Number of independent inputs that affect a sample.
     fn rank(&self, kind: ChannelKind, place: TimePoint, last: usize) -> usize {
         let stage = |step: Option<usize>, s: usize| match step {
             Some(step) => self.after[step.min(self.after.len() - 1)][s],
@@ -176,7 +175,7 @@ impl Inputs {
         }
     }
 
-    /// The most equations of the step from node `last`.
+    /// Largest number of equations of the step from node `last`.
     fn most_of_step(&self, last: usize) -> usize {
         match self.silent[last.min(self.silent.len() - 1)] {
             true => 2,
@@ -185,7 +184,7 @@ impl Inputs {
     }
 }
 
-/// The span of vectors that are added one after the other.
+/// Orthonormal basis of vectors added one after the other.
 #[derive(Default)]
 struct Span(Vec<Vec<f64>>);
 

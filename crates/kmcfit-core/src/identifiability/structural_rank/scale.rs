@@ -1,4 +1,4 @@
-//! The common scale of the functions that share one: where it is free, and what holds it.
+//! Common scale of a group of functions: intervals on which it is free, and the constraints and penalties that determine it.
 
 use super::super::components::{Component, given_words};
 use super::super::spans::{span_words, spans};
@@ -6,15 +6,15 @@ use super::{RankFinding, RankFindingKind, Symmetry};
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;
 
-/// Functions with at least this many knots can follow a slow `s(t)` so nearly that it is hardly seen.
+/// Number of knots from which a basis follows a slowly varying `s(t)` closely.
 const MANY_KNOTS: usize = 5;
-/// Knots are the same if they are this near, relative to the record.
+/// Largest distance between equal knots, relative to the record.
 const SAME_TIME: f64 = 1e-9;
 
-/// The scale of one component.
+/// Common scale of one component.
 pub(super) struct CommonScale {
     space: FactorSpace,
-    /// Nodes at which a force acts or a function is known.
+    /// Nodes at which a force acts, and at which a fixed function is nonzero.
     forced: Vec<bool>,
     known: Vec<bool>,
     free_functions: usize,
@@ -42,7 +42,7 @@ impl CommonScale {
         (0..self.forced.len()).all(|i| self.is_free(i))
     }
 
-    /// Number of directions of the scale among the parameters that act.
+    /// Number of scaling directions among the parameters that affect a sample.
     pub fn directions(&self, visible: &[bool]) -> usize {
         let free = |i: &usize| self.is_free(*i);
         match &self.space {
@@ -101,7 +101,7 @@ impl CommonScale {
         let reference = smooth.is_some_and(|order| order == 0);
         let left = match by_records {
             _ if reference => Symmetry::None,
-            // A force elsewhere and smoothness tie the silent spans to the others.
+            // A force at other times and a penalty determine the scale on force-free intervals.
             Symmetry::Function if smooth.is_some() && (held || partly) => Symmetry::None,
             Symmetry::Function | Symmetry::NearlyFunction if smooth.is_some() && !held => {
                 Symmetry::ConstantFactor
@@ -157,7 +157,7 @@ impl CommonScale {
         (left, RankFinding { kind, sentence })
     }
 
-    /// Whether an equality with a right-hand side holds the constant factor.
+    /// True if an equality with nonzero right-hand side determines the constant factor.
     fn held(&self, problem: &Problem, component: &Component) -> bool {
         let mine = |j: usize| {
             let ranges = problem.functions.ranges();
@@ -173,10 +173,10 @@ impl CommonScale {
     }
 }
 
-/// The factors `s(t)` that keep all functions in their bases.
+/// Factors `s(t)` under which the bases of all functions are closed.
 enum FactorSpace {
     Nodes,
-    /// Constant on each cell: the cell of every node.
+    /// Constant on each cell; the cell of every node.
     Cells(Vec<usize>),
     Constant {
         nearly_more: bool,
@@ -235,7 +235,7 @@ impl FactorSpace {
     }
 }
 
-/// The lowest order of a penalty on a function of the component; variation counts as order 1.
+/// Lowest order of a penalty on a function of the component; total variation counts as order 1.
 fn smoothness(problem: &Problem, component: &Component) -> Option<usize> {
     let mine = |f: &usize| component.functions.contains(f);
     let penalties = (problem.penalties.iter())

@@ -1,4 +1,4 @@
-//! The derivatives of all predictions with respect to all parameters, from tangents in lanes.
+//! Jacobian of all predictions with respect to all parameters, from forward sensitivities eight directions at a time.
 
 mod observation_rows;
 mod sensitivity_layout;
@@ -12,12 +12,12 @@ use crate::simd::tall_qr::RowBlock;
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
 use nalgebra::DMatrix;
 use observation_rows::JacobianRows;
-use sensitivity_layout::Moving;
+use sensitivity_layout::SensitivityLayout;
 use std::ops::Range;
 
 impl Problem {
-    /// The change of every prediction (rows: samples of all channels of all experiments, in order)
-    /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
+    /// Jacobian of the predictions (rows: samples of all channels of all experiments, in order) with respect to the
+    /// parameters: [`Problem::predictions_tangent`] of all unit vectors, to machine precision.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
@@ -36,8 +36,8 @@ impl Problem {
         }
     }
 
-    /// One direction after the other: for numbers at the ends of their range, where the order of the
-    /// operations decides what is still finite.
+    /// Jacobian by one tangent solve per column, for values near the limits of the floating-point range, where the order of
+    /// operations determines what is finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let mut unit = vec![0.0; self.parameters()];
@@ -54,8 +54,8 @@ impl Problem {
         jacobian
     }
 
-    /// The parameter at each place of the tangents: in the order in which they begin to matter, so that
-    /// those that have not begun cost nothing.
+    /// Parameter of each column of the sensitivities, ordered by the first node that it affects; columns cost nothing before
+    /// that node.
     pub(crate) fn places(&self) -> Vec<usize> {
         let first = self.functions.first_nodes();
         let mut order: Vec<usize> = (0..self.parameters()).collect();
@@ -63,8 +63,8 @@ impl Problem {
         order
     }
 
-    /// Whether the pieces of [`Problem::each_piece`] are all there is to the Jacobian: nothing of a sensor is
-    /// estimated, and no channel is filtered.
+    /// True if the row blocks of [`Problem::each_piece`] form the complete Jacobian: no sensor parameter is estimated, and no
+    /// channel is filtered.
     pub(crate) fn comes_in_pieces(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
@@ -72,9 +72,9 @@ impl Problem {
         self.channels().all(is_plain)
     }
 
-    /// Gives `take` the rows of the Jacobian, some at a time, with the parameters in `order` at their places
-    /// ([`Problem::places`]), and without what the sensors and filters do; it returns the piece, or another one, to
-    /// go on with. The rows of a channel come in their order, those of several channels in turn.
+    /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::places`]) and without the
+    /// contributions of sensors and filters; `take` returns a block to fill next. Rows of one channel come in order, those of
+    /// several channels alternate.
     pub(crate) fn each_piece(
         &self,
         evaluation: &Evaluation,
@@ -92,8 +92,7 @@ impl Problem {
         }
     }
 
-    /// The step in the middle of the only record of a problem, at the end of a tile; `None` if there are several, or the one
-    /// is short.
+    /// Step in the middle of the only record of a problem, at the end of a tile; `None` for several records or a short one.
     pub(crate) fn middle(&self) -> Option<usize> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
@@ -102,9 +101,9 @@ impl Problem {
         (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
-    /// [`Problem::each_piece`] for the samples in some steps of the only record, which begin with a tile, and how
-    /// displacement and velocity at their end answer to each place. Later steps than the first do not know how the
-    /// state that they set out from answers: that state has two places of its own, behind the others.
+    /// [`Problem::each_piece`] for the samples within some steps of the only record, starting with a tile; returns the
+    /// derivatives of displacement and velocity at their end. Steps after the first treat their initial state as two further
+    /// columns, behind the others.
     pub(crate) fn each_piece_of_part(
         &self,
         evaluation: &Evaluation,
@@ -116,7 +115,7 @@ impl Problem {
         sweep(self, experiment, view, order, 0, steps, &mut take)
     }
 
-    /// What the sensors that are estimated add to a Jacobian, and what the filters make of it.
+    /// Adds the derivatives with respect to sensor parameters to a Jacobian and applies the filters.
     fn add_sensors(&self, evaluation: &Evaluation, jacobian: &mut DMatrix<f64>) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
@@ -129,8 +128,8 @@ impl Problem {
     }
 }
 
-/// Goes through some steps of the response of one experiment, whose first sample has the row `row`: how displacement and
-/// velocity at the end answer to each place.
+/// Integrates the sensitivities of one experiment over `steps`, with the first sample in row `row`; returns the derivatives
+/// of displacement and velocity at the end.
 fn sweep(
     problem: &Problem,
     experiment: &Experiment,
@@ -140,7 +139,7 @@ fn sweep(
     steps: Range<usize>,
     take: &mut impl FnMut(RowBlock) -> RowBlock,
 ) -> Vec<[f64; 2]> {
-    let moving = Moving::new(&problem.functions, order, experiment);
+    let moving = SensitivityLayout::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
     let places = order.len() + 2 * usize::from(is_later);
     let mut tangents = match is_later {
@@ -161,7 +160,7 @@ fn sweep(
         *piece = take(full);
         piece.restart(next);
     };
-    let course = BaseTrajectory {
+    let base = BaseTrajectory {
         system: view.system,
         nodal: view.nodal,
         excitation: view.excitation,
@@ -172,7 +171,7 @@ fn sweep(
     while from < steps.end {
         let to = (from + TILE).min(steps.end);
         moving.fill(&mut tangents, from, from == steps.start);
-        tangents.advance(course, from..to);
+        tangents.advance(base, from..to);
         for (reader, piece) in &mut readers {
             while reader.read(&tangents, from..to, piece) {
                 give(piece);
@@ -193,7 +192,7 @@ fn sweep(
     (0..places).map(end).collect()
 }
 
-/// What the sensor of one channel adds to its rows, from `row` on, and what its filter makes of them.
+/// Adds the derivatives with respect to the sensor parameters of one channel to its rows from `row`, and filters them.
 fn add_sensor(channel: &Channel, view: SimulatedRecord, row: usize, jacobian: &mut DMatrix<f64>) {
     let parameters = jacobian.ncols();
     let scalars = parameters - view.scalars.len();
@@ -230,8 +229,8 @@ mod tests {
 
     const NODES: usize = 70;
 
-    /// Two records of two systems that differ in their stiffness, the second over the first `nodes` nodes of the grid,
-    /// each with a displacement at every third node and `count` accelerations from the first node on.
+    /// Two records with coefficient sets that differ in their stiffness, the second over the first `nodes` nodes of the grid,
+    /// each with a displacement at every third node and `count` accelerations from the first node.
     fn problem(with_knots: bool, nodes: usize, count: usize) -> Problem {
         let grid = Grid::new(0.0, 7.0, NODES).expect("a grid");
         let function = |quantity, knots: u32, start: f64| match with_knots {
@@ -280,9 +279,9 @@ mod tests {
         Problem::new(system, functions.expect("functions"), records).unwrap()
     }
 
-    /// Ends of tiles, of lanes and of records; pieces that come back with nothing but rubbish in them.
+    /// Covers the ends of tiles, of lanes and of records, and returned blocks with arbitrary contents.
     #[test]
-    fn pieces_are_the_jacobian_and_it_is_the_gradient_s() {
+    fn row_blocks_form_the_jacobian_that_agrees_with_the_gradient() {
         let lengths = [1, 7, 8, 9, 64, 65, 66, NODES];
         for (with_knots, nodes) in [(true, 5), (true, 65), (false, 9), (false, NODES)] {
             for count in lengths {

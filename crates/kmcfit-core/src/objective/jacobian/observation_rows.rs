@@ -1,4 +1,4 @@
-//! The tangents of one channel's samples, tile by tile.
+//! Rows of the Jacobian for the samples of one channel, computed tile by tile.
 
 use crate::objective::SimulatedRecord;
 use crate::record::Channel;
@@ -6,42 +6,44 @@ use crate::simd::tall_qr::RowBlock;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::Observation;
 use crate::simulate::fast::nodal_observations::Accelerations;
-use crate::simulate::fast::sensitivities::{Change, Steady, TILE, Tangents};
+use crate::simulate::fast::sensitivities::{
+    ConstantPerturbation, FunctionPerturbation, TILE, Tangents,
+};
 use crate::system::FUNCTIONS;
 use std::ops::Range;
 
-/// Takes the tangents of one channel's samples, tile by tile.
+/// Computes the Jacobian rows of one channel's samples, tile by tile.
 pub(super) struct JacobianRows<'a> {
     channel: &'a Channel,
     view: SimulatedRecord<'a>,
-    /// Sample to go on with.
+    /// Index of the next sample.
     next: usize,
     gain: f64,
     kind: ObservationKind,
     batch: SampleBatch,
 }
 
-/// How a channel's samples answer to the states.
+/// Kind of the samples of a channel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ObservationKind {
-    /// Displacements, each at a node.
+    /// Displacements at nodes.
     Displacements,
-    /// Accelerations, sample `i` on node `i`.
+    /// Accelerations, sample `i` at node `i`.
     Accelerations,
-    /// Anything.
+    /// Any other kind or times.
     Any,
 }
 
-/// Up to eight samples, a sample after the other.
+/// Up to eight consecutive samples.
 struct SampleBatch {
     count: usize,
-    /// Each sample's node or, for any sample, the left node of its step, from the start of the tile.
+    /// Node of each sample or, between nodes, the left node of its step, relative to the tile.
     nodes: [usize; LANES],
     states: [[f64; 4]; LANES],
     functions: [[[f64; FUNCTIONS]; 2]; LANES],
-    /// Whether nothing at the right node is looked at.
+    /// True for samples that do not depend on the right node.
     at_left: [bool; LANES],
-    /// What accelerations on nodes answer to.
+    /// Derivatives of accelerations at nodes.
     seen: Accelerations,
 }
 
@@ -62,7 +64,7 @@ impl SampleBatch {
 }
 
 impl<'a> JacobianRows<'a> {
-    /// From sample `next` on.
+    /// Starts at sample `next`.
     pub fn new(channel: &'a Channel, view: SimulatedRecord<'a>, next: usize) -> Self {
         let [gain, ..] = channel.sensor().values(view.scalars);
         Self {
@@ -79,8 +81,8 @@ impl<'a> JacobianRows<'a> {
         }
     }
 
-    /// Takes the samples in the steps `steps`, over which the tangents have just gone, until the `piece` is
-    /// full: whether there may be more.
+    /// Appends the rows of samples within `steps`, the current tile of the tangents, until `piece` is full; returns true if
+    /// samples may remain.
     pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut RowBlock) -> bool {
         simd::run(Read {
             reader: self,
@@ -91,7 +93,7 @@ impl<'a> JacobianRows<'a> {
         piece.is_full()
     }
 
-    /// Takes at most so many next samples within the steps `steps`: how many they are and where they stand.
+    /// Collects up to `most` next samples within `steps` and returns their number.
     #[inline(always)]
     fn batch<A: Arithmetic>(&mut self, arithmetic: A, steps: &Range<usize>, most: usize) {
         let batch = &mut self.batch;
@@ -128,7 +130,7 @@ impl<'a> JacobianRows<'a> {
     }
 }
 
-/// The samples of a channel within a tile.
+/// Samples of a channel within a tile.
 struct Read<'a, 'c> {
     reader: &'a mut JacobianRows<'c>,
     tangents: &'a Tangents,
@@ -159,7 +161,7 @@ impl Kernel for Read<'_, '_> {
     }
 }
 
-/// The answers of up to eight samples to all directions.
+/// Derivatives of up to eight samples along all directions.
 struct BatchSensitivity<'a> {
     tangents: &'a Tangents,
     batch: &'a SampleBatch,
@@ -168,7 +170,7 @@ struct BatchSensitivity<'a> {
 }
 
 impl BatchSensitivity<'_> {
-    /// Writes them behind the rows of a piece that has room for them.
+    /// Writes the derivatives behind the rows of `piece`, which must have space for them.
     #[inline(always)]
     fn write<A: Arithmetic>(&self, arithmetic: A, piece: &mut RowBlock) {
         let gain = Eight::splat(arithmetic, self.gain);
@@ -180,7 +182,7 @@ impl BatchSensitivity<'_> {
         for (g, first) in (0..places).step_by(LANES).enumerate() {
             let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
-                // Of lanes without a sample nobody wants to know.
+                // Lanes without a sample are unused.
                 match self.kind {
                     ObservationKind::Displacements => {
                         let states = self.tangents.states(g);
@@ -209,7 +211,7 @@ impl BatchSensitivity<'_> {
                 let answer = (gain * *answer).row();
                 let rows = &mut piece.column_mut(place)[row..];
                 match rows.first_chunk_mut::<LANES>() {
-                    // What is below the rows means nothing.
+                    // Entries below the last row are undefined.
                     Some(rows) => *rows = answer,
                     None => rows[..count].copy_from_slice(&answer[..count]),
                 }
@@ -217,7 +219,7 @@ impl BatchSensitivity<'_> {
         }
     }
 
-    /// What accelerations answer to constants, for one direction a row.
+    /// Adds the derivatives of accelerations with respect to constant functions, one direction per row.
     #[inline(always)]
     fn add_constants<A: Arithmetic>(
         &self,
@@ -226,14 +228,14 @@ impl BatchSensitivity<'_> {
         answers: &mut [Eight<A>; LANES],
     ) {
         for change in self.tangents.changes(g) {
-            if let Some(Steady { lane, value }) = change.steady {
+            if let Some(ConstantPerturbation { lane, value }) = change.steady {
                 let slopes = Eight::load(arithmetic, &self.batch.seen.functions[change.function]);
                 answers[lane] += slopes * Eight::splat(arithmetic, value);
             }
         }
     }
 
-    /// The answer of an acceleration, but for what it answers to constants.
+    /// Derivative of an acceleration, without that with respect to constant functions.
     #[inline(always)]
     fn at_acceleration<A: Arithmetic>(
         &self,
@@ -248,7 +250,11 @@ impl BatchSensitivity<'_> {
             answer += Eight::splat(arithmetic, by[l]) * Eight::load(arithmetic, tangent);
         }
         if varies {
-            for change in self.tangents.changes(g).filter(Change::varies) {
+            for change in self
+                .tangents
+                .changes(g)
+                .filter(FunctionPerturbation::varies)
+            {
                 let slope = Eight::splat(arithmetic, seen.functions[change.function][l]);
                 answer += slope * Eight::load(arithmetic, &change.rows[node]);
             }
@@ -256,7 +262,7 @@ impl BatchSensitivity<'_> {
         answer
     }
 
-    /// The answer of sample `l` to the directions of a group, before the gain.
+    /// Derivative of sample `l` along the directions of a group, before multiplication by the gain.
     #[inline(always)]
     fn at_step<A: Arithmetic>(&self, arithmetic: A, g: usize, l: usize) -> Eight<A> {
         let SampleBatch {

@@ -1,32 +1,32 @@
-//! The layout of forward sensitivities: the parameters of each function in groups and lanes.
+//! Layout of forward sensitivities: assignment of parameters to groups of eight directions (lanes).
 
 use crate::functions::{Design, Parameterization};
 use crate::record::Experiment;
 use crate::simd::LANES;
-use crate::simulate::fast::sensitivities::{Slot, Steady, TILE_NODES, Tangents};
+use crate::simulate::fast::sensitivities::{ConstantPerturbation, Slot, TILE_NODES, Tangents};
 
-/// The functions of an experiment's system that have parameters, and where these stand.
-pub(super) struct Moving<'a> {
+/// Estimated functions of an experiment's coefficient set and the columns of their parameters.
+pub(super) struct SensitivityLayout<'a> {
     parts: Vec<FunctionLayout<'a>>,
     slots: Vec<Slot>,
     groups: usize,
-    /// Initial states that are estimated: which, and their places.
+    /// Estimated initial states, as pairs of state and column.
     seeds: Vec<(usize, usize)>,
-    /// How many places there are.
+    /// Number of columns.
     places: usize,
 }
 
 struct FunctionLayout<'a> {
     design: &'a Design,
-    /// The slots of its groups.
+    /// Slots of the groups of the function.
     slots: Vec<usize>,
-    /// Slot and lane of each of its parameters.
+    /// Slot and lane of each parameter.
     lanes: Vec<(usize, usize)>,
     constant: bool,
 }
 
-impl<'a> Moving<'a> {
-    /// `order` is the parameter at each place, [`LANES`] places a group.
+impl<'a> SensitivityLayout<'a> {
+    /// Layout for the parameters `order` of the columns, [`LANES`] columns per group.
     pub fn new(functions: &'a Parameterization, order: &[usize], experiment: &Experiment) -> Self {
         let mut places = vec![0; order.len()];
         for (place, j) in order.iter().enumerate() {
@@ -77,7 +77,7 @@ impl<'a> Moving<'a> {
         Tangents::new(self.slots.clone(), &initial)
     }
 
-    /// From a state of which nothing is known: it has two places behind the others.
+    /// Tangents from an arbitrary initial state, which has two columns behind the others.
     pub fn tangents_from_any_state(&self) -> Tangents {
         let mut initial = vec![[[0.0; LANES]; 2]; (self.places + 2).div_ceil(LANES)];
         for (place, state) in (self.places..).zip([0, 1]) {
@@ -86,7 +86,7 @@ impl<'a> Moving<'a> {
         Tangents::new(self.slots.clone(), &initial)
     }
 
-    /// How the functions change at the nodes of the tile from node `first` on, and whether it is the first of all.
+    /// Sets the perturbations of the functions in the tile that starts at node `first`; `is_first` marks the first tile.
     pub fn fill(&self, tangents: &mut Tangents, first: usize, is_first: bool) {
         for part in &self.parts {
             if !part.constant {
@@ -100,10 +100,10 @@ impl<'a> Moving<'a> {
 }
 
 impl FunctionLayout<'_> {
-    /// A constant changes along its one parameter, everywhere by the same.
+    /// Sets the perturbation of a constant function, equal at all nodes.
     fn hold(&self, tangents: &mut Tangents) {
         for ((_, value), &(slot, lane)) in self.design.row(0).zip(&self.lanes) {
-            tangents.hold(slot, Steady { lane, value });
+            tangents.hold(slot, ConstantPerturbation { lane, value });
         }
     }
 

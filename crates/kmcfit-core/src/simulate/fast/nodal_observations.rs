@@ -1,4 +1,4 @@
-//! Accelerations at eight neighbouring nodes, as an accelerometer sampled with the grid measures them:
+//! Accelerations at eight neighbouring nodes, the samples of an accelerometer on the grid. Agrees with
 //! [`observe`](crate::simulate::reference::observe()) to some machine precisions.
 
 use super::elements::with_known;
@@ -7,11 +7,11 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::system::{FUNCTIONS, MOST_TERMS, NodalCoefficients, System, Term};
 
-/// Accelerations at eight nodes and their derivatives, one node a lane.
+/// Accelerations at eight nodes and their derivatives, one node per lane.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Accelerations {
-    /// The accelerations of `y`, relative to the base.
+    /// Accelerations `y''`, relative to the base.
     pub value: Row,
     /// Derivatives with respect to displacement and velocity at the node.
     pub states: [Row; 2],
@@ -36,8 +36,8 @@ pub(crate) struct NodalObservations<'a> {
 }
 
 impl NodalObservations<'_> {
-    /// The accelerations at eight nodes from node `i` on, with force and acceleration of the base at each; lanes
-    /// beyond the last node mean nothing.
+    /// Accelerations at eight nodes from node `i`, with force and acceleration of the base at each; lanes beyond the last node
+    /// are undefined.
     #[inline(always)]
     pub fn accelerations<A: Arithmetic>(
         &self,

@@ -1,7 +1,8 @@
-//! The response with prefactored stages: each function divided by the mass, and the input, times the step and the
-//! tableau's factors, are formed eight steps at a time. The rest of a step are products and sums of its states, in
-//! an order with few dependencies: a stage's velocity waits for four operations on the displacement of the stage
-//! before.
+//! Forward solve with prefactored stages.
+//!
+//! The quotients of each function and the mass, and the input, times the step and the factors of the tableau, are computed
+//! eight steps at a time. A step then consists of products and sums, ordered for short chains of dependent operations: the
+//! velocity of a stage follows by four operations from the displacement of the previous one.
 
 use super::padded_loads;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
@@ -9,8 +10,8 @@ use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{MIDPOINT, MOST_TERMS, Method, RK4, State, Tableau, Term};
 
-/// [`forward_into`](crate::simulate::reference::forward_into()), to 40 machine precisions of the largest value for each
-/// step. `false` if a kind of term is there twice: then nothing is done.
+/// Forward solve; agrees with [`forward_into`](crate::simulate::reference::forward_into()) to 40 machine precisions of the
+/// largest value per step. Returns `false`, without a response, if a kind of term occurs twice.
 pub(crate) fn forward(
     equation: EquationOfMotion,
     method: Method,
@@ -45,7 +46,7 @@ const OFFSET: usize = 3;
 const QUADRATIC_DAMPING: usize = 4;
 const COULOMB_FRICTION: usize = 5;
 
-/// The kinds of terms of a linear system, and of one with a cubic spring besides.
+/// Kinds of terms of a linear system, and of one with a cubic spring.
 const LINEAR: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING]);
 const CUBIC: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING, CUBIC_STIFFNESS]);
 
@@ -70,11 +71,11 @@ fn place(term: Term) -> usize {
     }
 }
 
-/// Most stages of a tableau.
+/// Largest number of stages of a tableau.
 const STAGES: usize = 4;
 
-/// `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of
-/// the tableau.
+/// Rates `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of the
+/// tableau.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Rates {
@@ -105,7 +106,7 @@ const NOTHING: StageRates = {
 struct PrefactoredForward<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
-    /// The term of each kind.
+    /// Index of the term of each kind.
     kinds: [Option<usize>; MOST_TERMS],
     width: f64,
     initial: State,
@@ -119,7 +120,7 @@ impl Kernel for PrefactoredForward<'_> {
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let there = self.kinds.map(|kind| kind.is_some());
         match (self.method, there) {
-            // Such lists are known when this is compiled.
+            // Compile-time constants for common lists.
             (Method::Midpoint, LINEAR) => self.sweep(arithmetic, &MIDPOINT, LINEAR),
             (Method::Rk4, LINEAR) => self.sweep(arithmetic, &RK4, LINEAR),
             (Method::Rk4, CUBIC) => self.sweep(arithmetic, &RK4, CUBIC),
@@ -162,7 +163,7 @@ impl PrefactoredForward<'_> {
             );
             for (k, (kind, steady)) in self.kinds.iter().zip(steady).enumerate() {
                 if let Some(j) = *kind {
-                    // Rates of constants are those of the first eight steps.
+                    // Constant functions keep the rates of the first eight steps.
                     if from > 0 && steady {
                         continue;
                     }
@@ -202,11 +203,11 @@ impl PrefactoredForward<'_> {
     }
 }
 
-/// The rates of a kind of term from its function, over the steps from `i` on.
+/// Rates of a kind of term from its function, over the steps from `i`.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
-    reason = "rows go where they stay, and nowhere between"
+    reason = "rows are written in place, without copies"
 )]
 fn prepare<A: Arithmetic, const S: usize>(
     arithmetic: A,
@@ -230,7 +231,7 @@ fn prepare<A: Arithmetic, const S: usize>(
     }
 }
 
-/// What drives the steps from `i` on.
+/// Input of the steps from `i`.
 #[inline(always)]
 fn prepare_drive<A: Arithmetic, const S: usize>(
     arithmetic: A,
@@ -260,8 +261,8 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     }
 }
 
-/// The step times what the acceleration of stage `s` counts for the next stage, the only one that sees
-/// it, and for the end of the step.
+/// Factors of the acceleration of stage `s` in the next stage, the only one that depends on it, and at the end of the step,
+/// times the step.
 #[inline(always)]
 fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] {
     let next = if s + 1 < S { tableau.a[s + 1][s] } else { 0.0 };
@@ -270,8 +271,8 @@ fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] 
 
 /// One step, in lane `l` of the rates.
 ///
-/// Sums are in the order in which their parts become known: the displacement of a stage before its velocity, and
-/// at the first stage before the velocity that the step starts from.
+/// Sums follow the order in which their terms become available: the displacement of a stage before its velocity, and at the
+/// first stage before the initial velocity.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -312,7 +313,7 @@ fn step<const S: usize>(
     (*y, *v) = (y_end, v_end);
 }
 
-/// What each term multiplies its function by, at one stage; for the cubic stiffness the square alone.
+/// Factor `phi` of each function at one stage; for the cubic stiffness the square alone.
 #[derive(Clone, Copy)]
 struct Phi([f64; MOST_TERMS]);
 
@@ -335,7 +336,7 @@ impl Phi {
         Self(phi)
     }
 
-    /// `sum` and what the displacement brings.
+    /// Adds the forces that depend on the displacement to `sum`.
     #[inline(always)]
     fn pushed(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
         let Self(phi) = self;
@@ -346,14 +347,14 @@ impl Phi {
             }
         }
         if there[CUBIC_STIFFNESS] {
-            // In pairs, of which neither waits for the other.
+            // In independent pairs.
             let slope = rates.kinds[CUBIC_STIFFNESS][l] * phi[STIFFNESS];
             sum -= slope * phi[CUBIC_STIFFNESS];
         }
         sum
     }
 
-    /// `sum` and what the velocity brings.
+    /// Adds the forces that depend on the velocity to `sum`.
     #[inline(always)]
     fn damped(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
         let mut sum = sum;
@@ -372,9 +373,10 @@ mod tests {
     use crate::simulate::{Engine, reference};
     use crate::system::{Excitation, Grid, NodalCoefficients, System};
 
-    /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
+    /// Rates of constants are computed once, those of varying functions anew: each function in turn varies after the first
+    /// eight steps.
     #[test]
-    fn functions_that_are_constant_at_first() {
+    fn functions_that_vary_after_the_first_eight_steps_are_recomputed() {
         let system = System {
             grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
             method: Method::Rk4,

@@ -1,4 +1,4 @@
-//! Eight steps linearised at once: the response is known, so no step waits for the one before.
+//! Linearisation of eight steps at a time about a known response.
 
 use super::elements::with_known;
 use super::padded_loads;
@@ -9,17 +9,17 @@ use crate::system::{
     FUNCTIONS, MIDPOINT, MOST_TERMS, Method, RK4, StagePosition, StageSamples, Tableau, Term,
 };
 
-/// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
-/// one of the right node's state (displacement, velocity).
+/// Derivatives of the states at the right nodes of eight steps, one step per lane. The last index is the component of the
+/// state at the right node (displacement, velocity).
 #[repr(align(64))]
 pub(super) struct StepLinearisation {
-    /// With respect to displacement and velocity at the left node, less the identity.
+    /// With respect to displacement and velocity at the left node, minus the identity.
     pub growth: [[Row; 2]; 2],
     /// With respect to each function's value at the left node, mass first.
     pub left: [[Row; 2]; FUNCTIONS],
     /// With respect to each function's value at the right node.
     pub right: [[Row; 2]; FUNCTIONS],
-    /// With respect to each function that has the same value everywhere.
+    /// With respect to a value equal at both nodes.
     pub sum: [[Row; 2]; FUNCTIONS],
 }
 
@@ -37,11 +37,11 @@ impl StepLinearisation {
 pub(super) struct RequestedDerivatives {
     /// With respect to the values at both nodes.
     pub ends: [bool; FUNCTIONS],
-    /// With respect to one value for both.
+    /// With respect to a value equal at both nodes.
     pub sum: [bool; FUNCTIONS],
 }
 
-/// A function at the three [`StagePosition`]s of eight steps.
+/// Values of a function at the three [`StagePosition`]s of eight steps.
 #[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
 
@@ -62,7 +62,8 @@ impl<A: Arithmetic> Places<A> {
     }
 }
 
-/// Linearises the steps `i` to `i + 7` of a response for the functions that are `wanted`: [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
+/// Linearises the steps `i` to `i + 7` of a response for the functions `wanted`; agrees with
+/// [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -166,7 +167,7 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         stages
     }
 
-    /// The derivatives of the state at the right node, from each of its components back through the stages.
+    /// Derivatives of each component of the state at the right node, backwards through the stages.
     #[inline(always)]
     fn transpose(
         &self,

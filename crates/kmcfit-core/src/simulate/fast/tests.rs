@@ -1,8 +1,8 @@
-//! Every specialisation against its reference function, over random systems, records, steppers and excitations.
+//! Agreement of every specialisation with its reference function, over random systems, records, steppers and excitations.
 
 use super::continuous_adjoint;
 use super::nodal_observations::{Accelerations, NodalObservations};
-use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
+use super::sensitivities::{BaseTrajectory, ConstantPerturbation, Slot, TILE, Tangents};
 use super::step_batch::{LaneLayout, SearchRay, StepBatch, reconstruct};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
@@ -19,8 +19,8 @@ use proptest::prelude::*;
 #[path = "../../../tests/common/properties.rs"]
 mod properties;
 
-/// Largest difference of two responses or gradients, in machine precisions of the largest value, for each step: each
-/// step rounds some ten operations, and what they lose is carried along.
+/// Largest difference of two responses or gradients per step, in machine precisions of the largest value: each step rounds
+/// about ten operations, and the errors accumulate.
 const PER_STEP: f64 = 40.0;
 
 /// A random system with a random record.
@@ -30,7 +30,7 @@ struct Case {
     nodal: NodalCoefficients,
     excitation: Option<Excitation>,
     initial: State,
-    /// Numbers in (-1, 1), three a node.
+    /// Random numbers in (-1, 1), three per node.
     numbers: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl Case {
             .expect("a response")
     }
 
-    /// The `which`-th series of random numbers, one a node.
+    /// Series `which` of random numbers, one per node.
     fn series(&self, which: usize) -> Vec<f64> {
         let nodes = self.nodes();
         (0..nodes)
@@ -68,7 +68,7 @@ impl Case {
         Engine::choose(system, excitation, self.nodes(), Purpose::Estimation)
     }
 
-    /// Whether two series agree.
+    /// Checks that two series agree.
     fn agree(&self, a: &[f64], b: &[f64]) -> Result<(), TestCaseError> {
         let largest = |f: &mut dyn Iterator<Item = f64>| f.fold(0.0f64, |m, x| m.max(x.abs()));
         let scale = largest(&mut b.iter().copied());
@@ -123,7 +123,7 @@ fn range(term: Option<&Term>) -> std::ops::Range<f64> {
     }
 }
 
-/// A function: one value a node, or a constant.
+/// A function: nodal values, or a constant.
 fn function(range: std::ops::Range<f64>, nodes: usize) -> impl Strategy<Value = Vec<f64>> {
     prop_oneof![
         prop::collection::vec(range.clone(), nodes),
@@ -185,7 +185,7 @@ fn any_case() -> impl Strategy<Value = Case> {
     case_of(terms(), methods(), 3..200, true)
 }
 
-/// Damping and stiffness alone, free, by the midpoint rule; records of several tiles among them.
+/// Linear systems in free response by the midpoint rule; some records have several tiles.
 fn linear_free_case() -> impl Strategy<Value = Case> {
     let case = |nodes| {
         let terms = Just(vec![Term::Damping, Term::Stiffness]);
@@ -210,7 +210,7 @@ impl Kernel for Observe<'_> {
     }
 }
 
-/// A direction for each lane of a group: one series of numbers a function, or one number for a constant function.
+/// A direction for each lane of a group: random nodal values, or one number for a constant function.
 fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
     let functions = 1 + case.system.terms.len();
     std::array::from_fn(|lane| {
@@ -244,7 +244,7 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
     ];
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
     let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
-    let course = BaseTrajectory {
+    let base = BaseTrajectory {
         system: &case.system,
         nodal: &case.nodal,
         excitation: case.excitation(),
@@ -258,7 +258,7 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
                 if let (0, Some(value)) = (first, case.numbers.get(slot)) {
                     tangents.hold(
                         slot,
-                        Steady {
+                        ConstantPerturbation {
                             lane: slot,
                             value: *value,
                         },
@@ -274,7 +274,7 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
                 *row = directions.each_ref().map(at);
             }
         }
-        tangents.advance(course, first..first + count);
+        tangents.advance(base, first..first + count);
         for (i, [y, v]) in tangents.states(0).iter().enumerate().take(count + 1) {
             for (lane, out) in out.iter_mut().enumerate() {
                 (out.displacement[first + i], out.velocity[first + i]) = (y[lane], v[lane]);
@@ -288,7 +288,7 @@ proptest! {
     #![proptest_config(properties(150, 1))]
 
     #[test]
-    fn prefactored_responses(case in any_case()) {
+    fn prefactored_responses_agree_with_the_reference(case in any_case()) {
         let mut fast = Trajectory::zeros(case.nodes());
         let (system, nodal) = (&case.system, &case.nodal);
         Engine::Prefactored
@@ -298,7 +298,7 @@ proptest! {
     }
 
     #[test]
-    fn prefactored_adjoints_and_their_sums(case in any_case()) {
+    fn prefactored_adjoints_and_their_sums_agree_with_the_reference(case in any_case()) {
         let (system, nodal, excitation) = (&case.system, &case.nodal, case.excitation());
         let (response, source) = (case.response(), case.source());
         let exact = reference::discrete_adjoint(system, nodal, excitation, &response, &source);
@@ -316,7 +316,7 @@ proptest! {
     }
 
     #[test]
-    fn responses_and_adjoints_in_blocks(case in linear_free_case()) {
+    fn responses_and_adjoints_in_blocks_agree_with_the_reference(case in linear_free_case()) {
         let (system, nodal) = (&case.system, &case.nodal);
         prop_assert_eq!(case.engine(), Engine::ParallelInTime);
         let response = case.response();
@@ -332,7 +332,7 @@ proptest! {
     }
 
     #[test]
-    fn fused_least_squares(case in linear_free_case()) {
+    fn fused_least_squares_agree_with_the_reference(case in linear_free_case()) {
         let (system, nodal) = (&case.system, &case.nodal);
         let (response, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
         let last = case.nodes() - 1;
@@ -370,7 +370,7 @@ proptest! {
     }
 
     #[test]
-    fn sensitivities_in_lanes(case in any_case(), holds in any::<bool>()) {
+    fn sensitivities_agree_with_the_tangent(case in any_case(), holds in any::<bool>()) {
         let response = case.response();
         let fast = sensitivities(&case, &response, holds);
         for (fast, direction) in fast.iter().zip(&directions(&case, holds)) {
@@ -382,7 +382,7 @@ proptest! {
     }
 
     #[test]
-    fn accelerations_at_nodes(case in any_case()) {
+    fn accelerations_at_nodes_agree_with_observations(case in any_case()) {
         let (system, nodal) = (&case.system, &case.nodal);
         let states = case.response();
         let around = [case.numbers[0], case.numbers[1]];
@@ -417,7 +417,7 @@ proptest! {
     }
 
     #[test]
-    fn batches_of_steps(case in linear_free_case(), count in 1usize..50) {
+    fn batches_of_steps_agree_with_single_trials(case in linear_free_case(), count in 1usize..50) {
         let Case { system, nodal, initial, .. } = &case;
         let (step, observed) = (system.grid.step(), case.series(0));
         let direction = [case.series(1), case.series(2), case.series(3)];

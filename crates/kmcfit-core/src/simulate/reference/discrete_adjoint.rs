@@ -14,8 +14,8 @@ use crate::system::{
 /// [`tangent`](super::tangent()) applied to `source`, to machine precision.
 ///
 /// Per stage, backwards, with `k̄` the multiplier of the stage's increment:
-/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
-/// functions. The stages are computed again from the nodes, so memory is two numbers a node.
+/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`; the contributions to the functions are `-ā phi_j/m` and, for the
+/// mass, `-ā (a + b'')/m`. Stages are recomputed from the nodes, so memory is two numbers per node.
 pub fn discrete_adjoint(
     system: &System,
     nodal: &NodalCoefficients,
@@ -55,7 +55,7 @@ fn sweep<const S: usize>(
     }
 }
 
-/// Carries the adjoint from node `i + 1` to node `i` and adds the step's share to the gradient.
+/// Advances the adjoint from node `i + 1` to node `i` and adds the step's contribution to the gradient.
 #[inline(always)]
 fn step_back<const S: usize>(
     tableau: &Tableau<S>,

@@ -27,7 +27,7 @@ pub(crate) struct Partials {
 
 impl<'a> EquationOfMotion<'a> {
     /// # Panics
-    /// If `system` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
+    /// If `system` does not fit the grid and the terms, or grid or excitation is shorter than `nodes` nodes.
     pub fn new(
         system: &'a System,
         nodal: &'a NodalCoefficients,
@@ -60,10 +60,10 @@ impl<'a> EquationOfMotion<'a> {
         }
     }
 
-    /// `y'' = f/m - sum_j p_j phi_j / m - b''`.
+    /// Acceleration `y'' = f/m - sum_j p_j phi_j / m - b''`.
     ///
-    /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
-    /// these are the paper's operations in the paper's order, and its run depends on every bit.
+    /// Each quotient is computed separately, and the terms are summed backwards (stiffness before damping): the paper's order
+    /// of operations, on whose every bit its run depends.
     #[inline(always)]
     pub fn acceleration(&self, i: usize, position: StagePosition, y: f64, v: f64) -> f64 {
         let mass = position.of(&self.nodal.mass, i);
@@ -78,7 +78,7 @@ impl<'a> EquationOfMotion<'a> {
         }
     }
 
-    /// The absolute acceleration `y'' + b''` for the acceleration `y'' = a`.
+    /// Absolute acceleration `y'' + b''` for the relative acceleration `y'' = a`.
     #[inline(always)]
     pub fn absolute(&self, i: usize, position: StagePosition, a: f64) -> f64 {
         match self.excitation.and_then(|e| e.base.as_ref()) {
@@ -101,7 +101,7 @@ impl<'a> EquationOfMotion<'a> {
         Partials { mass, da_dy, da_dv }
     }
 
-    /// The stages of step `i` from the state `(y, v)` at its left node.
+    /// Stages of step `i` from the state `(y, v)` at its left node.
     #[inline(always)]
     pub fn stages<const S: usize>(
         &self,
@@ -129,7 +129,7 @@ impl<'a> EquationOfMotion<'a> {
     }
 }
 
-/// The state at the right node: `x + sum_s b_s dt x'_s`.
+/// State at the right node: `x + sum_s b_s dt x'_s`.
 #[inline(always)]
 pub(crate) fn advance<const S: usize>(
     tableau: &Tableau<S>,

@@ -1,12 +1,12 @@
-//! Eq. 2: the response.
+//! Forward solve: the response by Eq. 2.
 
 use super::equation::{EquationOfMotion, advance};
 use crate::simulate::Trajectory;
 use crate::simulate::error::{SimulationError, require_finite, require_positive_mass};
 use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, Tableau};
 
-/// The response of `system` from `initial` under `excitation` (`None` is free response), over the whole grid:
-/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, step by step in the paper's order of operations.
+/// Response of `system` from `initial` under `excitation` (`None` for a free response) over the whole grid:
+/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, in sequential steps with the paper's order of operations.
 ///
 /// # Errors
 /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
@@ -24,8 +24,7 @@ pub fn forward(
     Ok(trajectory)
 }
 
-/// [`forward`] into existing storage, over as many nodes as `trajectory` has: a record may end before the grid
-/// does.
+/// [`forward`] into existing storage, over the nodes of `trajectory`; a record may be shorter than the grid.
 ///
 /// # Errors
 /// As [`forward`].

@@ -1,9 +1,9 @@
 //! Observations of a response at any time, and their derivatives with respect to states and functions.
 //!
-//! Between nodes displacement and velocity are cubic Hermite polynomials, of order 4 in the step: the
-//! displacement from its values and the velocities at both nodes, the velocity from its values and
-//! the accelerations there. The acceleration is the equation of motion's own, at the interpolated
-//! state, with the functions linear between nodes as in the stepper.
+//! Between nodes, displacement and velocity are cubic Hermite polynomials, fourth-order accurate in the step: the
+//! displacement from its values and the velocities at both nodes, the velocity from its values and the accelerations
+//! there. The acceleration follows from the equation of motion at the interpolated state, with functions linear between
+//! nodes as in the stepper.
 
 use super::equation::EquationOfMotion;
 use crate::record::ChannelKind;
@@ -13,10 +13,10 @@ use crate::system::{
     TimePoint,
 };
 
-/// A value observed by a sensor, and its derivatives.
+/// An observed value and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// The value itself, in the SI unit of its kind.
+    /// Value, in the SI unit of its kind.
     pub value: f64,
     /// Derivatives with respect to displacement and velocity at the left node, then at the right.
     pub states: [f64; 4],
@@ -53,10 +53,10 @@ impl Observation {
     }
 }
 
-/// The observation of `kind` at `place` of the response `states` of `system`.
+/// Observes `kind` at `place` of the response `states`.
 ///
-/// `around` is the force and the base's acceleration at that very time; `excitation` is that of
-/// the whole response. An acceleration is that of `y`, relative to the base.
+/// `around` is the force and the acceleration of the base at that time; `excitation` is that of the whole response.
+/// Accelerations are those of `y`, relative to the base.
 ///
 /// # Panics
 /// If `place` is not within `states`.
@@ -146,7 +146,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
     }
 }
 
-/// `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
+/// Acceleration `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
 fn acceleration(
     equation: EquationOfMotion,
     i: usize,

@@ -1,4 +1,4 @@
-//! The linearisation of single steps, for methods that keep the states as unknowns.
+//! Linearisation of single steps, for methods with the states as unknowns.
 
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
@@ -13,7 +13,7 @@ pub type StateChange = [f64; 2];
 /// [`NodalCoefficients::functions`], mass first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepJacobian {
-    /// `Phi_i` itself: displacement and velocity at the right node.
+    /// `Phi_i`: displacement and velocity at the right node.
     pub end: State,
     /// Derivatives with respect to the displacement and to the velocity at the left node.
     pub state: [StateChange; 2],
@@ -23,7 +23,7 @@ pub struct StepJacobian {
     pub right: Vec<StateChange>,
 }
 
-/// What one column of a step's Jacobian differentiates with respect to.
+/// Variable of one column of a step's Jacobian.
 #[derive(Clone, Copy)]
 enum Seed {
     Displacement,
@@ -31,7 +31,7 @@ enum Seed {
     Function(usize, StagePosition),
 }
 
-/// All steps linearised about the node states `states`, which need not be a response.
+/// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
 pub fn step_jacobians(
     system: &System,
     nodal: &NodalCoefficients,

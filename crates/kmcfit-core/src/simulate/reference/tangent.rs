@@ -1,4 +1,4 @@
-//! The tangent: the linearisation of Eq. 2.
+//! Tangent: directional derivative of the forward solve.
 
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
@@ -6,9 +6,8 @@ use crate::system::{
     Excitation, MIDPOINT, Method, NodalCoefficients, RK4, System, SystemTangent, Tableau,
 };
 
-/// Directional derivative of [`forward`](super::forward()) at `trajectory` (which must be the response of
-/// `system` under `excitation`) along `direction`: the change of displacement and velocity per unit
-/// step, exact for the discrete response.
+/// Directional derivative of [`forward`](super::forward()) at `trajectory` (the response of `system` under `excitation`)
+/// along `direction`: change of displacement and velocity, exact for the discrete response.
 pub fn tangent(
     system: &System,
     nodal: &NodalCoefficients,

@@ -1,4 +1,7 @@
-//! Refits of both models to simulated samples, by their linearisation.
+//! Least costs of the constant and the varying model for simulated samples, from one linearisation at the constant optimum.
+//!
+//! With orthonormal columns `Q` of the weighted Jacobian, extended by the rows of penalties and priors, the least cost for
+//! a right-hand side `r` is `|r - Q Q^T r|^2`.
 
 use super::reduced::ConstantModel;
 use crate::identifiability::Factorisation;
@@ -11,11 +14,11 @@ use nalgebra::{DMatrix, DVector};
 
 /// Both models, linearised at the constant optimum.
 pub struct LinearisedModels {
-    /// Orthonormal columns that span what each model can do: constant, varying.
+    /// `Q` of the constant and of the varying model.
     spans: [DMatrix<f64>; 2],
-    /// Root weight times sigma of each sample.
+    /// Root weight times sigma of each sample, dimensionless.
     noise: Vec<f64>,
-    /// What penalties and priors ask for.
+    /// Right-hand sides of the rows of penalties and priors.
     asked: Vec<f64>,
 }
 
@@ -57,7 +60,7 @@ impl LinearisedModels {
         }
     }
 
-    /// Least costs of both models for simulated samples `index`.
+    /// Least costs of the constant and the varying model for simulated samples `index`.
     pub fn costs(&self, seed: u64, index: usize) -> [f64; 2] {
         let mut random = stream(seed, index);
         let unit = normal(&mut random, self.noise.len());
@@ -72,8 +75,8 @@ impl LinearisedModels {
     }
 }
 
-/// An orthonormal basis of the columns' span; columns are first scaled to size 1, for parameters have
-/// units.
+/// Orthonormal basis of the span of the columns. Columns are first scaled to unit length, because parameters have
+/// different units.
 fn span(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     for mut column in matrix.column_iter_mut() {
         let size = column.norm();

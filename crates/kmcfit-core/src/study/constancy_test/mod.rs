@@ -1,21 +1,20 @@
-//! Does a function vary at all?
+//! Constancy test: a likelihood-ratio test of a constant against a time-varying coefficient function.
 //!
-//! For each function the model is fitted as it is and with that function constant. The statistic is
-//! the likelihood ratio
+//! For each function the model is fitted twice, as stated and with that function constant. The statistic is
 //!
 //! ```text
-//! LR = J(constant) - J(varying)                     with sigma
-//!    = n ln(J(constant) / J(varying))               without, n samples
+//! LR = J(constant) - J(varying)                     if sigma is known
+//!    = n ln(J(constant) / J(varying))               otherwise, n samples
 //! ```
 //!
-//! on whole costs, penalties and priors included. Its distribution when the function is constant is
-//! not a chi-square once there are penalties, so it is simulated: samples of the constant model
-//! with seeded normal noise, both models refitted to their linearisation at the constant optimum,
-//! penalties and priors included, inequality constraints left out: bounds that hold the varying model
-//! alone make the test err towards constant, one that holds the constant itself towards varying. The
-//! p-value is `(1 + how many simulated LR are at least the observed) / (1 + simulations)`.
+//! with the full cost `J`, penalties and priors included. Penalties invalidate the chi-square distribution of `LR` under
+//! the null hypothesis (the function is constant), so the distribution is simulated: samples of the constant model with
+//! seeded normal noise are fitted by both models, linearised at the constant optimum. The p-value is
+//! `(1 + number of simulated LR not below the observed one) / (1 + simulations)`.
 //!
-//! The noise is normal: with a robust loss the p-value is only as good as that.
+//! Limits: the linearised models include penalties and priors but no inequality constraints. Active bounds of the varying
+//! model alone bias the test towards constant, an active bound of the constant biases it towards varying. The simulated
+//! noise is normal also where the loss is robust.
 //!
 //! Source: A. C. Davison, D. V. Hinkley, *Bootstrap Methods and their Application*, Cambridge 1997,
 //! section 4.2.
@@ -31,38 +30,37 @@ use crate::solvers::fit_from;
 use linearised::LinearisedModels;
 use reduced::ConstantModel;
 
-/// The verdict on one function.
+/// Result of the constancy test of one function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConstancyTest {
-    /// Its name.
+    /// Name of the function.
     pub function: String,
     /// Index in the list of functions.
     pub index: usize,
-    /// The likelihood ratio.
+    /// Likelihood ratio `LR`.
     pub statistic: f64,
-    /// Its p-value under the constant model.
+    /// p-value of `LR` under the constant model.
     pub p_value: f64,
-    /// Simulations behind it.
+    /// Number of simulations.
     pub simulations: usize,
-    /// BIC of the constant model less that of the varying one, every parameter counted, `LR - (extra
-    /// parameters) ln n`: positive speaks for varying. Penalised parameters count in full, so with
-    /// penalties it is too hard on them.
+    /// BIC of the constant model minus that of the varying one, `LR - (extra parameters) ln n`: positive values favour the
+    /// varying model. Penalised parameters count in full, so with penalties the value is biased towards constant.
     pub bic: f64,
-    /// The constant that fits best, in the unit of the function.
+    /// Best-fitting constant, in the unit of the function.
     pub constant: f64,
-    /// Its unit.
+    /// Unit of the function.
     pub unit: String,
-    /// Largest p-value called varying.
+    /// Significance level.
     pub level: f64,
 }
 
 impl ConstancyTest {
-    /// Whether the samples say that it varies.
+    /// Rejection of the constant model at the significance level.
     pub fn varies(&self) -> bool {
         self.p_value <= self.level
     }
 
-    /// In words.
+    /// Result as a sentence.
     pub fn sentence(&self) -> String {
         let Self {
             function,
@@ -72,28 +70,28 @@ impl ConstancyTest {
         } = self;
         match self.varies() {
             true => format!(
-                "{function} varies: a constant would fit worse by {statistic:.1}, which chance brings \
-                 with a probability of {p_value:.3}"
+                "likelihood-ratio test rejects a constant {function} (p = {p_value:.3}): the best constant raises the \
+                 cost by {statistic:.1}"
             ),
             false => format!(
-                "{function} may be constant, {:.6} {}: varying lowers the misfit by {statistic:.1}, \
-                 as chance does with a probability of {p_value:.2}",
+                "likelihood-ratio test does not reject a constant {function}, {:.6} {} (p = {p_value:.2}): variation \
+                 lowers the cost by {statistic:.1}",
                 self.constant, self.unit
             ),
         }
     }
 }
 
-/// How the question is asked.
+/// Settings of the constancy test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstancySettings {
-    /// Largest p-value called varying, as 0.05.
+    /// Significance level, for example 0.05.
     pub level: f64,
-    /// Simulated records.
+    /// Number of simulations.
     pub simulations: usize,
-    /// Their seed.
+    /// Seed of the simulations.
     pub seed: u64,
-    /// Most threads; the result does not depend on it.
+    /// Largest number of threads; results do not depend on it.
     pub threads: usize,
 }
 
@@ -108,10 +106,10 @@ impl Default for ConstancySettings {
     }
 }
 
-/// The verdict on every function that could vary, from `optimum`, where the problem was fitted.
+/// Tests every function with several parameters, starting from the fitted parameters `optimum`.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum, or a constant in its place, has no response.
+/// A [`SimulationError`] if the simulation fails at the optimum or at the constant that replaces a function.
 pub fn constancy_tests(
     problem: &Problem,
     optimum: &[f64],
@@ -123,10 +121,10 @@ pub fn constancy_tests(
         .collect()
 }
 
-/// The verdict on function `function` alone.
+/// Tests function `function` alone.
 ///
 /// # Errors
-/// As [`variation`].
+/// As [`constancy_tests`].
 pub fn of_function(
     problem: &Problem,
     optimum: &[f64],

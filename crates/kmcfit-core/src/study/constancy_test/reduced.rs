@@ -1,16 +1,16 @@
-//! The problem with one function constant.
+//! The null model of the constancy test: the problem with one function replaced by a constant, `theta = M theta'`.
 
 use crate::constraints::{Constraints, RowGroup, Rows};
 use crate::functions::{CoefficientFunction, Parameterization, Penalty};
 use crate::problem::Problem;
 
-/// The problem with one function constant, and how its parameters become those of the whole one.
+/// The problem with one constant function, and the map `M` from its parameters to those of the full problem.
 pub struct ConstantModel {
     pub problem: Problem,
     function: usize,
-    /// Where the constant stands.
+    /// Index of the constant among the parameters.
     pub place: usize,
-    /// The parameters of the constant 1 in the function that it replaces.
+    /// Parameters of the constant 1 in the basis of the replaced function.
     one: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl ConstantModel {
         reduced
     }
 
-    /// Constraints and penalties in the parameters of the reduced problem.
+    /// Rewrites constraints and penalties in the parameters of the constant model.
     fn rewrite(&mut self, whole: &Problem) {
         let groups = |list: &[RowGroup]| -> Vec<RowGroup> {
             let each = list.iter().map(|group| RowGroup {
@@ -64,7 +64,7 @@ impl ConstantModel {
         for cone in constraints.cones.iter_mut().flat_map(|g| &mut g.cones) {
             cone.rows = self.rows(&cone.rows);
         }
-        // Rows about the function's shape have nothing left to say.
+        // Rows on the shape of the function have no entries for a constant.
         for group in &mut constraints.groups {
             let mut kept = RowGroup {
                 rows: Rows::new(),
@@ -95,7 +95,7 @@ impl ConstantModel {
         parts.variations = variations;
     }
 
-    /// `A M` for `theta = M theta'`.
+    /// Rows `A M` with `theta = M theta'`.
     fn rows(&self, rows: &Rows) -> Rows {
         let mut out = Rows::new();
         for (i, right) in rows.right().iter().enumerate() {
@@ -113,7 +113,7 @@ impl ConstantModel {
         }
     }
 
-    /// A penalty of the function: one of a derivative is nothing for a constant.
+    /// Penalty in the new parameters; `None` for a penalty on a derivative, which is zero for a constant.
     fn penalty(&self, penalty: &Penalty) -> Option<Penalty> {
         if penalty.function != self.function {
             return Some(penalty.clone());
@@ -132,7 +132,7 @@ impl ConstantModel {
         })
     }
 
-    /// The parameters of the whole problem.
+    /// Parameters of the full problem, `M theta'`.
     pub fn embed(&self, theta: &[f64]) -> Vec<f64> {
         let function = self.one.iter().map(|one| one * theta[self.place]);
         let before = theta[..self.place].iter().copied();
@@ -140,10 +140,10 @@ impl ConstantModel {
         before.chain(function).chain(after).collect()
     }
 
-    /// Those of the reduced one, with the mean of the function's values.
+    /// Parameters of the constant model, with the mean value of the function.
     pub fn mean_of(&self, theta: &[f64]) -> Vec<f64> {
         let end = self.place + self.one.len();
-        // The constant nearest to the parameters.
+        // Constant nearest to the parameters, by least squares.
         let along: f64 = self
             .one
             .iter()
@@ -191,10 +191,10 @@ mod tests {
             .unwrap()
     }
 
-    /// With one function constant the problem is the whole one where that function is constant: of every function the
-    /// response, the penalties, the soft rows and the constraints.
+    /// The constant model agrees with the full problem at constant functions, for each function: response, penalties, soft rows
+    /// and constraints.
     #[test]
-    fn the_reduced_problem_is_the_whole_one_at_constants() {
+    fn the_constant_model_agrees_with_the_full_problem_at_constants() {
         let whole = whole();
         for function in 0..3 {
             let reduced = ConstantModel::new(&whole, function);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_about_the_shape_of_a_constant_are_gone() {
+    fn rows_on_the_shape_of_a_constant_are_removed() {
         let whole = whole();
         let slopes = |problem: &Problem| {
             let groups = problem.constraints.groups.iter();

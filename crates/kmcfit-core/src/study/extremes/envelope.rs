@@ -1,4 +1,4 @@
-//! Envelopes of all coefficient functions and of their ratios to the mass, within a misfit that the confidence allows.
+//! Envelopes of all coefficient functions and of `k/m` and `c/m`: smallest and largest values compatible with the data.
 
 use super::{
     Extreme, ExtremePair, ExtremeStatus, MisfitLimit, extreme_pairs, ratios_at, values_at,
@@ -8,9 +8,9 @@ use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 
-/// Roughness of a system in an envelope, as a multiple of the optimum's.
+/// Largest roughness of a system in an envelope, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
-/// A misfit of this share of the level is at it.
+/// A misfit above this share of the limit counts as equal to the limit.
 const AT_LEVEL: f64 = 0.999;
 
 /// The extremes of one function or ratio at several times.
@@ -25,7 +25,7 @@ pub struct Envelope {
 }
 
 impl MisfitLimit {
-    /// The misfit `asked` for, or the one that a confidence allows, with budgets of roughness where the fit has penalties.
+    /// The requested misfit limit, or that of a confidence level, with limits of roughness for each penalty of the fit.
     pub fn at(
         problem: &Problem,
         theta: &[f64],
@@ -37,7 +37,7 @@ impl MisfitLimit {
         let has_sigma = problem.channels().all(|c| c.weighting().is_sigma());
         let mut level = Self::of(asked.unwrap_or_else(|| match has_sigma {
             true => evaluation.misfit + quantile,
-            // n ln J rises by the quantile.
+            // The profile statistic `n ln J` rises by the quantile.
             false => evaluation.misfit * (quantile / problem.sample_count() as f64).exp(),
         }));
         level.budgets = (problem.penalties.iter())
@@ -52,7 +52,7 @@ impl MisfitLimit {
 }
 
 impl Extreme {
-    /// How the search ended; one that was stuck at the level has nothing left to gain.
+    /// Status of the search; a search without a feasible step whose misfit equals the limit has converged.
     pub fn ended_at(&self, level: &MisfitLimit) -> ExtremeStatus {
         match self.ended {
             ExtremeStatus::NoFeasibleStep if self.misfit >= AT_LEVEL * level.misfit => {
@@ -63,8 +63,8 @@ impl Extreme {
     }
 }
 
-/// The envelopes of all functions that are fitted and of k/m and c/m at `times`; none where the optimum itself is not within
-/// the level and the constraints.
+/// Envelopes of all estimated functions and of k/m and c/m at `times` (s); empty where the optimum violates the misfit limit
+/// or the constraints.
 pub fn envelopes(
     problem: &Problem,
     theta: &[f64],

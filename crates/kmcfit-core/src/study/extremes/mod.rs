@@ -1,26 +1,25 @@
-//! The extreme systems among all that explain the samples as well as stated.
+//! Data-consistent extremes: smallest and largest value of a quantity over all parameters compatible with the data.
 //!
-//! For a number `q` of the system (a function's value, or `k/m`, at a time)
+//! For a quantity `q` (the value of a function, or `k/m`, at one time)
 //!
 //! ```text
-//! max or min q(theta)   subject to   misfit(theta) <= level,  the model's constraints,
+//! max or min q(theta)   subject to   misfit(theta) <= limit,  the constraints of the model,
 //!                                    |L_j theta_j - target_j|^2 <= budget_j  (if stated)
 //! ```
 //!
-//! over many times this is the widest tube. `misfit` is that of the samples plus the priors of the
-//! scalars; penalties have no part in it but through the budgets. It is solved by sequential convex
-//! programming: the predictions are linearised, so that the level is one second-order cone
-//! `|W (r + J d)| <= sqrt(level)`, with a box of changing size as trust region; a trial that is
-//! outside the true level is brought back by Gauss–Newton projections, and every accepted point is a
-//! fresh forward solve. With many parameters the states are unknowns beside them, tied by the
-//! linearised steps.
+//! `misfit` is that of the samples plus the priors of the scalar parameters; penalties enter through the budgets only.
+//! Extremes at many times form an envelope.
 //!
-//! The result is a system, so the tube is at least as wide as stated; that it is not wider still is
-//! known only as far as the local search goes, and more starts can only widen it.
+//! Method: sequential convex programming. The predictions are linearised, which makes the misfit limit a second-order
+//! cone `|W (r + J d)| <= sqrt(limit)`; the trust region is a box of variable size. Gauss–Newton projections restore trial
+//! points beyond the limit, and each accepted point is simulated anew. With many parameters the states are unknowns as
+//! well, linked by the linearised steps.
 //!
-//! The question is that of the pull-apart search of Data2Dynamics. Source of the method: A. R. Conn,
-//! N. I. M. Gould, P. L. Toint, *Trust-Region Methods*, SIAM 2000, chapter 15, second-order
-//! corrections included.
+//! Each result is a feasible system, so the true envelope is at least as wide. The search is local; more starting points
+//! can only widen the envelope.
+//!
+//! Sources: A. R. Conn, N. I. M. Gould, P. L. Toint, *Trust-Region Methods*, SIAM 2000, chapter 15, with second-order
+//! corrections. Data2Dynamics has a comparable analysis.
 
 mod envelope;
 mod search;
@@ -33,23 +32,22 @@ use crate::functions::Penalty;
 use crate::problem::Problem;
 use search::Search;
 
-/// What bounds the systems beside the problem's own constraints.
+/// Limits of the admissible systems, in addition to the constraints of the problem.
 #[derive(Debug, Clone)]
 pub struct MisfitLimit {
-    /// Largest misfit, in the unit of the cost: for samples with sigma the best chi-square plus a
-    /// quantile, or a stated J.
+    /// Largest misfit, in the unit of the cost: the least chi-square plus a quantile for samples with sigma, or a stated `J`.
     pub misfit: f64,
-    /// Penalties whose `|L theta - target|^2` must not exceed the number beside it.
+    /// Penalties with the largest value of `|L theta - target|^2`.
     pub budgets: Vec<(Penalty, f64)>,
-    /// No number is pushed beyond so many times its natural size: free response has no upper end for a
-    /// mass.
+    /// Largest value of a quantity, as a multiple of its natural size. It ends the search where a quantity is unbounded,
+    /// like the mass of a free response.
     pub reach: f64,
-    /// Most convex programs for one extreme.
+    /// Largest number of convex programs for one extreme.
     pub programs: usize,
 }
 
 impl MisfitLimit {
-    /// A misfit, and nothing else; numbers up to ten times their natural sizes.
+    /// A misfit limit without budgets; quantities up to ten times their natural sizes.
     pub fn of(misfit: f64) -> Self {
         Self {
             misfit,
@@ -60,33 +58,33 @@ impl MisfitLimit {
     }
 }
 
-/// How the search for an extreme ended.
+/// End of the search for an extreme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExtremeStatus {
-    /// No step of the convex programs gains any more.
+    /// The convex programs predict no further gain.
     Converged,
-    /// The stated reach is met: the number has no end before it.
+    /// The quantity has reached the search limit.
     SearchLimit,
-    /// No trial could be brought back to the level.
+    /// No trial could be restored to the misfit limit.
     NoFeasibleStep,
-    /// The programs ran out.
+    /// The limit of convex programs is reached.
     ProgramLimit,
 }
 
-/// An extreme system.
+/// An extreme of a quantity and the system that attains it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extreme {
-    /// The number pushed, as in `mass at 3 s`.
+    /// Name of the quantity, as in `mass at 3 s`.
     pub function: String,
-    /// The time that it speaks of, s.
+    /// Time of the quantity, s.
     pub time: Option<f64>,
-    /// Whether it is the largest rather than the smallest.
+    /// True for the largest value, false for the smallest.
     pub largest: bool,
-    /// Its value.
+    /// Value of the quantity.
     pub value: f64,
-    /// The system, and the scalars.
+    /// Parameters of the system, scalars included.
     pub parameters: Vec<f64>,
-    /// Misfit by a fresh forward solve, at most the level.
+    /// Misfit from a new simulation, at most the limit.
     pub misfit: f64,
     /// How the search ended.
     pub ended: ExtremeStatus,
@@ -95,23 +93,23 @@ pub struct Extreme {
 }
 
 impl Extreme {
-    /// Name of the system, as in `largest mass at 3 s`.
+    /// Name of the extreme, as in `largest mass at 3 s`.
     pub fn name(&self) -> String {
         let way = if self.largest { "largest" } else { "smallest" };
         format!("{way} {}", self.function)
     }
 }
 
-/// Both ends of one number.
+/// Smallest and largest value of one quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtremePair {
-    /// The system with the smallest value.
+    /// Smallest value.
     pub low: Extreme,
-    /// The system with the largest.
+    /// Largest value.
     pub high: Extreme,
 }
 
-/// The targets of a tube of function `function` at `times` (s), those on the grid.
+/// Quantities for the envelope of function `function`: its values at those of `times` (s) within the grid.
 pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Target> {
     let each = times
         .iter()
@@ -119,7 +117,7 @@ pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Targe
     each.map(Target::Linear).collect()
 }
 
-/// The targets of a tube of the ratio of two functions, the second positive.
+/// Quantities for the envelope of the ratio of two functions; the second is positive.
 pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) -> Vec<Target> {
     let each = times.iter().filter_map(|t| {
         let over = Linear::value(problem, over, *t)?;
@@ -128,8 +126,8 @@ pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) ->
     each.collect()
 }
 
-/// Both extremes of every target, each from all `starts` that are within the level, on up to
-/// `threads` threads; `None` if no start is.
+/// Smallest and largest value of each target, each from all feasible `starts`, on up to `threads` threads; `None` if no
+/// start is feasible.
 pub fn extreme_pairs(
     problem: &Problem,
     starts: &[Vec<f64>],
@@ -163,7 +161,7 @@ pub fn extreme_pairs(
     Some(bands)
 }
 
-/// One extreme from one start; `None` unless the start is within the level and the constraints.
+/// One extreme from one start; `None` if the start violates the misfit limit or the constraints.
 pub fn extreme(
     problem: &Problem,
     start: &[f64],

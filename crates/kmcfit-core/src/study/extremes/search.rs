@@ -1,4 +1,4 @@
-//! Sequential convex programming for one extreme.
+//! Search for one extreme by sequential convex programming with a trust region.
 
 use super::{Extreme, ExtremeStatus, MisfitLimit};
 use crate::constraints::{self, Cone, Rows};
@@ -11,22 +11,22 @@ use crate::solvers::{add_priors, linear_predictions};
 use crate::study::functional::Target;
 use crate::study::refit::{positive_rms, sizes};
 
-/// First size of the trust region, relative to the functions' natural sizes.
+/// Initial size of the trust region, relative to the natural sizes of the functions.
 const FIRST_RADIUS: f64 = 0.25;
-/// Largest and smallest.
+/// Smallest and largest size of the trust region.
 const RADII: [f64; 2] = [1e-7, 100.0];
-/// A step whose gain is below this share of the number's size ends the search.
+/// Smallest gain that continues the search, relative to the size of the quantity.
 const SETTLED: f64 = 1e-9;
-/// Trials aim at this share of the level's root: a program may violate a cone by [`Kkt::VIOLATION`], which must not put
-/// them outside.
+/// Misfit limit of the convex programs as a share of the root of the stated one. A program may violate a cone by
+/// [`Kkt::VIOLATION`]; the margin keeps trial points feasible.
 const AIM: f64 = 1.0 - 2.0 * Kkt::VIOLATION;
-/// Corrections of one trial.
+/// Largest number of corrections of one trial.
 const CORRECTIONS: usize = 6;
-/// A step is good if it keeps this share of the predicted gain, poor below the next.
+/// Shares of the predicted gain above which a step is good and below which it is poor.
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.2;
 
-/// The misfit of the samples plus the priors.
+/// Misfit of the samples plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     let scalars = problem.functions.scalars().iter();
     let priors = scalars
@@ -35,13 +35,13 @@ fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     evaluation.misfit + priors.sum::<f64>()
 }
 
-/// One problem and one level.
+/// The search for extremes of one problem under one misfit limit.
 pub struct Search<'a> {
     pub problem: &'a Problem,
     pub level: &'a MisfitLimit,
 }
 
-/// Parameters within the level, with their forward solve.
+/// Feasible parameters with their simulation.
 pub struct FeasiblePoint {
     parameters: Vec<f64>,
     evaluation: Evaluation,
@@ -51,14 +51,14 @@ pub struct FeasiblePoint {
 /// A step of the search.
 struct SearchStep {
     trial: Vec<f64>,
-    /// What the linearised problem promises.
+    /// Gain predicted by the linearised problem.
     gain: f64,
-    /// Whether no step in the trust region promises more.
+    /// True if no step in the trust region has a larger predicted gain.
     is_largest: bool,
 }
 
 impl Search<'_> {
-    /// The forward solve at `theta`, if it is within level, budgets and constraints.
+    /// Simulation at `theta`; `None` if the misfit limit, a budget or a constraint is violated.
     pub fn point(&self, theta: &[f64]) -> Option<FeasiblePoint> {
         let evaluation = self.problem.evaluate(theta).ok()?;
         let misfit = measure(self.problem, theta, &evaluation);
@@ -76,7 +76,7 @@ impl Search<'_> {
         })
     }
 
-    /// The extreme of `target` towards `side` from `start`; `None` unless that is within the level.
+    /// Extreme of `target` towards `side` (-1 smallest, 1 largest) from `start`; `None` if `start` is not feasible.
     pub fn extreme(&self, start: &[f64], target: &Target, side: f64) -> Option<Extreme> {
         let mut here = self.point(start)?;
         let sizes = sizes(self.problem, start);
@@ -129,8 +129,8 @@ impl Search<'_> {
         })
     }
 
-    /// The linearised problem about `theta`: the level as a cone, constraints and budgets, in
-    /// variables measured by `units`.
+    /// The problem linearised about `theta`: misfit limit as a cone, constraints and budgets, in variables scaled by
+    /// `units`.
     fn linearised(&self, theta: &[f64], evaluation: &Evaluation) -> Subproblem {
         let mut sub = linear_predictions(self.problem, evaluation);
         let surplus = self.surplus(&sub, evaluation);
@@ -154,8 +154,8 @@ impl Search<'_> {
         sub
     }
 
-    /// The misfit less the weighted squares that stand for it, none for least squares. The squares of
-    /// a robust loss lie above it and touch it here, so a step that they allow is within the level.
+    /// Misfit minus its weighted squares, zero for least squares. The quadratic majorant of a robust loss lies above the
+    /// loss and touches it at the current point, so a step feasible for the majorant is feasible for the loss.
     fn surplus(&self, samples: &Subproblem, evaluation: &Evaluation) -> f64 {
         let plain = |c: &Channel| c.loss() == Loss::Squares;
         if self.problem.channels().all(plain) {
@@ -165,7 +165,7 @@ impl Search<'_> {
         evaluation.misfit - squares
     }
 
-    /// Parameters as units by their sizes, states by those of the responses.
+    /// Units of the unknowns: natural sizes of parameters, sizes of the responses for states.
     fn units(&self, sub: &Subproblem, evaluation: &Evaluation, sizes: &[f64]) -> Vec<f64> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {
@@ -178,7 +178,7 @@ impl Search<'_> {
         units
     }
 
-    /// The step that gains most in the linearised problem.
+    /// Step with the largest gain in the linearised problem.
     fn push(
         &self,
         here: &FeasiblePoint,
@@ -194,7 +194,7 @@ impl Search<'_> {
         for (j, size) in sizes.iter().enumerate() {
             sub.bound([(j, 1.0)], -radius * size, radius * size);
         }
-        // More than the trust region allows: the distance to it is linear where the step can be.
+        // A target beyond the trust region, where the objective "distance to the target" is linear.
         let most: f64 = slopes
             .iter()
             .map(|(j, a)| (a * sizes[*j] * radius).abs())
@@ -214,8 +214,8 @@ impl Search<'_> {
         })
     }
 
-    /// The changes of the parameters that solve a linearised problem, and whether they are its minimum. Every trial is
-    /// simulated, so a point within the constraints is tried although it may not be the best.
+    /// Parameter changes that solve a linearised problem, and the optimality of the solution. Each trial is simulated, so a
+    /// feasible point is usable although it may not be optimal.
     fn solved(
         &self,
         sub: &Subproblem,
@@ -233,8 +233,8 @@ impl Search<'_> {
         })
     }
 
-    /// The trial brought back to the level by the smallest changes, each for the linearisation at
-    /// the one before; `None` if that does not succeed.
+    /// Trial restored to the misfit limit by successive smallest changes, each for the linearisation at the previous point;
+    /// `None` if that fails.
     fn restored(&self, trial: Vec<f64>, sizes: &[f64]) -> Option<FeasiblePoint> {
         let mut theta = trial;
         let mut before = f64::INFINITY;
@@ -252,7 +252,7 @@ impl Search<'_> {
             for (d, size) in sub.proximal.iter_mut().zip(sizes) {
                 *d = 1.0 / (size * size);
             }
-            // The proximal term alone is zero at no step, which scales nothing: a constant does.
+            // The proximal term vanishes at a zero step and gives no scale; a constant does.
             sub.constant = 1.0;
             let (delta, _) = self.solved(&sub, &evaluation, sizes)?;
             theta = self.problem.constraints.moved(&theta, &delta);
@@ -261,7 +261,7 @@ impl Search<'_> {
     }
 }
 
-/// `|F z - f| <= radius`, relative to the radius.
+/// Cone `|F z - f| <= radius`, divided by the radius.
 fn ball(rows: &Rows, radius: f64) -> Cone {
     let mut cone = Rows::new();
     cone.push([], -1.0);
@@ -274,7 +274,7 @@ fn ball(rows: &Rows, radius: f64) -> Cone {
     Cone { rows: cone }
 }
 
-/// How large the number is, by the sizes of the parameters in it.
+/// Natural size of a quantity, from the sizes of its parameters.
 fn target_size(target: &Target, theta: &[f64], sizes: &[f64]) -> f64 {
     let slopes = target.slopes(theta);
     let change: f64 = slopes.iter().map(|(j, a)| (a * sizes[*j]).abs()).sum();

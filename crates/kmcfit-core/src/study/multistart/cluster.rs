@@ -1,11 +1,11 @@
-//! Clusters of optima.
+//! Clusters of local minima: minima with the same ratios to the mass and the same responses.
 
 use super::Waterfall;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::Status;
 
-/// How far two optima are from each other, without unit.
+/// Distance between two minima, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
     /// Largest root mean square difference of a ratio `p/m`, relative to its natural size.
@@ -14,7 +14,7 @@ pub struct Distance {
     pub responses: f64,
 }
 
-/// Optima that are one.
+/// Minima within the tolerance of each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {
     /// Indices of the runs, by rising cost.
@@ -24,9 +24,8 @@ pub struct Cluster {
 }
 
 impl Waterfall {
-    /// Clusters by rising cost: a run belongs to the first cluster whose best member is no further
-    /// than `tolerance`, in ratios and responses both. Only converged runs are told apart; the others
-    /// have not reached an optimum.
+    /// Clusters by rising cost. A run joins the first cluster whose best member is within `tolerance` in both ratios and
+    /// responses. Runs that have not converged are left out, because they have not reached a minimum.
     pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
         for &i in &self.order {
@@ -53,7 +52,7 @@ impl Waterfall {
     }
 }
 
-/// How far two points are from each other.
+/// Distance between two points.
 pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;

@@ -1,22 +1,22 @@
-//! Paths between two optima.
+//! Costs along paths between two minima.
 
 use crate::problem::Problem;
 use crate::system::NodalCoefficients;
 
-/// The cost along two paths between two points; infinite where there is no response.
+/// Costs along two paths between two points; infinite where the simulation fails.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paths {
-    /// Along `(1 - s) a + s b`, both ends included.
+    /// Costs along the straight path `(1 - s) a + s b`, both ends included.
     pub straight: Vec<f64>,
-    /// Along the gauge: the mass goes from one to the other geometrically, `m_a^(1-s) m_b^s`, and the
-    /// ratios to it go straight, so that between systems with the same ratios nothing but the common
-    /// factor changes. `None` where the functions cannot follow, as when one is fixed.
+    /// Costs along the path of the scaling ambiguity: the mass is `m_a^(1-s) m_b^s` and the ratios to the mass vary linearly,
+    /// so that only the common factor varies between systems with equal ratios. `None` where the bases do not contain the
+    /// path, for example where a function is fixed.
     pub gauge: Option<Vec<f64>>,
 }
 
 impl Paths {
-    /// Whether one of the paths never rises by more than `rise` above the higher end: then the two
-    /// are ends of one valley. No path below it proves nothing.
+    /// True if the cost along one of the paths never exceeds the higher end's by more than the share `rise`: the minima are
+    /// connected. False is no proof of the opposite.
     pub fn one_valley(&self, rise: f64) -> bool {
         let low = |path: &Vec<f64>| {
             let ends = path[0].max(path[path.len() - 1]);
@@ -26,7 +26,7 @@ impl Paths {
     }
 }
 
-/// The cost at `points` steps between the parameters `a` and `b`.
+/// Costs at `points` steps between the parameters `a` and `b`.
 pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths {
     let points = points.max(1);
     let shares: Vec<f64> = (0..=points).map(|i| i as f64 / points as f64).collect();
@@ -46,7 +46,7 @@ pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths 
     }
 }
 
-/// The point at `s` of the gauge path, functions of single experiments and scalars straight.
+/// Point `s` of the scaling path; functions of single experiments and scalars vary linearly.
 fn along_gauge(
     problem: &Problem,
     a: &[f64],

@@ -6,7 +6,7 @@ use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES};
 use crate::system::State;
 
-/// Everything that one solve needs.
+/// Arguments of one forward solve.
 pub(super) struct BlockForward<'a> {
     pub nodal: LinearSystem<'a>,
     pub initial: State,
@@ -35,7 +35,7 @@ impl Kernel for BlockForward<'_> {
             nodal.gather(arithmetic, tile, workspace);
             let maps = workspace.prepare(arithmetic, h, tile.length);
             let starts = starts(&maps, &mut x);
-            workspace.replay(arithmetic, h, tile.length, &starts);
+            workspace.response_pass(arithmetic, h, tile.length, &starts);
             tile.scatter(arithmetic, &workspace.response[0], displacement);
             tile.scatter(arithmetic, &workspace.response[1], velocity);
         }
@@ -48,7 +48,7 @@ impl Kernel for BlockForward<'_> {
     }
 }
 
-/// The states at the starts of all blocks, one after the other from `x`, which is carried to the end.
+/// States at the starts of all blocks, by recursion from `x`, which becomes the state at the end.
 #[inline(always)]
 pub(super) fn starts(maps: &Maps, x: &mut [f64; 2]) -> Ends {
     let mut starts = [[[0.0; LANES]; 2]; 2];

@@ -1,16 +1,14 @@
-//! Linear free response in eight blocks at once.
+//! Parallel-in-time integration of linear free responses, in eight SIMD lanes.
 //!
-//! A step of the midpoint rule is a linear map of the state as long as the terms are linear. So the
-//! record can be cut into blocks that do not wait for each other: a first pass finds the map of
-//! each block, from these the states between blocks follow one after the other, and a second
-//! pass computes the response in all blocks at once. The adjoint is done the same way from the end. One
-//! step after the other, each waits for the one before; in eight lanes the processor has always
-//! something to do.
+//! A step of the midpoint rule is a linear map of the state if the terms are linear. The record is divided into blocks. A
+//! first pass computes the map of each block; the states between blocks follow by a recursion over the maps; a second pass
+//! computes the response in all blocks in parallel. The adjoint is computed likewise, backwards. Sequential integration has
+//! one chain of dependent operations, eight lanes have eight independent ones.
 //!
-//! Responses, adjoints and least squares equal [`forward`](crate::simulate::reference::forward()) and
-//! [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of the largest value for
-//! each step: each step adds an increment of the state, as there, and the relative error of a block's map
-//! is that of its few steps.
+//! Responses, adjoints and least squares agree with [`forward`](crate::simulate::reference::forward()) and
+//! [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of the largest value per
+//! step: steps are increments of the state, as in the reference, and the relative error of a block's map is that of its
+//! few steps.
 
 mod adjoint;
 mod forward;
@@ -28,7 +26,7 @@ use step::{Constants, NodeCoefficients, StepRates};
 use tile::Tile;
 use workspace::{Workspace, with_workspace};
 
-/// A mass outside this range meets its own square near the ends of the range of numbers.
+/// Range of masses whose square is safely within the floating-point range.
 const MASSES: std::ops::Range<f64> = 1e-150..1e150;
 
 /// A system with damping and stiffness alone, and the step `h` (s).
@@ -41,8 +39,7 @@ pub(crate) struct LinearSystem<'a> {
 }
 
 impl<'a> LinearSystem<'a> {
-    /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
-    /// the terms damping and stiffness.
+    /// Constructs the system; `None` if a mass is outside the safe range. The terms must be damping and stiffness.
     pub fn of(system: &System, nodal: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
         let [damping, stiffness] = nodal.coefficients.as_slice() else {
             return None;
@@ -51,7 +48,7 @@ impl<'a> LinearSystem<'a> {
         Self::new(functions, system.grid.step(), nodes)
     }
 
-    /// The same from mass, damping and stiffness, and the step `h` (s).
+    /// Constructs the system from mass, damping and stiffness, and the step `h` (s).
     pub fn new([mass, damping, stiffness]: [&'a [f64]; 3], h: f64, nodes: usize) -> Option<Self> {
         let nodal = Self {
             mass: &mass[..nodes],
@@ -59,13 +56,12 @@ impl<'a> LinearSystem<'a> {
             stiffness,
             h,
         };
-        // Also behind the end of a record that is shorter than the grid.
+        // Nodes beyond the end of a short record are included.
         simd::run(MassRange(mass)).then_some(nodal)
     }
 
-    /// The cost `sum_i w_i (y_i - reading_i)^2` of one sample a node with the weights of the inner
-    /// nodes and of both ends, and its gradient: with respect to the functions into `gradient`,
-    /// with respect to the initial state returned.
+    /// Cost `sum_i w_i (y_i - sample_i)^2` of one sample per node with the weights of inner nodes and of both ends. Overwrites
+    /// `gradient` with the gradient with respect to the functions and returns that with respect to the initial state.
     pub fn least_squares(
         self,
         initial: State,
@@ -82,7 +78,7 @@ impl<'a> LinearSystem<'a> {
         .solve(gradient)
     }
 
-    /// Brings the functions into lanes.
+    /// Copies the functions to SIMD layout.
     #[inline(always)]
     fn gather<A: Arithmetic>(&self, arithmetic: A, tile: Tile, workspace: &mut Workspace) {
         let functions = [self.mass, self.damping, self.stiffness];
@@ -105,8 +101,8 @@ impl<'a> LinearSystem<'a> {
         StepRates::new(at(i), at(i + 1), self.constants())
     }
 
-    /// One step of the adjoint by itself: carries `x` from node `i + 1` to node `i` and adds the
-    /// step's share to the gradient, which is overwritten at node `i`.
+    /// One sequential step of the adjoint: advances `x` from node `i + 1` to node `i` and adds the step's contribution to the
+    /// gradient, which is overwritten at node `i`.
     #[inline(always)]
     fn step_back(
         &self,
@@ -127,8 +123,8 @@ impl<'a> LinearSystem<'a> {
         *x = [y + source[0], w + source[1]];
     }
 
-    /// The response from `initial`, over as many nodes as `trajectory` has. Where it, or a block's map,
-    /// leaves the finite numbers, the last state is not finite.
+    /// Response from `initial` over the nodes of `trajectory`. If it, or a block's map, is not finite, the last state is not
+    /// finite.
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {
             simd::run(forward::BlockForward {
@@ -141,7 +137,7 @@ impl<'a> LinearSystem<'a> {
         });
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()).
+    /// Adjoint, as [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()).
     pub fn gradient(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
         let by_velocity = source.velocity.iter().any(|s| *s != 0.0);
         let source = [
@@ -171,8 +167,7 @@ impl<'a> LinearSystem<'a> {
     }
 }
 
-/// Whether all masses are positive, and neither so large nor so small that a product of two leaves
-/// the range of numbers.
+/// Check that all masses are within the safe range.
 struct MassRange<'a>(&'a [f64]);
 
 impl simd::Kernel for MassRange<'_> {

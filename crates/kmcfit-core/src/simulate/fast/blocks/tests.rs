@@ -3,7 +3,7 @@ use crate::simd::LANES;
 use crate::simulate::{Engine, reference};
 use crate::system::{Grid, Method, Term};
 
-/// Records of a few steps more and less than whole tiles, and of several.
+/// Records slightly shorter and longer than whole tiles, and of several tiles.
 const NODES: [usize; 8] = [65, 66, 81, 200, 4096, 4097, 4113, 9000];
 
 const INITIAL: State = State {
@@ -19,7 +19,7 @@ fn system(nodes: usize) -> System {
     }
 }
 
-/// Mass falls, damping changes its sign, stiffness wobbles.
+/// Falling mass, damping of both signs, oscillating stiffness.
 fn nodal(nodes: usize) -> NodalCoefficients {
     let at = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
         (0..nodes).map(|i| f(i as f64 / nodes as f64)).collect()
@@ -65,11 +65,11 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     largest(&difference)
 }
 
-/// Rounding of the states at every step, carried along: some epsilons a period and 25 s of them.
+/// Bound of the accumulated rounding errors of 25 s: some machine precisions per period.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
-fn motions_are_those_of_single_steps() {
+fn responses_agree_with_sequential_steps() {
     for nodes in NODES {
         let (system, nodal) = (system(nodes), nodal(nodes));
         let one_by_one = system.forward(&nodal, INITIAL, None).unwrap();
@@ -87,7 +87,7 @@ fn motions_are_those_of_single_steps() {
 }
 
 #[test]
-fn gradients_are_those_of_single_steps() {
+fn gradients_agree_with_sequential_steps() {
     for (nodes, by_velocity) in NODES.into_iter().flat_map(|n| [(n, 0.0), (n, 0.3)]) {
         let (system, nodal) = (system(nodes), nodal(nodes));
         let response = system.forward(&nodal, INITIAL, None).unwrap();
@@ -106,7 +106,7 @@ fn gradients_are_those_of_single_steps() {
 }
 
 #[test]
-fn squares_are_motion_and_gradient_in_one() {
+fn least_squares_agree_with_response_and_gradient() {
     let weights = [0.7, 0.2];
     for nodes in NODES {
         let (system, nodal) = (system(nodes), nodal(nodes));
@@ -148,7 +148,7 @@ fn squares_are_motion_and_gradient_in_one() {
     }
 }
 
-/// A response and what follows from it, with one arithmetic.
+/// A response and its derivatives, with one SIMD arithmetic.
 struct Whole<'a>(&'a System, &'a NodalCoefficients);
 
 impl simd::Kernel for Whole<'_> {
@@ -179,24 +179,24 @@ impl simd::Kernel for Whole<'_> {
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
         let mut slopes = [&mut gradient.mass, c, k].map(Vec::as_mut_slice);
         let (cost, _) = with_workspace(|workspace| {
-            let survey = least_squares::Survey {
+            let first_pass = least_squares::FirstPass {
                 of,
                 tiles: &tiles,
                 workspace,
             };
-            let charts = survey.run(arithmetic);
-            let joint = of.join(&tiles, &charts, &mut slopes);
-            let descent = least_squares::Descent {
+            let block_maps = first_pass.run(arithmetic);
+            let joint = of.join(&tiles, &block_maps, &mut slopes);
+            let descent = least_squares::SecondPass {
                 of,
-                legs: &joint.legs,
+                tile_states: &joint.tile_states,
                 gradient: slopes
                     .each_mut()
                     .map(|g| &mut g[..tiles.last().map_or(0, |tile| tile.node(LANES, 0))]),
-                at_hand: false,
+                rates_kept: false,
                 workspace,
             };
-            let harvest = descent.run(arithmetic);
-            of.finish(&joint, &harvest, &mut slopes)
+            let result = descent.run(arithmetic);
+            of.finish(&joint, &result, &mut slopes)
         });
         let numbers = response.displacement.iter().chain(&response.velocity);
         let numbers = numbers.chain(gradient.functions().flatten()).chain([&cost]);
@@ -216,10 +216,10 @@ fn all_arithmetics_give_the_same_bits() {
     }
 }
 
-/// Masses at the ends of the range of numbers, and responses that leave it, go one step after the other
-/// and end as they do there.
+/// Masses near the limits of the floating-point range, and responses that exceed it, are integrated sequentially with the
+/// results of the reference.
 #[test]
-fn what_blocks_cannot_do_is_done_step_by_step() {
+fn systems_outside_the_safe_range_are_integrated_sequentially() {
     let nodes = 500;
     let system = system(nodes);
     let mut tiny = nodal(nodes);
@@ -245,9 +245,9 @@ fn what_blocks_cannot_do_is_done_step_by_step() {
     assert_eq!(found.unwrap_err(), expected);
 }
 
-/// A record that ends before the grid does: the system must have mass on all of it.
+/// The mass must be positive on the whole grid, also for a shorter record.
 #[test]
-fn mass_is_required_behind_the_end_of_a_record() {
+fn mass_is_required_beyond_the_end_of_a_record() {
     let nodes = 500;
     let (system, mut nodal) = (system(nodes), nodal(nodes));
     nodal.mass[nodes - 1] = -1.0;
@@ -258,11 +258,11 @@ fn mass_is_required_behind_the_end_of_a_record() {
     assert_eq!(found, expected);
 }
 
-/// Where the response meets the samples, the derivative of a block's cost is the difference of two numbers
-/// that are nearly the same. What it loses is less than the response's own rounding takes from the residuals:
-/// the gradients of two responses that differ by rounding differ more.
+/// Where the response equals the samples, the derivative of a block's cost is a difference of nearly equal numbers. The
+/// cancellation error is below the effect of rounding errors of the response on the residuals: the gradients of two
+/// responses that differ by rounding differ more.
 #[test]
-fn squares_lose_nothing_near_the_readings() {
+fn least_squares_are_accurate_for_a_response_equal_to_the_samples() {
     let nodes = 2000;
     let (system, nodal) = (system(nodes), nodal(nodes));
     let one_by_one = system.forward(&nodal, INITIAL, None).unwrap();
@@ -294,9 +294,9 @@ fn squares_lose_nothing_near_the_readings() {
     }
 }
 
-/// Whoever computes a tile, and whether its rates are still at hand: the same bits.
+/// Results of a tile do not depend on the thread, nor on reuse of its rates.
 #[test]
-fn every_cut_gives_the_same_bits() {
+fn results_do_not_depend_on_the_division_into_threads() {
     for nodes in [2000, 4097, 20_000] {
         let (system, nodal) = (system(nodes), nodal(nodes));
         let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();

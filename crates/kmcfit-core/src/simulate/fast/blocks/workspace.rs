@@ -1,32 +1,32 @@
-//! One tile in lanes: storage that is used again and again, and the passes over it.
+//! Storage of one tile in SIMD layout, and the passes over it.
 
 use super::step::{Constants, NodeCoefficients, StepRates};
 use super::tile::LONGEST;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use std::cell::RefCell;
 
-/// One row a node.
+/// One row per node.
 type NodeRows = [Row; LONGEST + 1];
 
-/// A state in every lane, at the ends of both halves.
+/// One state per lane, at the ends of both halves.
 pub(super) type Ends = [[Row; 2]; 2];
 
-/// The maps of both halves of every lane, from the state at the start of a half to that at its end, by
-/// columns: what becomes of `(1, 0)` and of `(0, 1)`.
+/// Maps of both halves of every lane, from the state at the start of a half to that at its end, by columns: the images of
+/// `(1, 0)` and `(0, 1)`.
 pub(super) type Maps = [[[Row; 2]; 2]; 2];
 
-/// What becomes of any state at the start of a block: the block's map, and half the derivative of the sum of the
-/// squares of its residuals, `H x - g`, with respect to that state.
+/// Map of a block, and half the derivative `H x - g` of its sum of squared residuals with respect to the state `x` at its
+/// start.
 pub(super) struct BlockMap {
     pub maps: Maps,
-    /// `H` of both halves: its diagonal, then what stands beside it.
+    /// `H` of both halves: diagonal, then off-diagonal entry.
     curvature: [[Row; 3]; 2],
     /// `g` of both halves.
     slope: [[Row; 2]; 2],
 }
 
 impl BlockMap {
-    /// `factor (H x - g)`: the adjoint state at the start of every block that is zero at its end.
+    /// Adjoint states `factor (H x - g)` at the starts of all blocks, for adjoint states of zero at their ends.
     pub fn driven(&self, starts: &Ends, factor: f64) -> Ends {
         let mut driven = [[[0.0; LANES]; 2]; 2];
         for (half, [dy, dw]) in driven.iter_mut().enumerate() {
@@ -41,11 +41,11 @@ impl BlockMap {
     }
 }
 
-/// A tile in lanes.
+/// A tile in SIMD layout.
 pub(super) struct Workspace {
     /// Mass, damping, stiffness.
     pub functions: [NodeRows; 3],
-    /// The six numbers of every step's [`StepRates`].
+    /// The six numbers of each step's [`StepRates`].
     rates: [NodeRows; 6],
     /// Displacement and velocity.
     pub response: [NodeRows; 2],
@@ -72,7 +72,7 @@ impl Default for Workspace {
     }
 }
 
-/// Does something with this thread's workspace.
+/// Calls `act` with the workspace of the thread.
 pub(super) fn with_workspace<R>(act: impl FnOnce(&mut Workspace) -> R) -> R {
     WORKSPACE.with_borrow_mut(|workspace| act(workspace))
 }
@@ -119,7 +119,7 @@ impl Workspace {
         middle[j] = rates.mobility[1].row();
     }
 
-    /// The adjoint state before step `j`, from that after it.
+    /// Adjoint state before step `j`, from that after it.
     #[inline(always)]
     fn backward<A: Arithmetic, const VELOCITY: bool>(
         &self,
@@ -140,10 +140,10 @@ impl Workspace {
         }
     }
 
-    /// StepRates of all steps from the functions, and the maps of all blocks.
+    /// Computes the rates of all steps and the maps of all blocks.
     #[inline(always)]
     pub fn prepare<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) -> Maps {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         let mut maps = [[[[0.0; LANES]; 2]; 2]; 2];
         for (half, map) in maps.iter_mut().enumerate() {
@@ -167,16 +167,16 @@ impl Workspace {
         maps
     }
 
-    /// The charts of all blocks, from the functions and from samples in place of the source. With `KEEP`
-    /// the rates of all steps are kept as well.
+    /// Block maps of all blocks, from the functions and from samples in place of the source. `KEEP` stores the rates of all
+    /// steps.
     #[inline(always)]
-    pub fn survey<A: Arithmetic, const KEEP: bool>(
+    pub fn first_pass<A: Arithmetic, const KEEP: bool>(
         &mut self,
         arithmetic: A,
         h: f64,
         length: usize,
     ) -> BlockMap {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let half = length / 2;
         let mut left = [
             self.coefficients(arithmetic, 0, of),
@@ -208,29 +208,29 @@ impl Workspace {
             }
         }
         let empty = [0.0; LANES];
-        let mut chart = BlockMap {
+        let mut block_map = BlockMap {
             maps: [[[empty; 2]; 2]; 2],
             curvature: [[empty; 3]; 2],
             slope: [[empty; 2]; 2],
         };
         for block in 0..2 {
             let [from_y, from_w] = map[block];
-            chart.maps[block] = [
+            block_map.maps[block] = [
                 [from_y[0].row(), from_y[1].row()],
                 [from_w[0].row(), from_w[1].row()],
             ];
             let [yy, ww, yw] = curvature[block];
-            chart.curvature[block] = [yy.row(), ww.row(), yw.row()];
+            block_map.curvature[block] = [yy.row(), ww.row(), yw.row()];
             let [gy, gw] = slope[block];
-            chart.slope[block] = [gy.row(), gw.row()];
+            block_map.slope[block] = [gy.row(), gw.row()];
         }
-        chart
+        block_map
     }
 
-    /// StepRates of all steps from the functions.
+    /// Computes the rates of all steps from the functions.
     #[inline(always)]
     pub fn prepare_rates<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         for j in 0..length {
             let right = self.coefficients(arithmetic, j + 1, of);
@@ -239,10 +239,16 @@ impl Workspace {
         }
     }
 
-    /// The response in all blocks from their starts.
+    /// Response in all blocks from their initial states.
     #[inline(always)]
-    pub fn replay<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize, starts: &Ends) {
-        let of = Constants::new(h).in_lanes(arithmetic);
+    pub fn response_pass<A: Arithmetic>(
+        &mut self,
+        arithmetic: A,
+        h: f64,
+        length: usize,
+        starts: &Ends,
+    ) {
+        let of = Constants::new(h).splat(arithmetic);
         let mut x = load(arithmetic, starts);
         for i in 0..length / 2 {
             for (half, x) in x.iter_mut().enumerate() {
@@ -254,8 +260,8 @@ impl Workspace {
         }
     }
 
-    /// From samples in place of the source: their residuals `r = y - sample`, the source
-    /// `factor r`, and the sum of the squares `r^2` in every lane.
+    /// Residuals `r = y - sample`, from samples in place of the source; replaces the source by `factor r` and returns the sum
+    /// of `r^2` in each lane.
     #[inline(always)]
     pub fn compare<A: Arithmetic>(&mut self, arithmetic: A, length: usize, factor: f64) -> Row {
         let factor = Eight::splat(arithmetic, factor);
@@ -272,8 +278,8 @@ impl Workspace {
         (sums[0] + sums[1]).row()
     }
 
-    /// The adjoint state at the start of every block that is zero at its end. `VELOCITY`: whether the
-    /// source has a part at the velocity.
+    /// Adjoint states at the starts of all blocks for states of zero at their ends. `VELOCITY` is true if the source has a
+    /// velocity part.
     #[inline(always)]
     pub fn drive<A: Arithmetic, const VELOCITY: bool>(
         &self,
@@ -281,7 +287,7 @@ impl Workspace {
         h: f64,
         length: usize,
     ) -> Ends {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut x = [[of.zero; 2]; 2];
         for i in (0..length / 2).rev() {
             for (half, x) in x.iter_mut().enumerate() {
@@ -296,20 +302,20 @@ impl Workspace {
         ]
     }
 
-    /// The adjoint in all blocks from their ends, and the gradient of all steps at the nodes `0..length`;
-    /// returns what belongs to the node after each lane.
+    /// Adjoint in all blocks from their ends, and the gradient of all steps at the nodes `0..length`; returns the contribution
+    /// to the node after each lane.
     #[inline(always)]
-    pub fn replay_back<A: Arithmetic, const VELOCITY: bool>(
+    pub fn adjoint_pass<A: Arithmetic, const VELOCITY: bool>(
         &mut self,
         arithmetic: A,
         h: f64,
         length: usize,
         ends: &Ends,
     ) -> [Row; 3] {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let scale = [of.per_h, of.one, of.h];
         let mut x = load(arithmetic, ends);
-        // Share of the node to the right so far, and of the node after each half.
+        // Contributions to the right node so far, and to the node after each half.
         let mut after = [[of.zero; 3]; 2];
         let mut last = [[of.zero; 3]; 2];
         for i in (0..length / 2).rev() {

@@ -1,4 +1,4 @@
-//! The response of one system, made again from eight of its states.
+//! Reconstruction of the response of one system from eight of its states.
 
 use super::part;
 use super::rows::{Steps, Values};
@@ -6,11 +6,10 @@ use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 use crate::simulate::Trajectory;
 use crate::system::{NodalCoefficients, State};
 
-/// The response of `system` from the displacements and velocities where its eight parts begin, by divisions alone.
+/// Computes the response of the system from displacements and velocities at the starts of its eight parts.
 ///
-/// Whether it is the response that one step after the other gives from `initial`, to the last bit: the first part begins there, and
-/// each ends where the next begins.
-/// Otherwise what is in `trajectory` is of no use.
+/// Returns true if it is bit-identical with sequential integration from `initial`: the first part starts there, and each
+/// part ends in the initial state of the next. Otherwise the contents of `trajectory` are undefined.
 pub(crate) fn reconstruct(
     nodal: &NodalCoefficients,
     initial: State,
@@ -22,7 +21,7 @@ pub(crate) fn reconstruct(
         return false;
     }
     let nodes = trajectory.nodes();
-    let ends = simd::run(Replay {
+    let ends = simd::run(PartsReplay {
         functions: [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]],
         states,
         step,
@@ -33,22 +32,22 @@ pub(crate) fn reconstruct(
     joins(&ends[0], &states[0]) && joins(&ends[1], &states[1])
 }
 
-/// A response from its states at the beginning of its eight parts, a lane each; gives those at their ends.
-struct Replay<'a> {
+/// Integration of the eight parts from their initial states, one per lane; returns their final states.
+struct PartsReplay<'a> {
     /// Mass, damping, stiffness at the nodes.
     functions: [&'a [f64]; 3],
-    /// Displacements and velocities where the parts begin.
+    /// Displacements and velocities at the starts of the parts.
     states: [Row; 2],
     step: f64,
     response: [&'a mut [f64]; 2],
 }
 
-impl Kernel for Replay<'_> {
+impl Kernel for PartsReplay<'_> {
     type Output = [Row; 2];
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> [Row; 2] {
-        let Replay {
+        let PartsReplay {
             functions,
             states,
             step,

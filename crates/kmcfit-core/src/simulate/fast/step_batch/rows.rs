@@ -1,4 +1,4 @@
-//! BatchRows of systems, one a lane, and the steps that they take.
+//! Rows of systems in SIMD lanes, and their steps by the midpoint rule.
 
 use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
@@ -8,7 +8,7 @@ pub(super) struct BatchRows<'a, const R: usize> {
     pub ray: SearchRay<'a>,
     pub lengths: &'a [Row; R],
     pub states: &'a mut [States; R],
-    /// Sums of squares, not finite where the response is not.
+    /// Sums of squares; not finite where the response is not.
     pub costs: &'a mut [Row; R],
 }
 
@@ -31,7 +31,7 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
-    /// Twice the values in the middle: halves of all three would change no bit of an acceleration.
+    /// Twice the values at mid-step; halving all three would not change a bit of an acceleration.
     #[inline(always)]
     fn twice_middle(self, right: Self) -> Self {
         let mut values = self.0;
@@ -41,7 +41,8 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
-    /// `-y'' = k y/m + c v/m`. Of both signs all that follows has the same bits, but for the sign of a velocity of zero.
+    /// Deceleration `-y'' = k y/m + c v/m`. Using it in place of the acceleration changes no bit except the sign of a zero
+    /// velocity.
     #[inline(always)]
     fn deceleration(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
         let [m, c, k] = self.0;
@@ -49,7 +50,7 @@ impl<A: Arithmetic> Values<A> {
     }
 }
 
-/// What is the same in every step.
+/// Constants of all steps.
 #[derive(Clone, Copy)]
 pub(super) struct Steps<A: Arithmetic> {
     dt: Eight<A>,
@@ -78,14 +79,14 @@ impl<A: Arithmetic> Steps<A> {
     }
 }
 
-/// A row of systems on their way.
+/// A row of systems during integration.
 #[derive(Clone, Copy)]
 struct BatchCoefficients<A: Arithmetic> {
     arithmetic: A,
     length: Row,
     left: Values<A>,
     state: [Eight<A>; 2],
-    /// The squares of the residuals.
+    /// Sum of squared residuals.
     sum: Eight<A>,
 }
 
@@ -100,7 +101,7 @@ impl<A: Arithmetic> BatchCoefficients<A> {
             length: *length,
             left: Values::at(ray, arithmetic, Eight::load(arithmetic, length), 0),
             state,
-            // Both ends count half.
+            // Both ends have half weight.
             sum: splat(-0.5) * (residual * residual),
         }
     }
@@ -125,7 +126,7 @@ impl<A: Arithmetic> BatchCoefficients<A> {
         let splat = |x| Eight::splat(self.arithmetic, x);
         let [y, v] = self.state;
         let residual = y - splat(last_sample);
-        // Zero, and not a number where the response is not finite.
+        // Zero for a finite response, otherwise not a number.
         let nothing = splat(0.0) * y + splat(0.0) * v;
         (self.sum + splat(0.5) * (residual * residual) + nothing).row()
     }

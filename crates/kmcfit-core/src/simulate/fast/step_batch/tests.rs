@@ -3,10 +3,10 @@ use crate::simulate::{Trajectory, reference};
 use crate::system::quadrature::trapezoid;
 use crate::system::{Grid, Method, NodalCoefficients, System, Term};
 
-/// Parts of one node and of many, whole rounds of eight and others, and last parts that are short or empty.
+/// Parts of one and of many nodes, with short and empty last parts.
 const NODES: [usize; 9] = [3, 4, 8, 9, 17, 41, 64, 65, 241];
 
-/// Mass, damping and stiffness, and what is taken away from them.
+/// Mass, damping and stiffness, and the search direction.
 fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
     let of = |f: fn(f64) -> f64| -> Vec<f64> {
         (0..nodes)
@@ -38,7 +38,7 @@ fn nodal_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
     }
 }
 
-/// One by one, by the forward solve and the trapezoid rule: the response and its cost.
+/// One trial by the forward solve and the trapezoid rule: response and cost.
 fn by_itself(ray: &SearchRay, length: f64) -> Option<(Trajectory, f64)> {
     let nodes = ray.samples.len();
     let system = System {
@@ -71,7 +71,7 @@ fn ray<'a>(
 }
 
 #[test]
-fn every_trial_is_the_forward_solve_by_itself() {
+fn every_trial_agrees_with_its_forward_solve() {
     NODES.into_iter().for_each(every_trial);
 }
 
@@ -79,11 +79,11 @@ fn every_trial(nodes: usize) {
     let [functions, direction] = functions(nodes);
     let samples: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
     let ray = ray(&functions, &direction, &samples);
-    // One lane, part of a row, whole rows, and half a row beside one, two and three; the two longest leave no mass.
+    // One lane, part of a row, whole rows, and half a row with one, two and three rows; the two longest steps leave no mass.
     for count in [1, 7, 8, 19, 28, 32, 44, 50, 52] {
         let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
         let layout = LaneLayout::new(ray, &lengths);
-        // One thread's rows and another one's.
+        // Rows of one thread and of another.
         let (rows, mut trials) = (layout.rows(), [StepBatch::default(), StepBatch::default()]);
         trials[0].run(ray, &layout, 0..rows.div_ceil(2));
         trials[1].run(ray, &layout, rows.div_ceil(2)..rows);
@@ -119,7 +119,7 @@ fn every_trial(nodes: usize) {
             let mut states = states.expect("states of every trial");
             let is_whole = reconstruct(&nodal, ray.initial, states, ray.step, &mut again);
             assert!(is_whole && again == response, "trial {which} of {count}");
-            // A last bit is seen, in whatever part.
+            // A change of the last bit in any part is detected.
             let parts = nodes.div_ceil(part(nodes));
             let state = &mut states[which % 2][which % parts];
             *state = state.next_up();
@@ -131,14 +131,14 @@ fn every_trial(nodes: usize) {
     }
 }
 
-/// Trials whose costs are as good as equal are all told, whichever is lower in its last digits.
+/// All trials with nearly equal costs are candidates, whichever is lower in the last digits.
 #[test]
-fn costs_that_are_as_good_as_equal_are_all_candidates() {
+fn trials_of_nearly_equal_cost_are_all_candidates() {
     let [functions, direction] = functions(41);
     let samples = [0.3; 41];
     let ray = ray(&functions, &direction, &samples);
     let layout = LaneLayout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
-    // Within the margin, and beyond it.
+    // Costs within the margin, and beyond it.
     let mut costs = [1.0; LANES];
     (costs[1], costs[2], costs[3]) = (0.5, 0.5 * (1.0 + 1e-12), 0.5 * (1.0 + 1e-9));
     assert_eq!(layout.lowest(&[costs]), [1, 2]);

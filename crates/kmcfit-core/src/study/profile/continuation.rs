@@ -1,4 +1,4 @@
-//! The walk along a profile.
+//! Continuation along a likelihood profile, outwards from the optimum on both sides.
 
 use super::{ActivationPoint, End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
@@ -9,31 +9,30 @@ use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
 
-/// A rise of so many quantiles in one step is a fit that was lost.
+/// Rise in one step, in quantiles, above which a fit is taken to have left the minimum.
 const LOST: f64 = 1e4;
-/// Name of the row that holds the number.
+/// Name of the equality row that fixes the quantity.
 const HELD: &str = "the profiled number";
-/// A step that raises the cost by less than this share of the quantile was too short: the next is
-/// twice as long.
+/// Rise of a step, as a share of the quantile, below which the next step is doubled.
 const SLOW: f64 = 0.15;
-/// A step that raises it by more than this share was too long for a neighbour: the next is half.
+/// Rise of a step, as a share of the quantile, above which the next step is halved.
 const FAST: f64 = 0.6;
-/// An end is found when the root of the rise is this near to the quantile's, relative to it.
+/// Relative accuracy of the root of the rise at an end.
 const END: f64 = 1e-9;
-/// Most refits for one end.
+/// Largest number of refits for one end.
 const END_FITS: usize = 60;
-/// A cost lower than the optimum's by this share of the quantile is a better optimum.
+/// Decrease of the cost below the optimum's, as a share of the quantile, that counts as a better minimum.
 const BETTER: f64 = 1e-3;
-/// Without a covariance, the first step as a share of the number's size.
+/// First step without a covariance, as a share of the quantity's size.
 const FIRST_STEP: f64 = 0.02;
-/// Bisections for the value at which a constraint becomes active: to a thousandth of a step.
+/// Bisections for the value at which a constraint becomes active: accuracy of a thousandth of a step.
 const MARK_FITS: usize = 10;
-/// A bound that a program finds is kept away from by this share of the number's size.
+/// Distance kept from a bound found by a convex program, as a share of the quantity's size.
 const SPARE: f64 = 1e-6;
-/// A rise is another constraint's work if without it less than this share of the quantile is left.
+/// A rise is attributed to a constraint if less than this share of the quantile remains without it.
 const BLAMED: f64 = 0.5;
 
-/// Names of the constraints that are active at a point, the profile's own row left out.
+/// Names of the constraints that are active at a point, without the row that fixes the quantity.
 fn names(problem: &Problem, point: &Iterate) -> Vec<String> {
     let active = active_constraints(problem, point).into_iter();
     active
@@ -42,7 +41,7 @@ fn names(problem: &Problem, point: &Iterate) -> Vec<String> {
         .collect()
 }
 
-/// The problem with the number held at `value`.
+/// The problem with the quantity fixed at `value`.
 fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
     let mut held = problem.clone();
     let mut group = RowGroup::new(HELD);
@@ -59,11 +58,11 @@ struct ProfilePoint {
     value: f64,
     cost: f64,
     point: Iterate,
-    /// Names of the constraints that are active there.
+    /// Names of the active constraints.
     active: Vec<String>,
 }
 
-/// A walk along one profile.
+/// The computation of one profile.
 pub struct ProfileSearch<'a> {
     problem: &'a Problem,
     of: &'a Linear,
@@ -77,7 +76,7 @@ pub struct ProfileSearch<'a> {
 }
 
 impl<'a> ProfileSearch<'a> {
-    /// At the optimum, which is polished first.
+    /// Starts at the optimum, after a refit to full accuracy.
     pub fn new(
         problem: &'a Problem,
         optimum: &[f64],
@@ -104,7 +103,7 @@ impl<'a> ProfileSearch<'a> {
         })
     }
 
-    /// To both sides.
+    /// Computes both sides.
     pub fn run(mut self) -> Profile {
         let first = self.points[0].clone();
         let sides = [-1.0, 1.0].map(|side| self.side(side, &first));
@@ -114,7 +113,7 @@ impl<'a> ProfileSearch<'a> {
         self.finish(first.value, sides)
     }
 
-    /// What the quantile is compared to.
+    /// Rise of the cost, comparable with the quantile.
     fn rise(&self, cost: f64) -> f64 {
         match self.sigma {
             true => cost - self.base,
@@ -122,12 +121,12 @@ impl<'a> ProfileSearch<'a> {
         }
     }
 
-    /// The signed distance to the quantile: the roots' difference.
+    /// Signed distance to the quantile: difference of the square roots.
     fn distance(&self, cost: f64) -> f64 {
         self.rise(cost).max(0.0).sqrt() - self.how.quantile.sqrt()
     }
 
-    /// The best fit with the number at `value`, from `guess`.
+    /// Best fit with the quantity fixed at `value`, started at `guess`.
     fn fit(&self, problem: &Problem, value: f64, guess: &[f64]) -> Result<ProfilePoint, String> {
         let held = held(problem, self.of, value);
         let start = nearest(&held, guess, &self.sizes)
@@ -135,7 +134,7 @@ impl<'a> ProfileSearch<'a> {
         let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
         match found.outcome.status {
             Status::Infeasible | Status::Failed => Err(found.outcome.reason.to_string()),
-            // A step that leads out of the valley is too long, and says nothing of its walls.
+            // A large rise in one step is a different minimum: the step is too long.
             _ if self.rise(found.best.evaluation.cost) > LOST * self.how.quantile => {
                 Err("no fit near the optimum was found with the number held there".to_owned())
             }
@@ -148,7 +147,7 @@ impl<'a> ProfileSearch<'a> {
         }
     }
 
-    /// How far the number can go towards `side` under the constraints and limits, and what is there.
+    /// Farthest value towards `side` within constraints and limits, and the kind of limit there.
     fn reach(&self, side: f64, theta: &[f64]) -> (f64, End) {
         let here = self.of.of(theta);
         let limit = self.how.limits[usize::from(side > 0.0)];
@@ -162,7 +161,7 @@ impl<'a> ProfileSearch<'a> {
         if self.problem.constraints.is_empty() || far == here {
             return (far, what);
         }
-        // The point of the constraints whose number is nearest to what is far.
+        // Feasible point whose quantity is nearest to the far limit.
         let unit = (far - here).abs().max(f64::MIN_POSITIVE);
         let mut sub = Subproblem::new(theta.len());
         sub.residuals.push(
@@ -181,7 +180,7 @@ impl<'a> ProfileSearch<'a> {
         if (far - reached).abs() <= 1e-3 * unit {
             return (far, what);
         }
-        // A program meets rows about several parameters to its accuracy only.
+        // A program satisfies rows on several parameters to its own accuracy only.
         let spare = match self.problem.constraints.are_simple() {
             true => 0.0,
             false => SPARE * size.min((reached - here).abs()),
@@ -249,8 +248,8 @@ impl<'a> ProfileSearch<'a> {
         (None, End::Steps)
     }
 
-    /// Where the rise is the quantile, between a sample inside and one outside: the Illinois variant
-    /// of the secant method (M. Dowell, P. Jarratt, *BIT* 11 (1971) 168-174).
+    /// Value at which the rise equals the quantile, between a point inside and one outside: the Illinois variant of the
+    /// secant method (M. Dowell, P. Jarratt, *BIT* 11 (1971) 168-174).
     fn end(&mut self, inside: ProfilePoint, outside: ProfilePoint) -> ProfilePoint {
         let (mut inside, mut outside) = (inside, outside);
         let root = self.how.quantile.sqrt();
@@ -284,8 +283,8 @@ impl<'a> ProfileSearch<'a> {
         outside
     }
 
-    /// Marks the constraints that become active on one side, each where it does, by bisection between
-    /// the last sample without it and the first one with it.
+    /// Locates the values at which constraints become active on one side, by bisection between the last point without the
+    /// constraint and the first one with it.
     fn mark(&mut self, side: f64, start: &ProfilePoint) {
         let beyond = |s: &&ProfilePoint| (s.value - start.value) * side >= 0.0;
         let mut points: Vec<ProfilePoint> = self.points.iter().filter(beyond).cloned().collect();
@@ -315,8 +314,8 @@ impl<'a> ProfileSearch<'a> {
         }
     }
 
-    /// Whether the rise at `end` is the work of the constraints `new`, which are not active at the
-    /// optimum: the fit is made again without them.
+    /// Attribution of the rise at `end` to the constraints `new`, which are not active at the optimum: the fit is repeated
+    /// without them.
     fn blame(&self, end: &ProfilePoint, new: Vec<String>) -> End {
         if new.is_empty() {
             return End::Rise;
@@ -362,7 +361,7 @@ impl<'a> ProfileSearch<'a> {
     }
 }
 
-/// The parameters at `value` on the line through two samples; those of the second without a first.
+/// Parameters at `value` on the line through two points; those of the second where there is no first.
 fn extrapolated(first: Option<&ProfilePoint>, second: &ProfilePoint, value: f64) -> Vec<f64> {
     let here = &second.point.parameters;
     let Some(first) = first.filter(|f| f.value != second.value) else {

@@ -1,10 +1,10 @@
-//! Proofs that a gradient is one, as functions that anyone can call.
+//! Error of a gradient against finite differences and Taylor remainders.
 
 use super::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 
-/// One point of the paper's Fig. 2.
+/// Error of a gradient at one step, a point of the paper's Fig. 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GradientError {
     /// Step `a` along the negative L2 gradient.
@@ -14,12 +14,12 @@ pub struct GradientError {
 }
 
 impl Problem {
-    /// The paper's Fig. 2: the error of a gradient against one-sided differences along itself, for
-    /// each of `steps`. An exact gradient's error falls in proportion to the step until rounding
-    /// takes over; an inexact one's stays at its floor.
+    /// Errors of a gradient against one-sided differences along the negative L2 gradient, for each of `steps` (the paper's
+    /// Fig. 2). The error of an exact gradient is proportional to the step until rounding errors dominate; that of an inexact
+    /// one levels off.
     ///
     /// # Errors
-    /// A [`SimulationError`] at `theta` itself; steps that break down are left out.
+    /// A [`SimulationError`] if the simulation at `theta` fails; steps whose simulation fails are omitted.
     pub fn gradient_error(
         &self,
         theta: &[f64],
@@ -45,7 +45,7 @@ impl Problem {
         Ok(errors)
     }
 
-    /// `J(to) - J(from)` without the cancellation of two rounded costs.
+    /// Difference `J(to) - J(from)`, computed from the residuals to avoid cancellation.
     pub fn cost_difference(&self, from: &Evaluation, to: &Evaluation) -> f64 {
         let channels = self.predicted(from).zip(to.predictions.iter().flatten());
         let misfit: f64 = channels
@@ -54,8 +54,8 @@ impl Problem {
         misfit + (to.regularisation - from.regularisation)
     }
 
-    /// Taylor remainders `|J(theta + a d) - J(theta) - a <dJ, d>|` along `direction` for each of
-    /// `steps`: they fall with the square of the step if the gradient is exact.
+    /// Taylor remainders `|J(theta + a d) - J(theta) - a <dJ, d>|` along `direction` for each of `steps`; proportional to the
+    /// square of the step for an exact gradient.
     ///
     /// # Errors
     /// A [`SimulationError`] at `theta` or at one of the trial points.
