@@ -3,7 +3,7 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::study::multistart::multistart;
 use std::hint::black_box;
 use std::path::Path;
@@ -71,7 +71,7 @@ fn sample(criterion: &mut Criterion) {
     criterion.bench_function("read and build a model", |b| {
         b.iter(|| {
             let file = ModelFile::read(black_box(&path)).expect("a model");
-            build(&file, Purpose::Fit).expect("a model")
+            build(&file, BuildMode::Fit).expect("a model")
         });
     });
 }

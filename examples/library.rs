@@ -1,12 +1,12 @@
 // A fit from Rust: the model file becomes a problem, the problem a system.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::fit;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = ModelFile::read("models/paper-lbfgs.yaml")?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     let start = model.problem.functions.start();
     let found = fit(&model.problem, &start, &model.settings, &mut |_| {})
         .map_err(|breakdown| breakdown.to_string())?;

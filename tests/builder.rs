@@ -1,6 +1,6 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
@@ -23,7 +23,7 @@ fn columns<const N: usize>(file: &str, names: [&str; N]) -> [Vec<f64>; N] {
 
 fn from_file(yaml: &str) -> (Problem, kmcfit_core::internals::solvers::FitSettings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/built-by-the-test.yaml");
-    let model = build(&ModelFile::parse(&path, yaml).unwrap(), Purpose::Fit).unwrap();
+    let model = build(&ModelFile::parse(&path, yaml).unwrap(), BuildMode::Fit).unwrap();
     (model.problem, model.settings)
 }
 
@@ -144,7 +144,7 @@ fn what_cannot_be_meant_is_refused() {
         (Builder::new(system()), "experiments: there are no records"),
         (
             Builder::new(system()).record(short()),
-            "experiments[0]: this experiment has no readings",
+            "experiments[0]: this experiment has no data",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &values[..2])),
@@ -176,7 +176,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
-            "grid.nodes: this number of nodes cannot be used\n  found: 2",
+            "grid.nodes: invalid number of nodes\n  found: 2",
         ),
         (
             Builder::new(system()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
@@ -188,7 +188,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(record().validation()),
-            "experiments: every experiment is held out of the fit",
+            "experiments: every experiment is a validation record",
         ),
         (
             Builder::new(system()).record(record().force(&times, &values)),
@@ -231,7 +231,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one()).nodes(usize::MAX),
-            "grid.nodes: this number of nodes cannot be used\n  found: 18446744073709551615",
+            "grid.nodes: invalid number of nodes\n  found: 18446744073709551615",
         ),
         (
             mass(CoefficientSpec::estimated(

@@ -3,7 +3,7 @@
 mod common;
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::report::{CostKind, cost_definition};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
@@ -286,7 +286,7 @@ fit: {{method: equation-error}}
     );
     let file = ModelFile::parse("dropbear.yaml", text).unwrap();
     let clock = std::time::Instant::now();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     assert!(model.warnings.is_empty(), "{:?}", model.warnings);
     let found = run(&model.problem);
     let seconds = clock.elapsed().as_secs_f64();
@@ -532,7 +532,7 @@ fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, Str
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), model).map_err(said)?;
-    build(&file, Purpose::Fit).map_err(said)
+    build(&file, BuildMode::Fit).map_err(said)
 }
 
 fn model(damping: &str, fit: &str) -> String {
@@ -575,7 +575,7 @@ fn model_files() {
             parts.penalties[0].weight = 2.0;
         })
         .unwrap();
-    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the readings, with y, y' and y'' from the readings and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
+    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the record, without a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
     assert_snapshot!(said(&model(period, "{method: gauss-newton}")), @"
@@ -616,7 +616,7 @@ fn model_files() {
     let text = model(number, "{method: equation-error}");
     assert_snapshot!(read(&text, f64::cos, 5).map(|_| ()).unwrap_err(), @"
     m.yaml:3:5: experiments[0]: the method `equation-error` cannot tell the motion from these readings
-      found: there are too few readings
+      found: too few samples
       expected: readings from which displacement, velocity and acceleration follow
     ");
     assert_snapshot!(read(&text, |_| 0.0, 401).map(|_| ()).unwrap_err(), @"

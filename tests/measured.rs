@@ -2,7 +2,7 @@
 
 mod common;
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::solvers::{Status, fit};
 
 /// Roll decay of the ship model KVLCC2 (Alexandersson and Kjellberg 2021, doi
@@ -30,7 +30,7 @@ fit: {{method: lbfgs, stop: {{iterations: 200, tolerance: 1e-9}}}}
         data.canonicalize().unwrap().display()
     );
     let file = ModelFile::parse("roll.yaml", text).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let start = model.problem.functions.start();
     let run = fit(&model.problem, &start, &model.settings, &mut |_| {}).unwrap();
     assert_eq!(run.outcome.status, Status::Converged, "{:?}", run.outcome);
@@ -67,7 +67,7 @@ functions:
         data.canonicalize().unwrap().display()
     );
     let file = ModelFile::parse("roll.yaml", text).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let run = fit(
         &model.problem,
         &model.problem.start(),

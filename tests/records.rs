@@ -1,6 +1,6 @@
 //! Records as model files bring them, from the YAML to the constants found.
 
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
 use kmcfit_core::internals::system::{
@@ -78,7 +78,7 @@ functions:
 "
     );
     let file = ModelFile::parse(folder.path().join("model.yaml"), yaml).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let start = model.problem.start();
     let (_, run) = fit_with_noise(&model.problem, &start, &model.settings, &mut |_| {}).unwrap();
     assert_eq!(run.outcome.status, Status::Converged, "{:?}", run.outcome);
@@ -323,7 +323,7 @@ functions:
 fit: {method: lbfgs, gradient: continuous}
 ";
         let file = ModelFile::parse(folder.path().join("model.yaml"), yaml).unwrap();
-        let problem = build(&file, Purpose::Fit).unwrap().problem;
+        let problem = build(&file, BuildMode::Fit).unwrap().problem;
         let theta = problem.start();
         let evaluation = problem.evaluate(&theta).unwrap();
         let [a, b] = [GradientKind::Discrete, GradientKind::Continuous]

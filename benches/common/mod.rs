@@ -1,7 +1,7 @@
 //! The problems that are timed.
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -72,7 +72,7 @@ pub fn model(name: &str, changes: &[(&str, &str)]) -> Model {
         text = text.replace(old, new);
     }
     let file = ModelFile::parse(&path, text).expect("a model");
-    build(&file, Purpose::Fit).expect("a model")
+    build(&file, BuildMode::Fit).expect("a model")
 }
 
 /// `models/paper-smooth.yaml` on `nodes` nodes.

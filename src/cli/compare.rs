@@ -3,7 +3,7 @@
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
 use super::{Failure, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable};
-use crate::config::{Model, ModelFile, Purpose, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compare models and finished runs: one table, overlaid figures, one page.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit compare constant.yaml spline.yaml runs/earlier")]
 pub struct Arguments {
     /// Model files (YAML), which are fitted, and folders of finished runs.
     #[arg(required = true, value_name = "MODEL|RUN")]
@@ -349,7 +350,7 @@ fn entry(path: &Path, name: &str) -> Result<ComparisonEntry, InputError> {
         );
     }
     let file = ModelFile::read(path)?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     let heading = Heading::of_model("fit", &file, true, None);
     Ok(ComparisonEntry::Model(Box::new(ToFit {
         file,

@@ -7,7 +7,7 @@ use super::{
     Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
     unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
 use crate::report::study::{
     self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
@@ -28,6 +28,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Analyse what the records determine: profiles, extremes, equivalent systems, next experiments.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit study model.yaml --threads 4")]
 pub struct Arguments {
     /// Model file or sequence (YAML), or the folder of a finished run, whose model is fitted again.
     model: PathBuf,
@@ -104,7 +105,7 @@ fn run_in(
     threads: usize,
     is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let mut model = build(file, Purpose::Fit)?;
+    let mut model = build(file, BuildMode::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
     announce(&model);

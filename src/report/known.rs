@@ -23,10 +23,10 @@ impl Known {
     /// Assesses a fit.
     pub fn of(model: &Model, fit: &Fit) -> Self {
         let is_simulated = model.settings.solver != Solver::EquationError;
-        let held_out = model.held_out.iter();
+        let validation = model.validation.iter();
         Self {
             assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
-            validation: held_out
+            validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),
         }

@@ -36,7 +36,7 @@ pub struct FittedModel<'a> {
     pub predictions: &'a [Prediction],
     /// The path on which the weight of the smoothness was chosen, if by a rule.
     pub weights: Option<&'a WeightPath>,
-    /// How well the readings determine what was found.
+    /// Assessment of the fit.
     pub known: &'a Known,
 }
 
@@ -144,7 +144,7 @@ impl FittedModel<'_> {
         self.model.settings.solver != Solver::EquationError
     }
 
-    /// The bands of functions and ratios, for models of few free values.
+    /// The bands of functions and ratios, for models of at most 64 parameters.
     pub(super) fn bands(&self) -> Option<&Bands> {
         self.known.bands()
     }

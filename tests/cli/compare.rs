@@ -362,12 +362,12 @@ fn a_bad_argument_ends_everything_before_it_begins() {
     let stderr = refused("bad.yaml");
     assert!(stderr.starts_with("error: bad.yaml:10:"), "{stderr}");
     assert_snapshot!(refused("constant.yaml"), @"
-    error: constant.yaml: there is no such file
+    error: constant.yaml: no such file
       expected: a model file (YAML), or the folder of a finished run
       hint: did you mean `constants.yaml`?
     ");
     assert_snapshot!(refused("empty"), @"
-    error: empty/result.json: there is no such file
+    error: empty/result.json: no such file
       expected: the result of a finished run
     ");
     bench.run_to(0, &["fit", "constants.yaml"]);

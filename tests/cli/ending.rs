@@ -167,9 +167,9 @@ fn failed_and_empty_runs_are_read_back() {
         assert_eq!(code, 2, "{stderr}");
         insta::allow_duplicates! {
             insta::assert_snapshot!(stderr, @"
-            error: failed/result.json: this run failed and found no device
+            error: failed/result.json: this run failed and has no estimates
               found: the start cannot be evaluated: the motion overflows at t = 0.100000 s
-              expected: the result of a run that found one
+              expected: the result of a run with estimates
             ");
         }
     }

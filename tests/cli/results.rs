@@ -81,7 +81,7 @@ fn the_sentence_is_the_whole_cost() {
     assert_eq!(result["model"]["cost_kind"], "integral");
     assert_eq!(
         result["model"]["cost_definition"],
-        "J = integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s) \
+        "J = integral (y - y_obs)^2 dt (trapezoid rule over the samples, m^2 s) \
          + 0.3 * integral (dm/dt)^2 dt \
          + 0.02 * integral (c - reference)^2 dt \
          + 0.004 * integral (d^2c/dt^2)^2 dt \

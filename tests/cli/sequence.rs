@@ -113,7 +113,7 @@ fn a_sequence_in_flow_style() {
         bench.write("models/flow.yaml", text);
         let (code, _, said) = bench.run(&["study", "models/flow.yaml"]);
         assert_eq!(code, 2, "{said}");
-        let read = "models/nowhere.yaml: there is no such file";
+        let read = "models/nowhere.yaml: no such file";
         assert!(said.contains(read), "{text}: {said}");
     }
 }

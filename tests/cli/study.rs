@@ -205,10 +205,7 @@ fn a_sequence() {
         &bench,
         &["study", "models/short.yaml", "--out", "runs/other"],
     );
-    assert!(
-        missing.contains("nowhere.yaml: there is no such file"),
-        "{missing}"
-    );
+    assert!(missing.contains("nowhere.yaml: no such file"), "{missing}");
     bench.write("models/short.yaml", "format: 1\nsequence: []\n");
     let before = refused(&bench, &["study", "models/short.yaml"]);
     assert!(before.contains("the sequence has no model"), "{before}");

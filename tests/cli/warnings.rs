@@ -34,9 +34,9 @@ fn what_stands_still_shows_no_device() {
     let (code, _, stderr) = bench.run(&["init", "record.csv"]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr, @"
-    error: record.csv: the readings do not move
-      found: 12 readings, all of them 1
-      expected: the motion of a device: nothing can be learnt from one that stands still
+    error: record.csv: all samples are equal
+      found: 12 samples, all 1
+      expected: a record of a moving system
     ");
     for grid in ["{nodes: 9}", "{nodes: auto}", "{}", "{nodes: 200}"] {
         bench.write(
@@ -484,7 +484,7 @@ fn what_stands_still_first_is_left_out() {
         bench.write("record.csv", &table_of(reading));
         let _ = std::fs::remove_file(bench.path("record.yaml"));
         let said = bench.run_to(0, &["init", "record.csv"]);
-        let moves = format!("nothing moves before {begins} s: left out (window)\n");
+        let moves = format!("at rest before {begins} s: excluded by `window`\n");
         assert!(said.contains(&moves), "{said}");
         let window = format!("window: {{min: {begins}}}");
         assert!(bench.read("record.yaml").contains(&window));

@@ -4,7 +4,7 @@
 
 use kmcfit::Run;
 use kmcfit::config::scalar::{Count, Nodes};
-use kmcfit::config::{Model, ModelFile, Override, Purpose, Sequence, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
@@ -124,7 +124,7 @@ fn small(folder: &Path, method: &str) -> (Heading, Model) {
         checkpoint: Some(1e9),
         ..Heading::new("fit", vec!["m.yaml".into()])
     };
-    (heading, build(&file, Purpose::Fit).expect("a problem"))
+    (heading, build(&file, BuildMode::Fit).expect("a problem"))
 }
 
 /// Fits a model, keeping a journal.
@@ -285,9 +285,9 @@ pub fn model(bytes: &[u8]) -> Verdict {
         *count = Count(MANY_NODES);
     }
     let purposes = [
-        Purpose::Fit,
-        Purpose::Check { nodes: None },
-        Purpose::Simulate { nodes: Some(21) },
+        BuildMode::Fit,
+        BuildMode::Check { nodes: None },
+        BuildMode::Simulate { nodes: Some(21) },
     ];
     let mut verdict = Verdict::Accepted;
     for purpose in purposes {

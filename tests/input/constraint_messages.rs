@@ -1,7 +1,7 @@
 //! Constraints in model files: what they mean, and every message about what they cannot mean.
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::finding::Finding;
 use kmcfit_core::internals::solvers::{Initial, Solver};
 
@@ -39,7 +39,7 @@ fn read(text: &str) -> Result<Model, String> {
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
-    build(&file, Purpose::Fit).map_err(said)
+    build(&file, BuildMode::Fit).map_err(said)
 }
 
 fn message(constraints: &str) -> String {
@@ -300,21 +300,21 @@ fn kinds() {
       expected: at least one constraint, or no `constraints`
     ");
     assert_snapshot!(message("5"), @"
-    m.yaml:11:14: constraints: this is the wrong kind of value
+    m.yaml:11:14: constraints: wrong type of value
       found: the number 5
       expected: a list: lines that begin with `- `, or [ … ]
     ");
     assert_snapshot!(message("[{}]"), @"
-    m.yaml:11:15: constraints[0]: this constraint demands nothing
+    m.yaml:11:15: constraints[0]: empty constraint
       expected: one of: `min` or `max`, `slope`, `shape`, `at` and `value`, `mean`, `integral`, `equal`, `passive`, `frequency`, `damping_ratio`
     ");
     assert_snapshot!(message("[positive]"), @"
-    m.yaml:11:15: constraints[0]: this is the wrong kind of value
+    m.yaml:11:15: constraints[0]: wrong type of value
       found: text `positive`
       expected: a map such as {function: mass, shape: non-increasing}
     ");
     assert_snapshot!(message("[{function: mass}]"), @"
-    m.yaml:11:15: constraints[0]: this constraint demands nothing
+    m.yaml:11:15: constraints[0]: empty constraint
       expected: one of: `min` or `max`, `slope`, `shape`, `at` and `value`, `mean`, `integral`, `equal`, `passive`, `frequency`, `damping_ratio`
     ");
     assert_snapshot!(message("[{function: mass, shape: convex, mean: 1}]"), @"
@@ -347,10 +347,10 @@ fn kinds() {
     assert_snapshot!(message("[{passive: false}]"), @"
     m.yaml:11:25: constraints[0].passive: this demands nothing
       found: false
-      expected: `passive: true`, or no such constraint
+      expected: `passive: true`, or leave the constraint out
     ");
     assert_snapshot!(message("[{passive: maybe}]"), @"
-    m.yaml:11:25: constraints[0].passive: this is the wrong kind of value
+    m.yaml:11:25: constraints[0].passive: wrong type of value
       found: text `maybe`
       expected: true or false
     ");
@@ -400,7 +400,7 @@ fn shapes_and_ranges() {
       expected: min at most max
     ");
     assert_snapshot!(message("[{function: mass, slope: 0.1}]"), @"
-    m.yaml:11:39: constraints[0].slope: this is the wrong kind of value
+    m.yaml:11:39: constraints[0].slope: wrong type of value
       found: the number 0.1
       expected: a map such as {min: 0.1, max: 0.5}
     ");
@@ -444,12 +444,12 @@ fn shapes_and_ranges() {
 #[test]
 fn values_at_times() {
     assert_snapshot!(message("[{function: mass, at: 0}]"), @"
-    m.yaml:11:36: constraints[0].at: `at` needs `value` beside it
+    m.yaml:11:36: constraints[0].at: `at` requires `value`
       found: `at` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
     assert_snapshot!(message("[{function: mass, value: 1}]"), @"
-    m.yaml:11:39: constraints[0].value: `value` needs `at` beside it
+    m.yaml:11:39: constraints[0].value: `value` requires `at`
       found: `value` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
@@ -469,7 +469,7 @@ fn values_at_times() {
       expected: at least one time in s
     ");
     assert_snapshot!(message("[{function: mass, at: [0, 1], value: [1, 2, 3]}]"), @"
-    m.yaml:11:51: constraints[0].value: there is not one value for every time
+    m.yaml:11:51: constraints[0].value: the numbers of values and times differ
       found: 3 values, 2 times
       expected: as many values as times, or one for all
     ");

@@ -1,7 +1,7 @@
 //! The unit of a column, from all places that may state it, and what is said where they differ.
 
 use insta::assert_snapshot;
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::finding::Finding;
 
 /// The warnings about a table with columns of a time and a displacement, or why it is refused; and the
@@ -20,7 +20,7 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
         error.to_string().replace(&place, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
-    let model = build(&file, Purpose::Fit).map_err(said)?;
+    let model = build(&file, BuildMode::Fit).map_err(said)?;
     let grid = &model.problem.system.grid;
     let about_units = |w: &&Finding| w.kind.contains("unit");
     let warnings: Vec<&str> = (model.warnings.iter().filter(about_units))

@@ -103,8 +103,8 @@ const MOST_REPLICATES: usize = 1_000_000;
 const FEWEST_REPLICATES: usize = 40;
 /// Ratios and motions that differ by less are those of one optimum.
 const SAME: f64 = 1e-3;
-/// Tubes are sought at so many times unless the model names some.
-const TUBES: usize = 5;
+/// Number of times of the extremes, unless the model names them.
+const EXTREME_TIMES: usize = 5;
 
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
     let none = StudySpec::default();
@@ -180,7 +180,7 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
     for (name, given, fewest, most) in limits {
         if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
             return Err(file
-                .error_at(&format!("study.{name}"), "this number cannot be used")
+                .error_at(&format!("study.{name}"), "invalid number")
                 .found(count.0)
                 .expected(format!("{fewest} to {most}, or no `{name}`")));
         }
@@ -231,7 +231,7 @@ fn within(
 ) -> Result<f64, InputError> {
     match given {
         Some(number) if !fits(number.0) => Err(file
-            .error_at(key, "this number cannot be used")
+            .error_at(key, "invalid number")
             .found(number.0)
             .expected(match key {
                 "study.confidence" => "a number between 0 and 1, for instance 0.95",
@@ -246,8 +246,9 @@ fn within(
 fn extremes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
     let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
-        let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
-        return Ok((0..TUBES).map(time).collect());
+        let time =
+            |i: usize| grid.start() + grid.duration() * i as f64 / (EXTREME_TIMES - 1) as f64;
+        return Ok((0..EXTREME_TIMES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
         on_grid(
@@ -310,7 +311,7 @@ fn target(
                 .ok_or_else(|| {
                     let names = || scalars.iter().map(|s| s.name.as_str());
                     let error = file
-                        .error_at(&format!("{key}.scalar"), "no such number is estimated")
+                        .error_at(&format!("{key}.scalar"), "no such nuisance parameter")
                         .found(quote(&name.0))
                         .expected(match scalars.is_empty() {
                             true => "a model that estimates initial states or sensors".to_owned(),
@@ -345,7 +346,7 @@ fn function(
             .found(format!("`{name}`"))
             .expected("a function that is fitted")),
         None => Err(file
-            .error_at(&key, format!("the device has no {name}"))
+            .error_at(&key, format!("the model has no {name}"))
             .found(format!("`{name}`"))
             .expected("a function of the model")),
     }

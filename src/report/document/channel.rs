@@ -86,7 +86,7 @@ pub struct NuisanceParameter {
 pub struct ValidationSummary {
     /// Name.
     pub name: String,
-    /// How well each channel is predicted.
+    /// Fit of each channel.
     pub channels: Vec<ChannelSummary>,
     /// What was found from its own readings: its initial state, its sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -269,7 +269,7 @@ pub struct ExperimentSummary {
     /// Root-mean-square residual of the first channel, in its SI unit.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
-    /// How well each channel is matched.
+    /// Fit of each channel.
     #[serde(default)]
     pub channels: Vec<ChannelSummary>,
 }

@@ -124,7 +124,7 @@ impl Reader<'_> {
             [] => {
                 let all: Vec<&str> = Kind::ALL.iter().map(|(_, name)| *name).collect();
                 Err(self
-                    .error("", "this constraint demands nothing")
+                    .error("", "empty constraint")
                     .expected(format!("one of: {}", all.join(", "))))
             }
             [first, second, ..] => Err(self
@@ -203,7 +203,7 @@ impl Reader<'_> {
                     return Err(self
                         .error("passive", "this demands nothing")
                         .found("false")
-                        .expected("`passive: true`, or no such constraint"));
+                        .expected("`passive: true`, or leave the constraint out"));
                 }
                 Constraint::Passive
             }
@@ -241,7 +241,7 @@ impl Reader<'_> {
                     None => ("value", "at"),
                 };
                 return Err(self
-                    .error(has, format!("`{has}` needs `{lacks}` beside it"))
+                    .error(has, format!("`{has}` requires `{lacks}`"))
                     .found(format!("`{has}` alone"))
                     .expected("both, as in {function: stiffness, at: 0.0, value: 1.0}"));
             }
@@ -251,7 +251,7 @@ impl Reader<'_> {
         self.not_empty("value", values.len(), "at least one value")?;
         if values.len() != 1 && values.len() != times.len() {
             return Err(self
-                .error("value", "there is not one value for every time")
+                .error("value", "the numbers of values and times differ")
                 .found(format!("{} values, {} times", values.len(), times.len()))
                 .expected("as many values as times, or one for all"));
         }

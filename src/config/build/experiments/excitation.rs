@@ -65,7 +65,7 @@ pub fn read(
         (Some(column), force) => {
             if let Some(named) = force.as_ref().and_then(|f| f.shape) {
                 return Err(file
-                    .error_at(&format!("{key}.force.shape"), "there are two forces")
+                    .error_at(&format!("{key}.force.shape"), "the force is given twice")
                     .found(format!("a column and the shape `{named}`"))
                     .expected("one of the two"));
             }
@@ -105,14 +105,14 @@ fn base(
         (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
             return Err(file
-                .error_at(&format!("{key}.base"), "the motion of the base is missing")
+                .error_at(&format!("{key}.base"), "the base motion is missing")
                 .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`"));
         }
         (Some(_), Some(_)) => {
             return Err(file
                 .error_at(
                     &format!("{key}.columns.base_displacement"),
-                    "the motion of the base is given twice",
+                    "the base motion is given twice",
                 )
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
@@ -173,7 +173,7 @@ fn signal(
     if missing > 0 {
         let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
         return Err(file
-            .error_at(&key, "what drives the motion has gaps")
+            .error_at(&key, "the input has gaps")
             .found(format!(
                 "{missing} of {} values missing, the first at {} s",
                 source.values.len(),
@@ -183,7 +183,7 @@ fn signal(
     }
     let samples = source.times.len();
     Signal::new(source.times, source.values, interpolation).ok_or_else(|| {
-        file.error_at(&key, "these samples make no signal")
+        file.error_at(&key, "invalid samples of the input")
             .found(format!("{samples} samples"))
             .expected("finite values at increasing times")
     })

@@ -136,7 +136,7 @@ fn table(
     let key = format!("{}.data", own.map_or(experiment, |_| column_key));
     let data = own.or(spec.data.as_ref()).ok_or_else(|| {
         file.error_at(experiment, "this experiment has no data")
-            .expected("`data`, a CSV file with the readings")
+            .expected("`data`, a CSV file with the samples")
     })?;
     Table::read_with(file.resolve(&data.0), &format(spec))
         .map_err(|error| about_format(file, experiment, error))
@@ -158,7 +158,7 @@ fn inside(
         true => Err(file
             .error_at(
                 &format!("{experiment}.window"),
-                "no reading lies in the window",
+                "no sample lies in the window",
             )
             .found(format!("{from} s to {to} s"))
             .expected(format!(
@@ -232,7 +232,7 @@ fn times(
             return Err(file
                 .error_at(
                     &format!("{experiment}.sample_rate"),
-                    "this sampling rate cannot be used",
+                    "invalid sampling rate",
                 )
                 .found(format!("{:?}", rate.0))
                 .expected(rates()));
@@ -247,7 +247,7 @@ fn times(
     let index = table.find(&column_name(id)).map_err(|error| {
         let error = asked_for(file, &key)(error);
         match own_column.or(shared_column) {
-            None => error.hint("`columns: {time: …}` names it; `sample_rate: …` does without"),
+            None => error.hint("name it with `columns: {time: …}`, or give `sample_rate: …`"),
             Some(_) => error,
         }
     })?;
@@ -277,7 +277,7 @@ fn rates() -> String {
 fn two_times(file: &ModelFile, experiment: &str) -> InputError {
     file.error_at(
         &format!("{experiment}.sample_rate"),
-        "there are times from a rate and from a column",
+        "both a sampling rate and a column of times are given",
     )
     .found("`sample_rate` beside a column of times")
     .expected("one of the two")

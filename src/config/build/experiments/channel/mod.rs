@@ -139,9 +139,9 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
     match (&spec.data, &spec.columns) {
         (None, None) => file
             .error_at(&key, "this experiment has no data")
-            .expected("`data`, a CSV file with the readings"),
+            .expected("`data`, a CSV file with the samples"),
         _ => file
-            .error_at(&format!("{key}.columns"), "this experiment has no readings")
+            .error_at(&format!("{key}.columns"), "this experiment has no data")
             .found("columns of other things only")
             .expected("one or more of `displacement`, `velocity`, `acceleration`"),
     }
@@ -171,7 +171,7 @@ fn without_column(
                 [] => "no `columns`: the displacement is read".to_owned(),
                 some => format!("columns of {}", names(some)),
             })
-            .expected(format!("`columns: {{{name}: …}}`, or no such key here"))),
+            .expected(format!("`columns: {{{name}: …}}`, or leave the key out"))),
         None => Ok(()),
     }
 }
@@ -256,16 +256,16 @@ fn present(
         0 => {
             let (missing, label) = (source.values.len(), &source.label);
             return Err(file
-                .error_at(column, "all readings are missing")
+                .error_at(column, "all samples are missing")
                 .found(format!("{missing} rows without a number in `{label}`"))
-                .expected("at least some readings"));
+                .expected("at least one sample"));
         }
         1 => "1 reading".to_owned(),
         count if count < Grid::FEWEST_NODES => format!("{count} readings"),
         _ => return Ok(present),
     };
     Err(file
-        .error_at(column, "there are too few readings")
+        .error_at(column, "too few samples")
         .found(found)
         .expected(format!("at least {}", Grid::FEWEST_NODES)))
 }
