@@ -40,10 +40,10 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
-        ClassificationKind, FunctionClassification, Gain, Gauge, RankFinding, RankFindingKind,
-        Ranked, ResolvedDirection, Sensitivity, Side, SingularSpectrum, Symmetry, anchors,
-        classify_functions, is_rounding, is_unhindered, rank_experiments, residual_spread,
-        structural_rank,
+        ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
+        ResolvedDirection, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry,
+        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
+        residual_spread, structural_rank,
     };
 }
 pub mod objective {

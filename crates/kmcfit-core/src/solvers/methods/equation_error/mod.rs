@@ -26,7 +26,7 @@ use measured::Measured;
 /// equation leaves undetermined.
 const PULL: f64 = 1e-9;
 
-/// Purpose of a minimum.
+/// Use of a minimum.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Accuracy {
     /// Starting point of a fit.
