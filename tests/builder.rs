@@ -311,7 +311,7 @@ fn what_cannot_be_meant_is_refused() {
         (
             Builder::new(system())
                 .record(record().coefficient(CoefficientKind::CubicStiffness, one())),
-            "experiments[0].functions.cubic_stiffness: the device has no such function",
+            "experiments[0].functions.cubic_stiffness: the system has no such function",
         ),
         (
             Builder::new(system())
