@@ -21,6 +21,7 @@ pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 pub struct Kkt {
     /// Stationarity `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the predicted decrease for
     /// `sum_j (delta_j / X_j)^2 <= 1`; or `sum_j r_j^2 / (2 d_j) / S`, the bound by the proximal terms, if smaller.
+    /// With a known Newton step, its predicted decrease ([`Subproblem::kkt_with_decrease`]).
     pub stationarity: f64,
     /// Complementarity `sum |multiplier| distance / S`: for rows the distance from the bound of the multiplier's sign, for cones the inner
     /// product, for absolute values `w |T z - t| / 2` less the multiplier's part.
@@ -121,6 +122,18 @@ impl Subproblem {
             violation_cost: share(rows.violation_cost),
             feasibility: rows.feasibility,
         }
+    }
+
+    /// [`Subproblem::kkt`] with the known decrease of half the cost by a Newton step on the active rows, `decrease = 1/2 r' H^-1 r` for the
+    /// gradient `r`, which uses the curvature along each direction instead of that of each variable.
+    pub(super) fn kkt_with_decrease(&self, candidate: &PrimalDual, decrease: f64) -> Kkt {
+        let mut kkt = self.kkt(candidate);
+        let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
+        let scale = self.cost_scale(&candidate.z, &self.joined_sizes(&candidate.z), at_zero);
+        if decrease <= kkt.stationarity * scale {
+            kkt.stationarity = decrease / scale;
+        }
+        kkt
     }
 
     /// Reference of the shares: half of the largest of the cost at `z`, `at_zero`, and the cost for which the rounding error of the residuals

@@ -133,6 +133,30 @@ impl Subproblem {
         self.solve_until(iterations, Kkt::is_solution)
     }
 
+    /// Step of a fit: a feasible point whose cost exceeds the minimum by at most [`Subproblem::STEP_GAP`] of the decrease, or the minimum;
+    /// and a bound of the excess.
+    pub fn solve_step(&self, iterations: u32) -> (Solution, f64) {
+        if iterations > 0
+            && self.is_finite()
+            && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
+        {
+            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+            let excess = match kkt.is_solution() {
+                true => 0.0,
+                false => 2.0 * (found.gap + found.decrease),
+            };
+            let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+            if excess <= 2.0 * Self::STEP_GAP * decrease {
+                let found = Some((found.point, kkt));
+                return (self.solution(ConicStatus::Solved, found, 1), excess);
+            }
+        }
+        (self.solve_within(iterations), 0.0)
+    }
+
+    /// Largest excess of the cost of a step over the minimum, as a share of the decrease; the next linearisation removes it.
+    const STEP_GAP: f64 = 5e-3;
+
     /// Attempts until the residuals of a point are within limits.
     fn solve_until(&self, iterations: u32, is_enough: impl Fn(&Kkt) -> bool) -> Solution {
         if iterations == 0 || !self.is_finite() {
@@ -140,6 +164,12 @@ impl Subproblem {
         }
         if self.has_impossible_row() {
             return self.solution(ConicStatus::Infeasible, None, 0);
+        }
+        if let Some(found) = self.minimise_on_stages(iterations, 0.0) {
+            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+            if kkt.is_solution() {
+                return self.solution(ConicStatus::Solved, Some((found.point, kkt)), 1);
+            }
         }
         // With zero cost at zero, the interior-point method has no unit of the cost.
         let zero = PrimalDual::zero(self);
@@ -237,7 +267,7 @@ impl Subproblem {
 
     /// Clips every variable to the bounds of single-variable rows: an interior-point method violates them by its accuracy, which may be a large
     /// share of a small variable.
-    fn clip(&self, z: &mut [f64]) {
+    pub(super) fn clip(&self, z: &mut [f64]) {
         let mut clip = |rows: &Rows, i: usize, upper: f64| {
             let mut entries = rows.row(i).filter(|(_, a)| *a != 0.0);
             if let (Some((j, a)), None) = (entries.next(), entries.next()) {

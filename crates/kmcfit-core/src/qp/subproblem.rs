@@ -1,7 +1,7 @@
 //! Definition of convex subproblems, and their solution without inequalities.
 
 use super::ldl::Symmetric;
-use super::{chain, few_variables};
+use super::{StageLayout, chain, few_variables};
 use crate::constraints::{Cone, Rows};
 
 /// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order cones.
@@ -30,6 +30,8 @@ pub struct Subproblem {
     /// Elimination order: place of each variable along a chain, mostly time, in which rows couple neighbours only; empty if unknown for some
     /// variable.
     pub stations: Vec<u32>,
+    /// Assignment of the variables to the nodes of a time grid, if known for all.
+    pub layout: Option<StageLayout>,
 }
 
 impl Subproblem {
@@ -47,6 +49,7 @@ impl Subproblem {
             upper: Vec::new(),
             cones: Vec::new(),
             stations: Vec::new(),
+            layout: None,
         }
     }
 
@@ -208,6 +211,15 @@ impl Subproblem {
             *value >= self.inequalities.right()[i] - slack && *value <= self.upper[i] + slack
         });
         rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
+    }
+
+    /// True if an inequality is active at zero, to `tolerance` relative to the row's size.
+    pub fn is_active_at_zero(&self, tolerance: f64) -> bool {
+        let bounds = self.inequalities.right().iter().zip(&self.upper);
+        let mut rows = bounds.enumerate();
+        rows.any(|(i, (lower, upper))| {
+            lower.abs().min(upper.abs()) <= tolerance * self.inequalities.scale(i)
+        })
     }
 
     /// Largest residual of the optimality conditions, relative to their right-hand side, of a usable plain solution: the iterations converge like

@@ -92,7 +92,7 @@ impl StepRule for GaussNewton {
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
-                if linear.trouble.is_some() || proposal.uncertainty > 0.0 {
+                if linear.trouble.is_some() || !proposal.is_solved {
                     linear.trouble.get_or_insert(ConicStatus::Almost);
                     // The following programs differ and may be solved with less damping.
                     self.damping = before;
@@ -109,7 +109,7 @@ impl StepRule for GaussNewton {
             {
                 return Step::Minimum(reason);
             }
-            if proposal.uncertainty > 0.0 {
+            if !proposal.is_solved {
                 // A shorter step predicts less because it is short.
                 linear.trouble.get_or_insert(ConicStatus::Almost);
             }
