@@ -149,7 +149,7 @@ fn a_mass_that_must_pass_zero() {
 fn a_damping_that_must_overflow() {
     let (_, result) = infeasible("{function: damping, at: 0.0, value: -1e20}");
     let reason = result["outcome"]["reason"].as_str().expect("text");
-    assert!(reason.contains("the motion overflows"), "{reason}");
+    assert!(reason.contains("the response overflows"), "{reason}");
 }
 
 /// A run that failed is said to have; one whose history is empty is a run like any other.
@@ -168,7 +168,7 @@ fn failed_and_empty_runs_are_read_back() {
         insta::allow_duplicates! {
             insta::assert_snapshot!(stderr, @"
             error: failed/result.json: this run failed and has no estimates
-              found: the start cannot be evaluated: the motion overflows at t = 0.100000 s
+              found: the start cannot be evaluated: the response overflows at t = 0.100000 s
               expected: the result of a run with estimates
             ");
         }

@@ -27,7 +27,7 @@ fn a_prediction_without_motion_does_not_cost_the_fit() {
     );
     let stdout = bench.run_to(0, &["fit", "model.yaml"]);
     assert!(
-        stdout.contains("no response: the motion overflows"),
+        stdout.contains("no response: the response overflows"),
         "{stdout}"
     );
     assert_eq!(status(&bench, "runs/model"), "completed");

@@ -229,7 +229,7 @@ fn a_record_at_rest() {
     bench.write("model.yaml", &model);
     let (code, stdout, stderr) = bench.run(&["study", "model.yaml"]);
     assert!(code == 0 || code == 3, "{code} {stderr}");
-    assert!(stdout.contains("the readings see 0 of"), "{stdout}");
+    assert!(stdout.contains("the samples determine 0 of"), "{stdout}");
     assert!(!stdout.contains("NaN"), "{stdout}");
 }
 

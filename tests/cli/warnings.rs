@@ -254,7 +254,7 @@ fn readings_without_squares_fail_by_name() {
     let (code, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
     assert_eq!(code, 3, "{summary}");
     assert!(
-        summary.contains("failed: the squares of the readings leave the range of numbers"),
+        summary.contains("failed: the squares of the samples leave the range of numbers"),
         "{summary}"
     );
     assert!(!summary.contains("is identified"), "{summary}");
