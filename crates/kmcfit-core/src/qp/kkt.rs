@@ -25,7 +25,8 @@ pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 pub struct Kkt {
     /// `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the decrease that it
     /// promises where `sum_j (delta_j / X_j)^2 <= 1`; or `sum_j r_j^2 / (2 d_j) / S`, more than which proximal terms do not
-    /// allow, if that is smaller.
+    /// allow, if that is smaller. Where the Newton step is known, the decrease that it promises
+    /// ([`Subproblem::kkt_with_decrease`]).
     pub stationarity: f64,
     /// `sum |multiplier| distance / S`: of each row from the bound at which its multiplier says that it is, of cones their
     /// inner product, of absolute values `w |T z - t| / 2` less the multiplier's part.
@@ -127,6 +128,18 @@ impl Subproblem {
             violation_cost: share(rows.violation_cost),
             feasibility: rows.feasibility,
         }
+    }
+
+    /// [`Subproblem::kkt`] where a Newton step of half the cost with the active rows is known to lower it by `decrease` and no
+    /// more: `1/2 r' H^-1 r` of the gradient `r`, which takes the curvature along each direction, and not of each variable alone.
+    pub(super) fn kkt_with_decrease(&self, candidate: &PrimalDual, decrease: f64) -> Kkt {
+        let mut kkt = self.kkt(candidate);
+        let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
+        let scale = self.cost_scale(&candidate.z, &self.joined_sizes(&candidate.z), at_zero);
+        if decrease <= kkt.stationarity * scale {
+            kkt.stationarity = decrease / scale;
+        }
+        kkt
     }
 
     /// Reference of the shares: half the largest of the cost at `z`, `at_zero`, and the cost of which the rounding of the residuals is

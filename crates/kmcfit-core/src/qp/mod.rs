@@ -15,6 +15,7 @@ mod polish;
 mod primal_dual;
 mod projection;
 mod solve;
+mod stages;
 mod subproblem;
 mod sum;
 
@@ -22,4 +23,5 @@ pub use kkt::Kkt;
 pub use primal_dual::PrimalDual;
 pub use projection::{project, project_within};
 pub use solve::{ConicStatus, Solution};
+pub use stages::{ResponseVariables, StageLayout};
 pub use subproblem::Subproblem;

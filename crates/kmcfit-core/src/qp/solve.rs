@@ -138,6 +138,31 @@ impl Subproblem {
         self.solve_until(iterations, Kkt::is_solution)
     }
 
+    /// A step of a fit: a point that satisfies the constraints and brings the cost down to the minimum but for
+    /// [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed the minimum.
+    pub fn solve_step(&self, iterations: u32) -> (Solution, f64) {
+        if iterations > 0
+            && self.is_finite()
+            && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
+        {
+            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+            let excess = match kkt.is_solution() {
+                true => 0.0,
+                false => 2.0 * (found.gap + found.decrease),
+            };
+            let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+            if excess <= 2.0 * Self::STEP_GAP * decrease {
+                let found = Some((found.point, kkt));
+                return (self.solution(ConicStatus::Solved, found, 1), excess);
+            }
+        }
+        (self.solve_within(iterations), 0.0)
+    }
+
+    /// Share of the decrease of the cost that a step may fall short by: the next linearisation brings it, like the error of
+    /// this one.
+    const STEP_GAP: f64 = 5e-3;
+
     /// Attempts until the residuals of a point are small enough.
     fn solve_until(&self, iterations: u32, is_enough: impl Fn(&Kkt) -> bool) -> Solution {
         if iterations == 0 || !self.is_finite() {
@@ -145,6 +170,12 @@ impl Subproblem {
         }
         if self.has_impossible_row() {
             return self.solution(ConicStatus::Infeasible, None, 0);
+        }
+        if let Some(found) = self.minimise_on_stages(iterations, 0.0) {
+            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+            if kkt.is_solution() {
+                return self.solution(ConicStatus::Solved, Some((found.point, kkt)), 1);
+            }
         }
         // Where it costs nothing to stay there is no unit of the cost for an interior-point method to go by.
         let zero = PrimalDual::zero(self);
@@ -242,7 +273,7 @@ impl Subproblem {
 
     /// Moves every variable that a row bounds or fixes alone into its bounds: an interior-point method leaves it outside by its
     /// accuracy, which for a variable of no other size is no small share of it.
-    fn clip(&self, z: &mut [f64]) {
+    pub(super) fn clip(&self, z: &mut [f64]) {
         let mut clip = |rows: &Rows, i: usize, upper: f64| {
             let mut entries = rows.row(i).filter(|(_, a)| *a != 0.0);
             if let (Some((j, a)), None) = (entries.next(), entries.next()) {

@@ -1,7 +1,7 @@
 //! The convex subproblem and its plain solution.
 
 use super::ldl::Symmetric;
-use super::{chain, few_variables};
+use super::{StageLayout, chain, few_variables};
 use crate::constraints::{Cone, Rows};
 
 /// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
@@ -31,6 +31,8 @@ pub struct Subproblem {
     /// Where the variables stand along a chain, time mostly, in which rows join near ones only; empty
     /// if no such order is known, or not of all variables.
     pub stations: Vec<u32>,
+    /// Which variables belong to which node of a time grid, where that is known of all.
+    pub layout: Option<StageLayout>,
 }
 
 impl Subproblem {
@@ -48,6 +50,7 @@ impl Subproblem {
             upper: Vec::new(),
             cones: Vec::new(),
             stations: Vec::new(),
+            layout: None,
         }
     }
 
@@ -212,6 +215,15 @@ impl Subproblem {
             *value >= self.inequalities.right()[i] - slack && *value <= self.upper[i] + slack
         });
         rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
+    }
+
+    /// Whether an inequality is active at zero, to `tolerance` relative to the row's size.
+    pub fn is_active_at_zero(&self, tolerance: f64) -> bool {
+        let bounds = self.inequalities.right().iter().zip(&self.upper);
+        let mut rows = bounds.enumerate();
+        rows.any(|(i, (lower, upper))| {
+            lower.abs().min(upper.abs()) <= tolerance * self.inequalities.scale(i)
+        })
     }
 
     /// Largest residual of the optimality conditions, relative to their right-hand side, with which

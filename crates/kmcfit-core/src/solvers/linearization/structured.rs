@@ -2,9 +2,10 @@
 //! of nodes, for functions with many parameters.
 
 use crate::constraints::Rows;
+use crate::functions::Design;
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::qp::Subproblem;
+use crate::qp::{ResponseVariables, StageLayout, Subproblem};
 use crate::record::{Channel, ChannelKind, Experiment};
 use crate::signal::SecondOrder;
 use crate::simulate::reference::step_jacobians;
@@ -41,6 +42,7 @@ pub fn subproblem(
         let nodes = 1..experiment.nodes as u32;
         sub.stations.extend(nodes.flat_map(|i| [i, i]));
     }
+    sub.layout = layout(problem);
     let mut base = parameters;
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
@@ -57,6 +59,45 @@ pub fn subproblem(
         base += 2 * (experiment.nodes - 1);
     }
     sub
+}
+
+/// The nodes at which the unknowns act; `None` if a function has neither one value per node nor a single one.
+fn layout(problem: &Problem) -> Option<StageLayout> {
+    let functions = &problem.functions;
+    let mut layout = StageLayout {
+        nodes: functions.nodes(),
+        ..StageLayout::default()
+    };
+    for (function, range) in functions.iter().zip(functions.ranges()) {
+        match function.design {
+            Design::Identity => layout.histories.push(range.clone()),
+            _ if range.len() <= 1 => layout.constants.extend(range.clone()),
+            _ => return None,
+        }
+    }
+    let first_scalar = functions.scalar_range().start;
+    let mut is_initial = vec![false; functions.scalars().len()];
+    let mut first = problem.parameters();
+    for experiment in &problem.experiments {
+        let initial = experiment.sought;
+        for index in initial.into_iter().flatten() {
+            if std::mem::replace(&mut is_initial[index], true) {
+                return None;
+            }
+        }
+        layout.responses.push(ResponseVariables {
+            first,
+            nodes: experiment.nodes,
+            initial: initial.map(|index| index.map(|index| first_scalar + index)),
+        });
+        first += 2 * (experiment.nodes - 1);
+    }
+    let others = functions.scalar_range().zip(is_initial);
+    let others = others.filter(|(_, is_initial)| !is_initial);
+    layout
+        .constants
+        .extend(others.map(|(variable, _)| variable));
+    Some(layout)
 }
 
 /// Where the unknowns of one experiment stand.
@@ -194,6 +235,7 @@ fn add_filter(
     let mut signal = rows;
     let mut indices = Vec::new();
     sub.stations.clear();
+    sub.layout = None;
     for backward in [false, true] {
         if backward {
             signal.reverse();

@@ -93,7 +93,7 @@ impl StepRule for GaussNewton {
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
-                if linear.trouble.is_some() || proposal.uncertainty > 0.0 {
+                if linear.trouble.is_some() || !proposal.is_solved {
                     linear.trouble.get_or_insert(ConicStatus::Almost);
                     // The next programs are others: they get the chance to be solved with less.
                     self.damping = before;
@@ -110,7 +110,7 @@ impl StepRule for GaussNewton {
             {
                 return Step::Minimum(reason);
             }
-            if proposal.uncertainty > 0.0 {
+            if !proposal.is_solved {
                 // A shorter step promises less for being short.
                 linear.trouble.get_or_insert(ConicStatus::Almost);
             }

@@ -26,6 +26,8 @@ pub(super) struct Proposal {
     pub predicted: f64,
     /// By how much more the subproblem can be lowered, as far as its solution is known; 0 where it is known to full accuracy.
     pub uncertainty: f64,
+    /// Whether the subproblem was solved as accurately as was wanted.
+    pub is_solved: bool,
 }
 
 /// What a subproblem gives.
@@ -55,7 +57,7 @@ pub(super) fn at_minimum(
         return Some(Reason::NoPredictedDecrease);
     }
     let change = change(problem, point, proposal);
-    let is_known = proposal.predicted > 0.0 && proposal.uncertainty == 0.0;
+    let is_known = proposal.predicted > 0.0 && proposal.is_solved;
     (is_known && change <= SMALLEST_CHANGE).then_some(Reason::NoPredictedChange(change))
 }
 
@@ -87,10 +89,13 @@ pub(super) fn propose(
             parameters,
             predicted,
             uncertainty: 0.0,
+            is_solved: true,
         })
     };
-    let plain = work.algebra(|| sub.solve_plain());
-    let plain = plain.map(|z| (cost - sub.value(&z), z));
+    // Where bounds are active they mostly stay so, and the stages take no longer than one plain step.
+    let is_plain_likely = sub.layout.is_none() || !sub.is_active_at_zero(constraints::TOLERANCE);
+    let plain = is_plain_likely.then(|| work.algebra(|| sub.solve_plain()));
+    let plain = plain.flatten().map(|z| (cost - sub.value(&z), z));
     if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
         if sub.holds(&z, 0.1 * constraints::TOLERANCE)
             && let Some(parameters) = moved(&z)
@@ -117,7 +122,7 @@ pub(super) fn propose(
         }
     }
     let iterations = work.program_iterations;
-    let solution = work.program(|| sub.solve_within(iterations));
+    let (solution, excess) = work.program(|| sub.solve_step(iterations));
     if !solution.status.is_point() {
         return ProposalOutcome::Unsolved(solution.status);
     }
@@ -134,10 +139,11 @@ pub(super) fn propose(
         parameters,
         predicted,
         uncertainty: match (solution.status, &solution.kkt) {
-            (ConicStatus::Solved, _) => 0.0,
+            (ConicStatus::Solved, _) => excess,
             (_, Some(kkt)) => kkt.cost() * cost.max(model),
             (_, None) => f64::INFINITY,
         },
+        is_solved: solution.status == ConicStatus::Solved,
     })
 }
 

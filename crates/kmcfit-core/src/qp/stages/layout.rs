@@ -1,0 +1,89 @@
+//! The variables of a subproblem in time.
+
+use std::ops::Range;
+
+/// Which variables of a subproblem belong to which node of a time grid. With it the subproblem is a linear-quadratic
+/// control problem: the state at node `i` holds the responses, the coefficients with their differences, and the
+/// constants; the controls are the highest differences of the coefficients.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StageLayout {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Coefficients with one variable at each node: their variables in time order.
+    pub histories: Vec<Range<usize>>,
+    /// Linearised responses.
+    pub responses: Vec<ResponseVariables>,
+    /// Variables that act at every node.
+    pub constants: Vec<usize>,
+}
+
+/// The variables of one linearised response: displacement and velocity at every node after the first, node by node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponseVariables {
+    /// Displacement at node 1; the velocity at node 1 follows, then the pair at node 2.
+    pub first: usize,
+    /// Number of nodes, the first included.
+    pub nodes: usize,
+    /// Displacement and velocity at node 0, where they are variables.
+    pub initial: [Option<usize>; 2],
+}
+
+/// Where a variable acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// History `f` at a node.
+    History(usize, usize),
+    /// Component `2 r + q` of the responses at a node.
+    Response(usize, usize),
+    /// Constant `c`.
+    Constant(usize),
+}
+
+impl Place {
+    /// The first node at which the variable acts.
+    pub fn node(self) -> usize {
+        match self {
+            Self::History(_, node) | Self::Response(_, node) => node,
+            Self::Constant(_) => 0,
+        }
+    }
+}
+
+impl StageLayout {
+    /// The place of every variable; `None` unless each of the `variables` has exactly one.
+    pub(super) fn places(&self, variables: usize) -> Option<Vec<Place>> {
+        let mut places = vec![None; variables];
+        let mut put = |variable: usize, place: Place| {
+            let slot = places.get_mut(variable)?;
+            slot.is_none().then(|| *slot = Some(place))
+        };
+        for (f, history) in self.histories.iter().enumerate() {
+            if history.len() != self.nodes {
+                return None;
+            }
+            for (node, variable) in history.clone().enumerate() {
+                put(variable, Place::History(f, node))?;
+            }
+        }
+        for (r, response) in self.responses.iter().enumerate() {
+            if response.nodes == 0 || response.nodes > self.nodes {
+                return None;
+            }
+            for q in 0..2 {
+                if let Some(variable) = response.initial[q] {
+                    put(variable, Place::Response(2 * r + q, 0))?;
+                }
+                for node in 1..response.nodes {
+                    put(
+                        response.first + 2 * (node - 1) + q,
+                        Place::Response(2 * r + q, node),
+                    )?;
+                }
+            }
+        }
+        for (c, variable) in self.constants.iter().enumerate() {
+            put(*variable, Place::Constant(c))?;
+        }
+        places.into_iter().collect()
+    }
+}

@@ -1,0 +1,402 @@
+//! A subproblem as a control problem along time.
+
+use super::layout::{Place, StageLayout};
+use super::riccati::{NONE, Transitions};
+use super::rows::{LooseRow, StageRows};
+use crate::constraints::{Rows, TOLERANCE};
+use crate::qp::Subproblem;
+
+/// Highest difference of a coefficient in the state.
+pub(super) const HIGHEST_ORDER: usize = 3;
+
+/// Number of states and controls that a subproblem needs, and the order of the differences of each history.
+pub(super) struct Sizes {
+    pub states: usize,
+    pub controls: usize,
+    orders: Vec<usize>,
+    places: Vec<Place>,
+}
+
+impl Sizes {
+    /// `None` if a row reaches over too many nodes, or an equality is no step of a response.
+    pub fn of(sub: &Subproblem, layout: &StageLayout) -> Option<Self> {
+        if layout.nodes < 2 || !sub.absolute.is_empty() || !sub.cones.is_empty() {
+            return None;
+        }
+        let places = layout.places(sub.variables)?;
+        let mut orders = vec![1; layout.histories.len()];
+        for rows in [&sub.residuals, &sub.equalities, &sub.inequalities] {
+            for i in 0..rows.len() {
+                let stage = stage_of(rows, i, &places);
+                for (j, _) in rows.row(i) {
+                    if let Place::History(f, node) = places[j] {
+                        orders[f] = orders[f].max(node - stage);
+                    }
+                }
+            }
+        }
+        if orders.iter().any(|order| *order > HIGHEST_ORDER) {
+            return None;
+        }
+        Some(Self {
+            states: 2 * layout.responses.len()
+                + orders.iter().sum::<usize>()
+                + layout.constants.len(),
+            controls: orders.len(),
+            orders,
+            places,
+        })
+    }
+}
+
+/// The first node at which a variable of row `i` acts: constants act at all, and come into play only where there is nothing else.
+fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
+    let entries = rows.row(i).filter(|(_, a)| *a != 0.0);
+    let nodes = entries.filter_map(|(j, _)| match places[j] {
+        Place::Constant(_) => None,
+        place => Some(place.node()),
+    });
+    nodes.min().unwrap_or(0)
+}
+
+/// The side of an inequality that a constraint row stands for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side {
+    /// Row of the subproblem.
+    pub row: usize,
+    /// 1 for the upper bound, -1 for the lower one.
+    pub sign: f64,
+}
+
+/// A subproblem in the coordinates of its stages.
+pub(super) struct StageProgram<const X: usize, const W: usize> {
+    pub stages: usize,
+    pub transitions: Transitions<W>,
+    /// What each step of a response adds beside `F_i xi_i`.
+    pub offsets: Vec<f64>,
+    /// `1/2 sum (a' xi - right)^2` is half the cost.
+    pub residuals: StageRows,
+    /// `a' xi <= right`.
+    pub constraints: StageRows,
+    /// Of each constraint row.
+    pub sides: Vec<Side>,
+    /// Largest coefficient of each constraint row in the variables.
+    pub scales: Vec<f64>,
+    /// Values of the first state that are known.
+    pub fixed: [Option<f64>; X],
+    places: Vec<Place>,
+    /// The state of each history's value; those of its differences follow.
+    values: Vec<usize>,
+    orders: Vec<usize>,
+    /// The first constant.
+    constants: usize,
+    /// Of each step of a response component its equality.
+    equalities: Vec<usize>,
+    /// Equalities that fix a first state.
+    fixing: Vec<(usize, usize)>,
+}
+
+impl<const X: usize, const W: usize> StageProgram<X, W> {
+    /// `None` where the subproblem is of another form: an equality that is neither a step of a response nor fixes a first
+    /// state, bounds without a point between them, or a row that speaks of more than one step of a response.
+    pub fn new(sub: &Subproblem, layout: &StageLayout, sizes: Sizes) -> Option<Self> {
+        let responses = 2 * layout.responses.len();
+        let mut values = Vec::new();
+        let mut next = Vec::new();
+        for (f, order) in sizes.orders.iter().enumerate() {
+            values.push(responses + next.len());
+            next.extend((1..*order).map(|j| values[f] + j));
+            next.push(X + f);
+        }
+        let constants = responses + next.len();
+        next.extend(layout.constants.iter().map(|_| NONE));
+        let stages = layout.nodes;
+        let mut fixed = [None; X];
+        fixed[constants + layout.constants.len()..].fill(Some(0.0));
+        for (r, response) in layout.responses.iter().enumerate() {
+            for q in 0..2 {
+                if response.initial[q].is_none() {
+                    fixed[2 * r + q] = Some(0.0);
+                }
+            }
+        }
+        let mut program = Self {
+            stages,
+            transitions: Transitions {
+                responses,
+                steps: vec![[0.0; W]; responses * (stages - 1)],
+                next,
+            },
+            offsets: vec![0.0; responses * (stages - 1)],
+            residuals: StageRows::default(),
+            constraints: StageRows::default(),
+            sides: Vec::new(),
+            scales: Vec::new(),
+            fixed,
+            places: sizes.places,
+            values,
+            orders: sizes.orders,
+            constants,
+            equalities: vec![NONE; responses * (stages - 1)],
+            fixing: Vec::new(),
+        };
+        for i in 0..sub.equalities.len() {
+            program.add_equality(&sub.equalities, i)?;
+        }
+        for (r, response) in layout.responses.iter().enumerate() {
+            for step in 0..response.nodes - 1 {
+                let steps = step * responses + 2 * r;
+                let known = &program.equalities[steps..steps + 2];
+                (!known.contains(&NONE)).then_some(())?;
+            }
+        }
+        program.add_residuals(sub)?;
+        program.add_constraints(sub)?;
+        Some(program)
+    }
+
+    /// A step of a response, solved for its later state, or a known first state.
+    fn add_equality(&mut self, rows: &Rows, i: usize) -> Option<()> {
+        let later = rows.row(i).filter_map(|(j, a)| match self.places[j] {
+            Place::Response(component, node) if node > 0 && a != 0.0 => {
+                Some((node, component, j, a))
+            }
+            _ => None,
+        });
+        let Some((node, component, pivot, size)) = later.max_by_key(|(node, ..)| *node) else {
+            let mut entries = rows.row(i).filter(|(_, a)| *a != 0.0);
+            let (Some((j, a)), None) = (entries.next(), entries.next()) else {
+                return None;
+            };
+            let state = self.first_state(j)?;
+            if self.fixed[state].is_some() {
+                return None;
+            }
+            self.fixed[state] = Some(rows.right()[i] / a);
+            self.fixing.push((state, i));
+            return Some(());
+        };
+        let step = (node - 1) * self.transitions.responses + component;
+        if self.equalities[step] != NONE {
+            return None;
+        }
+        let mut xi = [0.0; W];
+        for (j, a) in rows.row(i).filter(|(j, _)| *j != pivot) {
+            let is_at_once = match self.places[j] {
+                Place::Response(_, other) => other + 1 == node,
+                _ => true,
+            };
+            if !is_at_once {
+                return None;
+            }
+            self.add_entry(node - 1, j, -a / size, &mut xi)?;
+        }
+        self.equalities[step] = i;
+        self.transitions.steps[step] = xi;
+        self.offsets[step] = rows.right()[i] / size;
+        Some(())
+    }
+
+    /// The first state that is a variable.
+    fn first_state(&self, variable: usize) -> Option<usize> {
+        match self.places[variable] {
+            Place::History(f, 0) => Some(self.values[f]),
+            Place::Response(component, 0) => Some(component),
+            Place::Constant(c) => Some(self.constants + c),
+            _ => None,
+        }
+    }
+
+    /// Adds `a` times a variable in the coordinates of stage `i`; the constant that comes with it.
+    fn add_entry(&self, i: usize, variable: usize, a: f64, xi: &mut [f64; W]) -> Option<f64> {
+        match self.places[variable] {
+            Place::Constant(c) => xi[self.constants + c] += a,
+            Place::Response(component, node) if node == i => xi[component] += a,
+            Place::Response(component, node) if node == i + 1 => {
+                let step = i * self.transitions.responses + component;
+                for (xi, b) in xi.iter_mut().zip(&self.transitions.steps[step]) {
+                    *xi += a * b;
+                }
+                return Some(a * self.offsets[step]);
+            }
+            Place::Response(..) => return None,
+            Place::History(f, node) => {
+                // p_{i+d} = sum_j binomial(d, j) difference_j.
+                let (d, order) = (node.checked_sub(i)?, self.orders[f]);
+                if d > order {
+                    return None;
+                }
+                let mut binomial = 1.0;
+                for j in 0..=d {
+                    let at = if j < order { self.values[f] + j } else { X + f };
+                    xi[at] += a * binomial;
+                    binomial *= (d - j) as f64 / (j + 1) as f64;
+                }
+            }
+        }
+        Some(0.0)
+    }
+
+    /// Row `i` in the coordinates of its stage, and the constant that comes with it.
+    fn row(&self, rows: &Rows, i: usize) -> Option<(LooseRow, f64)> {
+        let stage = stage_of(rows, i, &self.places);
+        let mut xi = [0.0; W];
+        let mut constant = 0.0;
+        for (j, a) in rows.row(i) {
+            constant += self.add_entry(stage, j, a, &mut xi)?;
+        }
+        // Differences of weighted sums leave rounding where a coefficient is zero.
+        let largest = xi.iter().fold(0.0f64, |most, a| most.max(a.abs()));
+        let entries = xi.iter().enumerate();
+        let entries = entries.filter(|(_, a)| a.abs() > 4.0 * f64::EPSILON * largest);
+        let row = LooseRow {
+            stage,
+            entries: entries.map(|(j, a)| (j as u8, *a)).collect(),
+            right: 0.0,
+        };
+        Some((row, constant))
+    }
+
+    /// The residuals, the proximal terms, and what holds the differences that act on no node.
+    fn add_residuals(&mut self, sub: &Subproblem) -> Option<()> {
+        let mut loose = Vec::with_capacity(2 * sub.residuals.len());
+        for i in 0..sub.residuals.len() {
+            let (row, constant) = self.row(&sub.residuals, i)?;
+            let right = sub.residuals.right()[i] - constant;
+            loose.push(LooseRow { right, ..row });
+        }
+        let mut diagonal = |stage, column: usize, a| {
+            loose.push(LooseRow {
+                stage,
+                entries: vec![(column as u8, a)],
+                right: 0.0,
+            });
+        };
+        for (j, d) in sub.proximal.iter().enumerate().filter(|(_, d)| **d != 0.0) {
+            match self.places[j] {
+                Place::Response(component, node) => diagonal(node, component, d.sqrt()),
+                Place::History(f, node) => diagonal(node, self.values[f], d.sqrt()),
+                Place::Constant(c) => diagonal(0, self.constants + c, d.sqrt()),
+            }
+        }
+        for (f, order) in self.orders.iter().enumerate() {
+            (self.stages.saturating_sub(*order)..self.stages).for_each(|i| diagonal(i, X + f, 1.0));
+        }
+        self.residuals = StageRows::in_order(&loose, self.stages).0;
+        Some(())
+    }
+
+    fn add_constraints(&mut self, sub: &Subproblem) -> Option<()> {
+        let mut loose = Vec::with_capacity(sub.inequalities.len());
+        let mut sides = Vec::with_capacity(sub.inequalities.len());
+        for i in 0..sub.inequalities.len() {
+            let (row, constant) = self.row(&sub.inequalities, i)?;
+            let (lower, upper) = (
+                sub.inequalities.right()[i] - constant,
+                sub.upper[i] - constant,
+            );
+            if let Some(value) = self.known_value(&row) {
+                let slack = TOLERANCE * sub.inequalities.scale(i);
+                if value < lower - slack || value > upper + slack {
+                    return None;
+                }
+                continue;
+            }
+            // Also where one is not a number.
+            if !(lower < upper) {
+                return None;
+            }
+            if upper.is_finite() {
+                loose.push(LooseRow {
+                    stage: row.stage,
+                    entries: row.entries.clone(),
+                    right: upper,
+                });
+                sides.push(Side { row: i, sign: 1.0 });
+            }
+            if lower.is_finite() {
+                loose.push(LooseRow {
+                    stage: row.stage,
+                    entries: row.entries.iter().map(|(j, a)| (*j, -a)).collect(),
+                    right: -lower,
+                });
+                sides.push(Side { row: i, sign: -1.0 });
+            }
+        }
+        let (rows, order) = StageRows::in_order(&loose, self.stages);
+        self.constraints = rows;
+        self.sides = order.iter().map(|i| sides[*i as usize]).collect();
+        let scale = |side: &Side| sub.inequalities.scale(side.row);
+        self.scales = self.sides.iter().map(scale).collect();
+        Some(())
+    }
+
+    /// The value of a row that speaks of known first states alone.
+    fn known_value(&self, row: &LooseRow) -> Option<f64> {
+        let terms = row.entries.iter().map(|(column, a)| {
+            let fixed = self.fixed.get(usize::from(*column)).copied().flatten()?;
+            (row.stage == 0).then_some(a * fixed)
+        });
+        terms.sum()
+    }
+
+    /// The coordinates of all stages with the known first states, all others and the controls zero.
+    pub fn uncontrolled(&self) -> Vec<[f64; W]> {
+        let responses = self.transitions.responses;
+        let mut xi = vec![[0.0; W]; self.stages];
+        let mut x = self.fixed.map(|value| value.unwrap_or(0.0));
+        for (i, xi) in xi.iter_mut().enumerate() {
+            xi[..X].copy_from_slice(&x);
+            if i + 1 < self.stages {
+                x = self.transitions.forward(i, xi);
+                let offsets = &self.offsets[i * responses..];
+                let pairs = x[..responses].iter_mut().zip(offsets);
+                pairs.for_each(|(x, offset)| *x += offset);
+            }
+        }
+        xi
+    }
+
+    /// Number of controls.
+    pub fn controls(&self) -> usize {
+        self.orders.len()
+    }
+
+    /// The variables of the subproblem at the coordinates `xi`.
+    pub fn variables(&self, xi: &[[f64; W]]) -> Vec<f64> {
+        let each = self.places.iter().map(|place| match *place {
+            Place::History(f, node) => xi[node][self.values[f]],
+            Place::Response(component, node) => xi[node][component],
+            Place::Constant(c) => xi[0][self.constants + c],
+        });
+        each.collect()
+    }
+
+    /// Multipliers of the equalities: those with which the gradient of the Lagrangian vanishes in the responses and the known first
+    /// states, for its `gradient` without them.
+    pub fn equality_multipliers(&self, sub: &Subproblem, mut gradient: Vec<f64>) -> Vec<f64> {
+        let mut multipliers = vec![0.0; sub.equalities.len()];
+        let mut solve = |i: usize, is_pivot: &dyn Fn(usize) -> bool| {
+            let pivot = sub
+                .equalities
+                .row(i)
+                .find(|(j, a)| is_pivot(*j) && *a != 0.0);
+            let Some((j, a)) = pivot else { return };
+            multipliers[i] = -gradient[j] / a;
+            for (j, a) in sub.equalities.row(i) {
+                gradient[j] += a * multipliers[i];
+            }
+        };
+        let responses = self.transitions.responses;
+        for (step, i) in self.equalities.iter().enumerate().rev() {
+            if *i != NONE {
+                let place = Place::Response(step % responses, step / responses + 1);
+                solve(*i, &|j| self.places[j] == place);
+            }
+        }
+        for (state, i) in &self.fixing {
+            solve(*i, &|j| self.first_state(j) == Some(*state));
+        }
+        multipliers
+    }
+}
