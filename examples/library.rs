@@ -1,4 +1,4 @@
-// A fit from Rust: the model file becomes a problem, the problem a system.
+// A fit from Rust: a model file is built into a problem and fitted.
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::fit;
@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let model = build(&file, BuildMode::Fit)?;
     let start = model.problem.functions.start();
     let found = fit(&model.problem, &start, &model.settings, &mut |_| {})
-        .map_err(|breakdown| breakdown.to_string())?;
+        .map_err(|error| error.to_string())?;
     let (nodal, response) = (
         &found.best.evaluation.nodal,
         &found.best.evaluation.trajectories[0],

@@ -1,4 +1,4 @@
-//! Standard error of a constant function, and Wald's test of a constant one against a varying one.
+//! Standard error of a constant function, and Wald test of a constant against a varying function.
 
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;
@@ -6,7 +6,7 @@ use crate::record::{Channel, Loss, Weighting};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-/// Standard error of a function that is one number.
+/// Standard error of a constant function.
 pub fn standard_error(
     function: &CoefficientFunction,
     index: usize,
@@ -17,11 +17,11 @@ pub fn standard_error(
     Some(covariance[(index, index)].sqrt())
 }
 
-/// The probability that noise alone lets function `f` vary as much as it was found to, where the truth is constant: Wald's
-/// test of its values `p` in the parameters `theta`. With their `covariance` `C` and the values `e` of the constant 1,
-/// `min_a (p - a e)' C^-1 (p - a e)` has the chi-square law with one degree of freedom less than there are values; divided
-/// by that number the F law, where the noise is known by the residuals only. `None` for a function that is no constant plus
-/// something free, or constant by its basis, and under a robust loss, which leaves another covariance.
+/// p-value of the Wald test of function `f` against a constant: the probability that noise alone causes at least the variation
+/// found. With the parameters `p`, their `covariance` `C` and the parameters `e` of the constant 1, `min_a (p - a e)' C^-1 (p - a e)` has
+/// a chi-square distribution with one degree of freedom less than there are parameters; divided by that number, an F
+/// distribution where the noise is estimated from the residuals. `None` for a function whose basis contains no constant, or
+/// nothing else, and under a robust loss, which has another covariance.
 pub fn constant_probability(
     problem: &Problem,
     f: usize,

@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 /// Assessment of a fit of a simulated response.
 #[derive(Debug, Clone)]
 pub struct FitAssessment {
-    /// The optimum with half the step.
+    /// Step-size check.
     pub step_check: StepCheckOutcome,
     /// Statistics of all channels.
     pub statistics: FitStatistics,

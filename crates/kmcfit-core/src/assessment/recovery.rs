@@ -1,41 +1,41 @@
-//! A system beside the true one, and the roughness of its functions.
+//! Errors of an identified system against the true one, and roughness of its functions.
 
 use crate::functions::Ratios;
 use crate::system::{Grid, NodalCoefficients};
 use serde::Serialize;
 
-/// Largest relative error of `k/m` and `c/m` below which a system counts as the true one: well above
-/// what steppers and stopping tests leave, well below what is visible in a figure.
+/// Largest relative error of `k/m` and `c/m` of a recovered system: well above the errors of steppers and stopping tests, well
+/// below the resolution of a figure.
 pub const RECOVERED: f64 = 1e-3;
-/// Truths that differ by less than this share of their size are the same on two grids.
+/// Largest relative difference of equal true systems on two grids.
 const SAME_TRUTH: f64 = 2e-3;
 
-/// Largest distances from the truth over the nodes.
+/// Largest errors over the nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
-    /// Of the mass, kg.
+    /// Error of the mass, kg.
     pub mass: f64,
-    /// Of the damping, N s/m.
+    /// Error of the damping, N s/m.
     pub damping: f64,
-    /// Of the stiffness, N/m.
+    /// Error of the stiffness, N/m.
     pub stiffness: f64,
-    /// Of `k/m`, 1/s^2.
+    /// Error of `k/m`, 1/s^2.
     pub k_over_m: f64,
-    /// Of `c/m`, 1/s.
+    /// Error of `c/m`, 1/s.
     pub c_over_m: f64,
-    /// Of the mass, relative to the largest true mass.
+    /// Error of the mass, relative to the largest true mass.
     pub mass_relative: f64,
-    /// Of `k/m`, relative to the largest true `|k/m|`.
+    /// Error of `k/m`, relative to the largest true `|k/m|`.
     pub k_over_m_relative: f64,
-    /// Of `c/m`, relative to the largest true `|c/m|`; where that is below
-    /// [`RECOVERED`] of critical damping `2 sqrt(k/m)`, relative to the latter.
+    /// Error of `c/m`, relative to the largest true `|c/m|`; relative to critical damping `2 sqrt(k/m)` where the former is below
+    /// [`RECOVERED`] of the latter.
     pub c_over_m_relative: f64,
-    /// Whether `c_over_m_relative` is relative to critical damping.
+    /// True if `c_over_m_relative` is relative to critical damping.
     pub undamped: bool,
 }
 
 impl TruthErrors {
-    /// The distances of `system` from `truth`, on the same grid.
+    /// Errors of `nodal` against `truth`, on the same grid.
     pub fn of(nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
         let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
@@ -62,12 +62,12 @@ impl TruthErrors {
         }
     }
 
-    /// The larger of the relative errors of `k/m` and `c/m`.
+    /// Larger of the relative errors of `k/m` and `c/m`.
     pub fn worst_ratio(&self) -> f64 {
         self.k_over_m_relative.max(self.c_over_m_relative)
     }
 
-    /// Whether `k/m` and `c/m` are the true ones to a relative tolerance.
+    /// True if the relative errors of `k/m` and `c/m` are within a tolerance.
     pub fn within(&self, tolerance: f64) -> bool {
         self.k_over_m_relative < tolerance && self.c_over_m_relative < tolerance
     }
@@ -77,7 +77,7 @@ fn largest(f: &[f64]) -> f64 {
     f.iter().map(|x| x.abs()).fold(0.0, f64::max)
 }
 
-/// Largest distance; infinite where a ratio is not finite, because the mass is zero there.
+/// Largest absolute error; infinite where a ratio is not finite because the mass is zero.
 fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     let distance = |(a, b): (&f64, &f64)| {
         let distance = (a - b).abs();
@@ -90,20 +90,19 @@ fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(distance).fold(0.0, f64::max)
 }
 
-/// `integral (m'')^2 dt`, `integral (c')^2 dt`, `integral (k')^2 dt` by differences of the values at
-/// the nodes, whatever the basis.
+/// Roughness integrals of the functions by finite differences of nodal values, independent of the basis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Roughness {
-    /// `integral (m'')^2 dt`, kg^2/s^3.
+    /// Integral `integral (m'')^2 dt`, kg^2/s^3.
     pub mass: f64,
-    /// `integral (c')^2 dt`, N^2 s/m^2.
+    /// Integral `integral (c')^2 dt`, N^2 s/m^2.
     pub damping: f64,
-    /// `integral (k')^2 dt`, N^2/(m^2 s).
+    /// Integral `integral (k')^2 dt`, N^2/(m^2 s).
     pub stiffness: f64,
 }
 
 impl Roughness {
-    /// The roughness of a system on a grid with this step, s.
+    /// Roughness of nodal coefficients on a grid with this step, s.
     pub fn of(nodal: &NodalCoefficients, step: f64) -> Self {
         let slope = |f: &[f64]| -> f64 {
             let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
@@ -121,7 +120,7 @@ impl Roughness {
     }
 }
 
-/// Whether two true systems agree at the nodes of the second grid that the first covers.
+/// True if two true systems agree at the nodes of the second grid within the span of the first.
 pub fn is_same_truth(
     (one, grid): (&NodalCoefficients, &Grid),
     (other, other_grid): (&NodalCoefficients, &Grid),
@@ -139,7 +138,7 @@ pub fn is_same_truth(
         .all(|(f, g)| close(f, g))
 }
 
-/// The value between two nodes; `None` outside.
+/// Linear interpolation between nodes; `None` outside.
 fn interpolate(f: &[f64], place: f64) -> Option<f64> {
     let i = place.floor();
     if i < 0.0 || i + 1.0 >= f.len() as f64 {
@@ -161,7 +160,7 @@ mod tests {
         }
     }
 
-    /// m = t^2 on [0, 1]: (m'')^2 = 4, counted at the inner nodes.
+    /// For m = t^2 on [0, 1], (m'')^2 = 4 at the inner nodes.
     #[test]
     fn roughness_of_a_parabola() {
         let step = 1e-3;
@@ -174,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_common_factor_is_the_same_device() {
+    fn systems_with_a_common_factor_are_equal() {
         let truth = nodal(&[1.0, 0.5, 0.8], 0.1, 1.0);
         let doubled = nodal(&[2.0, 1.0, 1.6], 0.2, 2.0);
         let errors = TruthErrors::of(&doubled, &truth);
@@ -183,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
+    fn negligible_damping_is_compared_with_critical_damping() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
         let errors = TruthErrors::of(&nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
         assert!(errors.undamped);
@@ -192,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_without_mass_is_no_true_device() {
+    fn a_system_without_mass_is_not_recovered() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
         let errors = TruthErrors::of(&nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
         assert!(!errors.within(RECOVERED));

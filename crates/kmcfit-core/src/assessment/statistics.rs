@@ -13,17 +13,17 @@ pub struct FitStatistics {
     pub samples: usize,
     /// Number of parameters of functions and scalars.
     pub parameters: usize,
-    /// `J / (n - p)` for a chi-square of samples with known sigma; `None` where it has no meaning.
+    /// Reduced chi-square `J / (n - p)` of samples with known sigma; `None` where undefined.
     pub reduced_chi_square: Option<f64>,
-    /// Akaike's criterion.
+    /// Akaike information criterion.
     pub aic: Option<f64>,
-    /// The same corrected for small records.
+    /// Akaike information criterion, corrected for small samples.
     pub aicc: Option<f64>,
-    /// Schwarz's criterion.
+    /// Bayesian information criterion.
     pub bic: Option<f64>,
 }
 
-/// Statistics at the point of `evaluation`; chi-square and criteria for least squares without penalties.
+/// Statistics at the point of `evaluation`; chi-square and criteria require least squares without penalties.
 pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
     let samples = problem.sample_count();
     let parameters = problem.parameters();

@@ -1,23 +1,23 @@
-//! Which coefficient functions apply to which record.
+//! Coefficient sets of a builder: the functions shared by all records, and those of single records.
 
 use super::{BuildError, Builder, CoefficientSpec};
 use crate::functions::CoefficientKind;
 
-/// A coefficient function of a builder, and its key.
+/// A coefficient function of a builder, with its key.
 pub(super) struct FunctionEntry<'a> {
-    /// Such as `functions.mass` or `experiments[1].functions.damping`.
+    /// Key, such as `functions.mass` or `experiments[1].functions.damping`.
     pub key: String,
     pub kind: CoefficientKind,
     pub spec: &'a CoefficientSpec,
-    /// The record that has it for itself.
+    /// Index of the record with its own function; `None` for a shared one.
     pub owner: Option<usize>,
 }
 
 impl FunctionEntry<'_> {
-    /// Speed over which the sign of the velocity is smoothed, m/s: of Coulomb friction only, 0 for others.
+    /// Smoothing speed of the sign of the velocity, m/s, for Coulomb friction; 0 for other kinds.
     pub fn width(&self) -> Result<f64, BuildError> {
         let key = format!("{}.width", self.key);
-        let advice = "well below those of the motion";
+        let advice = "well below those of the response";
         match (self.kind, self.spec.width) {
             (CoefficientKind::CoulombFriction, Some(width)) if width > 0.0 && width.is_finite() => {
                 Ok(width)
@@ -42,9 +42,9 @@ impl FunctionEntry<'_> {
     }
 }
 
-/// The sets of functions that make up a system, and the set of each record.
+/// Coefficient sets, and the set of each record.
 pub(super) struct CoefficientSets {
-    /// Indices into the list of [`Builder::entries`], mass first; the shared set comes first.
+    /// Indices into the list of [`Builder::entries`], mass first; the first set is the shared one.
     pub sets: Vec<Vec<usize>>,
     pub of_record: Vec<usize>,
 }
@@ -72,7 +72,7 @@ impl Builder {
         shared.chain(own).collect()
     }
 
-    /// Which functions apply to which record.
+    /// Coefficient sets of the records.
     pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
         let entries = self.entries();
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
@@ -83,11 +83,11 @@ impl Builder {
         for (i, record) in self.records.iter().enumerate() {
             let mut set = shared.clone();
             if record.validation && !record.coefficients.is_empty() {
-                let problem = "an experiment that is held out cannot have functions of its own";
+                let problem = "a validation record cannot have functions of its own";
                 return Err(
                     BuildError::new(format!("experiments[{i}].functions"), problem)
                         .found("`functions` beside `validation: true`")
-                        .expected("the shared functions: they are what is to be tested"),
+                        .expected("the shared functions, which the validation tests"),
                 );
             }
             for (f, entry) in entries
@@ -107,7 +107,7 @@ impl Builder {
         Ok(found)
     }
 
-    /// The place of the shared function that a record replaces by one of its own.
+    /// Index of the shared function that a record replaces.
     fn shared_place(&self, entry: &FunctionEntry) -> Result<usize, BuildError> {
         let mut kinds = self.coefficients.iter().map(|(kind, _)| *kind);
         let Some(place) = kinds.position(|kind| kind == entry.kind) else {
@@ -130,7 +130,7 @@ impl Builder {
     }
 }
 
-/// Refuses records that share no estimated function, and functions that apply to no record.
+/// Error if records share no estimated function, or a function applies to no record.
 fn check_shared(entries: &[FunctionEntry], found: &CoefficientSets) -> Result<(), BuildError> {
     let users = |f: usize| {
         let uses = |set: &&usize| found.sets[**set].contains(&f);

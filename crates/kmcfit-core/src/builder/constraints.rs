@@ -1,4 +1,4 @@
-//! Constraints of a builder: rows of its statements, and a start inside them.
+//! Constraints of a builder: their rows, and the projection of the start.
 
 use super::coefficient::uncrossed;
 use super::coefficient_sets::FunctionEntry;
@@ -8,26 +8,26 @@ use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
 use crate::solvers::StartProjection;
 
-/// A statement that must hold, or whose violation is penalised.
+/// A constraint, or a soft constraint with a penalty.
 #[derive(Debug, Clone)]
 pub(super) struct ConstraintSpec {
-    /// Key that states it.
+    /// Key.
     pub key: String,
     pub statement: Constraint,
-    /// Weight of its violation in J; it must hold without.
+    /// Penalty weight of its violation in J; `None` for a constraint that must hold.
     pub soft: Option<f64>,
-    /// Index of the set of coefficient functions that it is about.
+    /// Index of the coefficient set.
     pub coefficient_set: usize,
 }
 
-/// The name of a group of rows, and the key that states it.
+/// Name of a group of rows, with the key of its constraint.
 #[derive(Debug, Clone)]
 pub(super) struct RowKey {
     name: String,
     key: String,
 }
 
-/// The constraints of the bounds of a function.
+/// Constraints from the bounds of a function.
 pub(super) fn of_bounds(entry: &FunctionEntry, coefficient_set: usize) -> Vec<ConstraintSpec> {
     let (of, key) = (entry.kind, entry.key.as_str());
     let (min, max) = (entry.spec.min.clone(), entry.spec.max.clone());
@@ -39,7 +39,7 @@ pub(super) fn of_bounds(entry: &FunctionEntry, coefficient_set: usize) -> Vec<Co
     };
     match (min, max) {
         (None, None) => Vec::new(),
-        // Both at once, so that equal ones become an equality.
+        // Both together, so that equal bounds become an equality.
         (min, max) if min == max => vec![constraint("min", min, max)],
         (min, max) => {
             let min = min.map(|min| constraint("min", Some(min), None));
@@ -81,9 +81,10 @@ impl Builder {
         added.map_err(|why| BuildError::new(key, why.to_string()))
     }
 
-    /// A notice where a constraint cannot be felt by free records. Without a force, `(m, c, k)` and `s(t) (m, c, k)` have the same
-    /// response for every positive `s(t)`. Passivity and a monotone mass or stiffness do not survive that change: unless something
-    /// else holds `s(t)`, they can be met by choosing it and say nothing about the system.
+    /// Notice for a constraint that the scaling ambiguity of free records can satisfy. Without a force, `(m, c, k)` and
+    /// `s(t) (m, c, k)` have the same response for every positive `s(t)`. Passivity and monotonicity of mass or stiffness are not
+    /// invariant under this change: unless `s(t)` is determined otherwise, a suitable `s(t)` satisfies them, and they carry no
+    /// information on the system.
     fn unfelt(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
         let what = match &constraint.statement {
             Constraint::Passive => "passivity",
@@ -111,7 +112,7 @@ impl Builder {
         (!(forced || held || smoothed || self.bounded_on_both_sides())).then_some(notice)
     }
 
-    /// Whether bounds keep the common scale from falling and from rising.
+    /// True if bounds limit the common scale from below and from above.
     fn bounded_on_both_sides(&self) -> bool {
         let positive = |limit: &&TimeHistory| match limit {
             TimeHistory::Constant(value) => *value > 0.0,
@@ -133,7 +134,7 @@ impl Builder {
 }
 
 impl ConstraintSpec {
-    /// Refuses a weight that is none, and a constraint that leaves no mass: the equation of motion divides by it.
+    /// Error for an invalid weight, and for a constraint that excludes a positive mass.
     fn check(&self) -> Result<(), BuildError> {
         if let Some(weight) = self.soft {
             let key = format!("{}.soft", self.key);
@@ -177,20 +178,20 @@ impl ConstraintSpec {
         if held > 0.0 {
             return Ok(());
         }
-        let problem = "this leaves no mass: it must be positive at all times";
+        let problem = "this excludes a positive mass: the mass must be positive at all times";
         Err(BuildError::new(&self.key, problem)
             .found(held)
             .expected("a number greater than 0"))
     }
 }
 
-/// Whether limits of a slope leave one sign to it and no size.
+/// True for limits on the sign of a slope alone.
 fn one_way(min: Option<f64>, max: Option<f64>) -> bool {
     matches!((min, max), (None, Some(0.0)) | (Some(0.0), None))
 }
 
-/// Whether a function cannot follow a change of the common scale `s(t)`: it is known and not zero, or of a basis that is not
-/// closed under it.
+/// True if a function determines the common scale `s(t)`: it is fixed and nonzero, or its basis is not closed under
+/// multiplication by `s(t)`.
 fn holds_scale(function: &CoefficientFunction) -> bool {
     match &function.basis {
         None => function.offset.iter().any(|p| *p != 0.0),
@@ -220,16 +221,16 @@ fn impossible(key: &str, why: ConstraintError) -> BuildError {
         }
         ConstraintError::Broken { name, time } => {
             BuildError::new(key, "no fit can satisfy this constraint")
-                .found(format!("`{name}` is broken at {time} s by what is given"))
+                .found(format!("fixed functions violate `{name}` at {time} s"))
                 .expected("functions with more freedom, or another constraint")
         }
     }
 }
 
-/// Moves the start of the search into the constraints; a notice unless it only was off by rounding.
+/// Projects the start onto the constraints, with a notice unless the change is a rounding error.
 ///
 /// # Errors
-/// Where the constraints contradict each other, or no start inside them was found.
+/// If the constraints contradict each other, or no feasible start is found.
 pub(super) fn move_start(
     problem: &mut Problem,
     keys: &[RowKey],
@@ -251,7 +252,7 @@ pub(super) fn move_start(
         StartProjection::Contradiction(names) => Err(contradiction(keys, &names, true)),
         StartProjection::ContradictionAmong(names) => Err(contradiction(keys, &names, false)),
         StartProjection::Unsolved(status) => {
-            let problem = "no start inside the constraints was found";
+            let problem = "no feasible start was found";
             Err(BuildError::new("constraints", problem)
                 .found(status.sentence())
                 .expected("constraints of moderate sizes that some functions satisfy"))
@@ -273,8 +274,8 @@ fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError
         1 => BuildError::new("constraints", "this constraint contradicts itself"),
         _ => BuildError::new("constraints", "these constraints contradict each other").hint(
             match minimal {
-                true => "leaving out any one of them resolves it",
-                false => "some of them may have no part in it",
+                true => "removing any one of them resolves it",
+                false => "some of them may not take part in the contradiction",
             },
         ),
     };
@@ -290,7 +291,7 @@ fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError
     }
 }
 
-/// Names in a row: `a`, `a and b`, `a, b and c`.
+/// Enumeration of names: `a`, `a and b`, `a, b and c`.
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     match names.split_last() {

@@ -1,4 +1,4 @@
-//! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and the start of the search.
+//! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and start.
 
 use super::coefficient_sets::CoefficientSets;
 use super::constraints::of_bounds;
@@ -10,14 +10,14 @@ use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
 use crate::system::{Grid, System, Term};
 
-/// Most nodes: more would be asked for by mistake, and end in a lack of memory.
+/// Largest number of nodes, a safeguard against mistyped numbers.
 const MOST_NODES: usize = 100_000_000;
 
 impl Builder {
-    /// The problem as it is specified, its start where it is given, with everything that belongs to it.
+    /// Lowers the specification to a problem, with the start as given, before its projection onto the constraints.
     ///
     /// # Errors
-    /// At the first part that cannot be used.
+    /// The first invalid part.
     pub fn lower(&self) -> Result<Built, BuildError> {
         let coefficient_sets = self.coefficient_sets()?;
         self.check_records()?;
@@ -76,10 +76,10 @@ impl Builder {
         })
     }
 
-    /// Refuses records that cannot be used, two of one name, and records that start at different times.
+    /// Error for invalid records, duplicate names, and records that start at different times.
     fn check_records(&self) -> Result<(), BuildError> {
         if !self.records.is_empty() && self.records.iter().all(|r| r.validation) {
-            let problem = "every experiment is held out of the fit";
+            let problem = "all experiments are validation records";
             return Err(BuildError::new("experiments", problem)
                 .found("`validation: true` in all of them")
                 .expected("at least one experiment without"));
@@ -102,12 +102,12 @@ impl Builder {
         let slack = 1e-6 * self.records[first].spacing();
         match spans.find(|(_, other)| (other - start).abs() > slack) {
             Some((i, other)) => {
-                let problem = "this record begins at another time than the first one";
+                let problem = "this record starts at another time than the first one";
                 Err(BuildError::new(format!("experiments[{i}]"), problem)
                     .found(format!("{other} s"))
                     .expected(format!("{start} s, as the functions are shared"))
                     .hint(format!(
-                        "`time_zero: {}` counts its times from its beginning",
+                        "`time_zero: {}` sets the start of a record to time 0",
                         other - start
                     )))
             }
@@ -115,7 +115,7 @@ impl Builder {
         }
     }
 
-    /// A grid over the span of the records.
+    /// Grid over the span of the records.
     fn grid_of_records(&self) -> Result<Grid, BuildError> {
         let spans = self.records.iter().filter_map(Record::span);
         let Some([start, end]) = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
@@ -147,7 +147,7 @@ impl Builder {
         })
     }
 
-    /// The times of all samples, where they are the same and equally spaced.
+    /// Times of all samples, if equal for all channels and equally spaced.
     fn common_times(&self) -> Option<&[f64]> {
         let mut times = self.records.iter().map(Record::common_times);
         let first = times.next()??;
@@ -155,7 +155,7 @@ impl Builder {
         (same && even_spacing(first).is_some()).then_some(first)
     }
 
-    /// The force terms of the system.
+    /// Force terms of the system.
     fn terms(&self) -> Result<Vec<Term>, BuildError> {
         let mut terms = Vec::new();
         for entry in self.entries().iter().filter(|entry| entry.owner.is_none()) {
@@ -164,7 +164,7 @@ impl Builder {
         Ok(terms)
     }
 
-    /// The functions on the grid.
+    /// Functions on the grid.
     fn parameterization(
         &self,
         grid: &Grid,
@@ -183,13 +183,13 @@ impl Builder {
         let sets = coefficient_sets.sets.clone();
         Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step()).ok_or_else(
             || {
-                let problem = "a basis has functions that the grid cannot tell apart";
+                let problem = "the functions of a basis are linearly dependent on the grid";
                 BuildError::new("functions", problem)
             },
         )
     }
 
-    /// The states of the records as the samples give them, for the equation error.
+    /// States estimated from the samples, for the equation error.
     fn measurements(
         &self,
         problem: &Problem,
@@ -206,7 +206,8 @@ impl Builder {
                 .filter(|(_, r)| !r.validation);
             let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
             let key = format!("experiments[{}]", place.unwrap_or_default());
-            let problem = "the method `equation-error` cannot tell the motion from these samples";
+            let problem =
+                "the method `equation-error` cannot derive the response from these samples";
             BuildError::new(key, problem)
                 .found(unsuited.reason.to_string())
                 .expected("samples from which displacement, velocity and acceleration follow")
@@ -216,7 +217,7 @@ impl Builder {
         Ok(Some(measurements))
     }
 
-    /// Initial states that are estimated without a start or a prior start where the samples do.
+    /// Sets initial states without a start or prior to those estimated from the samples.
     fn start_at_samples(&self, problem: &mut Problem) {
         if problem
             .experiments

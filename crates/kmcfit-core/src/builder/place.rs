@@ -1,4 +1,4 @@
-//! Records on the grid: experiments of the problem, with the scalars that they estimate.
+//! Experiments of a problem: records on the grid, with their scalar parameters.
 
 use super::BuildError;
 use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
@@ -8,21 +8,21 @@ use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, 
 use crate::signal::{even_spacing, median_spacing};
 use crate::system::{Grid, InputSample, State, TimePoint};
 
-/// One record to be put on a grid.
+/// A record to be placed on a grid.
 pub(super) struct Placement<'a> {
-    /// Its key.
+    /// Key.
     pub key: String,
     pub record: &'a Record,
     pub grid: &'a Grid,
-    /// Index of its set of coefficient functions.
+    /// Index of the coefficient set.
     pub coefficient_set: usize,
-    /// Whether the fit compares the equation of motion, and no response, with the samples.
+    /// True if the fit minimises the equation error.
     pub is_equation_error: bool,
-    /// Whether the channels are left out of the experiment.
+    /// True to omit the channels, for a simulation.
     pub simulation: bool,
 }
 
-/// A scalar in the making.
+/// A scalar to be created.
 struct PendingScalar<'a> {
     key: String,
     name: String,
@@ -32,7 +32,7 @@ struct PendingScalar<'a> {
 }
 
 impl PendingScalar<'_> {
-    /// Its value: known, or one more of `scalars`.
+    /// Known value, or a new parameter added to `scalars`.
     fn value(
         self,
         spec: ScalarSpec,
@@ -62,7 +62,7 @@ impl PendingScalar<'_> {
 }
 
 impl Placement<'_> {
-    /// The experiment; numbers that it estimates are added to `scalars`.
+    /// Creates the experiment; its estimated parameters are added to `scalars`.
     pub fn experiment(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
         let record = self.record;
         let input = record.inputs(&self.key)?;
@@ -87,13 +87,13 @@ impl Placement<'_> {
         Ok(experiment)
     }
 
-    /// The initial state, and which scalars it is where it is estimated.
+    /// Initial state, and the scalar parameters of its estimated components.
     fn initial(
         &self,
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<(State, [Option<usize>; 2]), BuildError> {
         let channels = &self.record.channels;
-        // The channel nearest to a displacement tells the sizes.
+        // The channel nearest to a displacement gives the sizes.
         let nearest = channels.iter().min_by_key(|c| c.kind);
         let sizes = nearest.map_or([1.0; 2], |c| {
             state_scales(c.kind, &c.values, median_spacing(&c.times))
@@ -135,7 +135,7 @@ impl Placement<'_> {
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Channel, BuildError> {
         let (grid, times) = (self.grid, &spec.times);
-        // The paper's integral where the times are equally spaced.
+        // The paper's integral for equally spaced times.
         let weighting = match (&spec.weighting, even_spacing(times)) {
             (Some(weighting), _) => weighting.clone(),
             (None, Some(spacing)) => Weighting::Integral { spacing },
@@ -172,7 +172,7 @@ impl Placement<'_> {
         Ok(channel)
     }
 
-    /// The motion of the base at the times of a sensor of absolute motion.
+    /// Motion of the base at the times of a sensor that measures absolute motion.
     fn base_motion(
         &self,
         spec: &ChannelSpec,
@@ -181,7 +181,7 @@ impl Placement<'_> {
         let (kind, asked) = (spec.kind, spec.sensor.absolute);
         let key = format!("{}.sensors.{}.absolute", self.key, kind.name());
         if input.base.is_none() {
-            let problem = "the base does not move, so there is only one motion to measure";
+            let problem = "the base is at rest, so relative and absolute motion are equal";
             return match asked {
                 None => Ok(None),
                 Some(_) => Err(BuildError::new(key, problem)
@@ -237,13 +237,13 @@ impl Placement<'_> {
             drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
         };
         if sensor.gain == ScalarValue::Known(0.0) {
-            let problem = "a sensor with gain 0 sees nothing";
+            let problem = "a sensor with gain 0 measures nothing";
             return Err(BuildError::new(format!("{key}.gain"), problem)
                 .found("0")
                 .expected("another number, or `estimate`"));
         }
         if self.is_equation_error && sensor.indices().iter().any(Option::is_some) {
-            let problem = "the method `equation-error` needs sensors that are known";
+            let problem = "the method `equation-error` needs sensors with known parameters";
             return Err(BuildError::new(key, problem)
                 .found("`estimate`")
                 .expected("numbers, or another method"));
@@ -252,7 +252,7 @@ impl Placement<'_> {
     }
 }
 
-/// The nodes that a response needs to reach `end`.
+/// Number of nodes of a response until `end`.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
     let steps = (steps - TimePoint::SAME_TIME).ceil().max(0.0);

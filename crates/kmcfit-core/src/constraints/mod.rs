@@ -1,6 +1,6 @@
 //! Constraints: named linear rows and second-order cones on the parameters of all functions.
 //!
-//! What is demanded of the functions is a [`Constraint`]; [`Constraint::build`] turns it into rows.
+//! A [`Constraint`] is a condition on coefficient functions; [`Constraint::build`] computes its rows.
 
 mod build;
 mod set;

@@ -1,9 +1,9 @@
-//! The test of whiteness in a sentence.
+//! Sentences of the whiteness test.
 
 use super::{FEWEST_READINGS, UntestedReason, Whiteness, WhitenessResult};
 use std::fmt;
 
-/// A probability below this is printed as a bound.
+/// Probability below which a bound is printed.
 const SMALLEST_PRINTED: f64 = 1e-6;
 
 impl fmt::Display for Whiteness {
@@ -20,7 +20,7 @@ impl fmt::Display for Whiteness {
         write!(
             f,
             "the residuals are not white: correlated {over} ({p}): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         )
     }
 }
@@ -34,7 +34,7 @@ impl fmt::Display for UntestedReason {
             UntestedReason::FewLags => {
                 write!(f, "there are too few lags for the parameters of the noise")
             }
-            UntestedReason::NoResiduals => write!(f, "the model goes through every sample"),
+            UntestedReason::NoResiduals => write!(f, "the model equals every sample"),
         }
     }
 }
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn in_words() {
+    fn outcomes_are_sentences() {
         let white = Whiteness {
             statistic: 10.2,
             degrees_of_freedom: 10,
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(
             test(&sine).to_string(),
             "the residuals are not white: correlated over 0.3 s (p < 1e-6): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         );
         let at = Whiteness {
             p_value: 0.012,
@@ -97,12 +97,12 @@ mod tests {
         assert_eq!(
             at.to_string(),
             "the residuals are not white: correlated at a distance of 1.5 s (p = 0.012): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         );
     }
 
     #[test]
-    fn what_is_not_tested() {
+    fn omitted_tests_state_their_reason() {
         let say = |values: &[f64]| test(values).to_string();
         assert_eq!(
             say(&[1.0; 19]),
@@ -110,7 +110,7 @@ mod tests {
         );
         assert_eq!(
             say(&[0.0; 40]),
-            "the residuals were not tested: the model goes through every sample"
+            "the residuals were not tested: the model equals every sample"
         );
     }
 

@@ -1,10 +1,9 @@
-//! Penalties on the total variation of a function.
+//! Total-variation penalties.
 
 use crate::rows::Rows;
 
-/// `weight * sum_i |(D theta_j)_i|` for one function `j`, where the rows of `D` are the changes from
-/// one knot, cell or node to the next: the total variation of the function. Unlike squared
-/// smoothness it does not charge a jump more than a slow change of the same height.
+/// Penalty `weight * sum_i |(D theta_j)_i|` on one function `j`; the rows of `D` are the changes between neighbouring knots,
+/// cells or nodes. Unlike a Tikhonov penalty it is equal for a jump and a slow change of the same height.
 #[derive(Debug, Clone)]
 pub struct TotalVariation {
     /// Index of the function, mass 0.
@@ -16,12 +15,12 @@ pub struct TotalVariation {
 }
 
 impl TotalVariation {
-    /// The changes `D theta`.
+    /// Changes `D theta`.
     pub fn changes(&self, theta: &[f64]) -> Vec<f64> {
         self.rows.multiply(theta)
     }
 
-    /// `sum_i |(D theta)_i|`, without the weight.
+    /// Total variation `sum_i |(D theta)_i|`, without the weight.
     pub fn total(&self, theta: &[f64]) -> f64 {
         self.changes(theta).iter().map(|c| c.abs()).sum()
     }

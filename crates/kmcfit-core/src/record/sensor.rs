@@ -1,20 +1,20 @@
-//! Sensors: gain, offset and drift between a response and its samples.
+//! Sensors: gain, offset and drift.
 
 use crate::functions::ScalarValue;
 
-/// Sample `= gain * response + offset + drift * time`.
+/// Sensor model `sample = gain * response + offset + drift * time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
-    /// Factor, without unit.
+    /// Gain, dimensionless.
     pub gain: ScalarValue,
-    /// Sample at rest, in the unit of the channel.
+    /// Offset, in the unit of the channel.
     pub offset: ScalarValue,
-    /// Change of the offset, in the unit of the channel per s.
+    /// Drift, in the unit of the channel per s.
     pub drift: ScalarValue,
 }
 
 impl Default for Sensor {
-    /// A perfect sensor.
+    /// An ideal sensor.
     fn default() -> Self {
         Self {
             gain: ScalarValue::Known(1.0),
@@ -34,13 +34,13 @@ impl Sensor {
         self.list().map(|value| value.of(scalars))
     }
 
-    /// Their changes along a change of the scalars.
+    /// Changes of gain, offset and drift along a change of the scalars.
     pub fn changes(self, scalars: &[f64]) -> [f64; 3] {
         self.indices()
             .map(|index| index.map_or(0.0, |i| scalars[i]))
     }
 
-    /// Which scalars they are, where they are estimated.
+    /// Indices of the estimated scalars.
     pub fn indices(self) -> [Option<usize>; 3] {
         self.list().map(ScalarValue::index)
     }

@@ -1,6 +1,6 @@
 //! Weights of residuals.
 
-/// How the residuals of a channel are weighed.
+/// Weights of the residuals of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Weighting {
     /// `J = integral r^2 dt` by the trapezoid rule over equally spaced samples (Eq. 1), in m^2 s.
@@ -8,30 +8,30 @@ pub enum Weighting {
         /// Spacing of the samples, s.
         spacing: f64,
     },
-    /// The same over samples at any times: the weight of each, s.
+    /// The same integral over samples at arbitrary times.
     Trapezoid(
         /// One weight per sample, s.
         Vec<f64>,
     ),
-    /// `J = sum (r / sigma)^2`: chi-square, without a factor 1/2 and without `dt`.
+    /// Chi-square `J = sum (r / sigma)^2`, without a factor 1/2 and without `dt`.
     Sigma(
         /// Standard deviation of a sample, in the unit of the channel.
         f64,
     ),
-    /// The same with a standard deviation that is estimated: its present value.
+    /// Chi-square with an estimated standard deviation, at its present value.
     Estimated {
-        /// In the unit of the channel.
+        /// Standard deviation, in the unit of the channel.
         sigma: f64,
     },
-    /// The same with a standard deviation for each sample.
+    /// Chi-square with a standard deviation for each sample.
     Sigmas(
-        /// One per sample.
+        /// One standard deviation per sample.
         Vec<f64>,
     ),
 }
 
 impl Weighting {
-    /// Whether samples have a standard deviation, so that J is a chi-square.
+    /// True if samples have a standard deviation, so that J is a chi-square.
     pub fn is_sigma(&self) -> bool {
         !matches!(self, Self::Integral { .. } | Self::Trapezoid(_))
     }

@@ -1,15 +1,15 @@
-//! Samples at the end of a sensor's range.
+//! Detection of clipped samples.
 
-/// Fewest samples at an end, and fewest in a row somewhere.
+/// Smallest number of samples at the limit, and of consecutive ones.
 const FEWEST: usize = 8;
 const ROW: usize = 3;
-/// The end holds so many times the samples of the next level inwards: a sine of coarse resolution reaches 2.4.
+/// Ratio of the samples at the limit to those at the next level inwards; a coarsely quantised sine has up to 2.4.
 const PILED_UP: usize = 5;
-/// More than this share at one end is no response that was cut, but a sensor at rest or a switch.
+/// Largest share of samples at one limit; a larger share belongs to a sensor at rest or a switch.
 const AT_MOST: f64 = 0.5;
 
-/// The number of samples that lie exactly at the largest or smallest value, and that value, if they pile up there as
-/// those of a response do that goes beyond the range of the sensor; of both ends that with more of them.
+/// Number of samples exactly at the largest or smallest value, and that value, if they accumulate there as those of a response
+/// beyond the range of the sensor; for both limits, the one with more samples. `None` without clipping.
 ///
 /// ```
 /// use kmcfit_core::internals::signal::clipped;

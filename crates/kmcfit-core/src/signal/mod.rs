@@ -1,5 +1,4 @@
-//! Signals over time, without knowledge of the system: values between samples, shapes of
-//! excitation, filters, spectra.
+//! Signals over time: interpolation, excitation shapes, filters, decimation, spectra, and checks of samples.
 //!
 //! ```
 //! use kmcfit_core::{Interpolation, Signal};

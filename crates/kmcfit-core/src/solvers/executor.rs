@@ -1,4 +1,4 @@
-//! The loop around every solver, run by argmin's executor.
+//! Loop of a search: initialisation, iterations, stopping tests and checkpoints, run by argmin's executor.
 
 use super::checkpoint::{ExactF64s, MethodState, Observer, SolverState};
 use super::evaluator::CountedEvaluator;
@@ -20,15 +20,14 @@ use argmin::core::{Error, Executor, IterState, KV, TerminationReason, Terminatio
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
-/// search goes on from there. `reference` is what the
-/// ratios of cost and gradient are taken to, by default the start itself.
+/// Runs one solver from `start`, reporting to `watch`. If `watch` holds a checkpoint of this search, the search continues
+/// from it. Ratios of cost and gradient refer to `reference`, by default the start.
 ///
-/// Every method accepts only points of lower cost, so the last point is the best one. The equation
-/// error is no search: it is minimised at once.
+/// Every method accepts only points of lower cost, so the last point is the best one. The equation error is not a search;
+/// it is minimised directly.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself cannot be evaluated.
+/// A [`SimulationError`] if the simulation at the start fails.
 pub(super) fn search(
     problem: &Problem,
     start: &[f64],
@@ -44,17 +43,17 @@ pub(super) fn search(
     search_prepared(problem, prepared, settings, reference, watch)
 }
 
-/// Where a search starts.
+/// Starting point of a search.
 pub(super) struct Prepared {
     /// The parameters.
     pub parameters: Vec<f64>,
-    /// Their evaluation, if there is one already.
+    /// Evaluation, if already computed.
     pub evaluation: Option<Evaluation>,
-    /// Storage for the first trial, if there is some.
+    /// Storage for the first trial, if available.
     pub spare: Option<Evaluation>,
 }
 
-/// [`search`] from a start that is `prepared`.
+/// [`search`] from a prepared starting point.
 pub(super) fn search_prepared(
     problem: &Problem,
     prepared: Prepared,
@@ -69,7 +68,7 @@ pub(super) fn search_prepared(
             watch.observe(),
         ));
     }
-    // A part of a record has not a sample at every node of the grid.
+    // Samples of a part of a record do not cover all nodes of the grid.
     let mut settings = settings.clone();
     if !problem.supports_continuous() {
         settings.gradient = GradientKind::Discrete;
@@ -104,11 +103,11 @@ pub(super) fn search_prepared(
     result.solver.finish(counts)
 }
 
-/// One search from `start` alone, without the other starting points of [`fit`](super::fit()): for fits whose start is
-/// near an optimum, or whose start is the question.
+/// One search from `start`, without the other starting points of [`fit`](super::fit()): for a start near a minimum, and for
+/// multistart analyses.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself has no response.
+/// A [`SimulationError`] if the simulation at the start fails.
 pub fn fit_from(
     problem: &Problem,
     start: &[f64],
@@ -118,7 +117,7 @@ pub fn fit_from(
     Ok(measured(problem, fit, settings))
 }
 
-/// [`search`] by itself, without an observer.
+/// [`search`] without an observer.
 pub(super) fn search_unobserved(
     problem: &Problem,
     start: &[f64],
@@ -128,27 +127,27 @@ pub(super) fn search_unobserved(
     search(problem, start, settings, None, &mut Observer::new(nothing))
 }
 
-/// One method at work, seen by argmin as a solver.
+/// A method in the form of an argmin solver.
 struct SearchDriver<'a, 'w> {
     method: Box<dyn StepRule>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
-    /// The evaluation at the start, if there is one already.
+    /// Evaluation at the start, if already computed.
     at_start: Option<Evaluation>,
     clock: Instant,
     timings: Timings,
-    /// `None` before argmin calls `init`, and where the start has no response.
+    /// `None` before initialisation, and where the simulation at the start fails.
     progress: Option<SearchProgress>,
-    /// Why the start has no response.
+    /// Error of the simulation at the start.
     trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
-    /// What was kept of this search when it ran before.
+    /// Saved history and state of this search.
     kept: Option<(Vec<IterationRecord>, SolverState)>,
     before: PriorWork,
     watch: &'a mut Observer<'w>,
 }
 
-/// What a search did before it was ended from outside.
+/// Work of a search before it was interrupted.
 #[derive(Default)]
 struct PriorWork {
     counts: SolveCounts,
@@ -161,7 +160,7 @@ struct SearchProgress {
     recorder: Recorder,
 }
 
-/// argmin's view of the search: parameters and cost; the rest lives in [`SearchDriver`].
+/// State passed to argmin: parameters and cost; the remaining state is in [`SearchDriver`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 impl SearchDriver<'_, '_> {
@@ -185,13 +184,12 @@ impl SearchDriver<'_, '_> {
         })
     }
 
-    /// The search where it stood when it was ended from outside, if that was kept and comes out with
-    /// the same bits.
+    /// The search continued from its saved state; `None` if none is saved or it cannot be reproduced bit by bit.
     fn restored(&mut self, work: &CountedEvaluator) -> Option<SearchProgress> {
         let (rows, standing) = self.kept.take()?;
         let progress = self.stand_again(work, rows, standing);
         if progress.is_none() {
-            // The search begins anew, with nothing of a state that does not fit the problem.
+            // A saved state that does not fit the problem is not used in part.
             self.method = step_rule(self.settings.solver);
             self.watch.refuse();
         }
@@ -233,7 +231,7 @@ impl SearchDriver<'_, '_> {
         Some(SearchProgress { point, recorder })
     }
 
-    /// Keeps where the search stands: when it is time to, and before it ends by an interrupt.
+    /// Saves the state of the search when due, and before an interrupt ends it.
     fn keep(&mut self, counts: SolveCounts) {
         let interrupted = |o: &Outcome| o.status == Status::Interrupted;
         let now = match &self.outcome {
@@ -319,7 +317,7 @@ impl SearchDriver<'_, '_> {
         }
     }
 
-    /// The outcome of a search that is over before its first iteration.
+    /// Outcome of a search that ends before its first iteration.
     fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
         let cost = self.progress.as_ref()?.point.evaluation.cost;
         let converged = |reason| Some(Outcome::new(Status::Converged, reason));
@@ -327,12 +325,12 @@ impl SearchDriver<'_, '_> {
             return converged(Reason::NoParameters);
         }
         if cost == 0.0 {
-            // Beside an infinite sigma, which is what squares beyond 1e308 come to, every residual is zero.
+            // With an infinite sigma, the result of squares beyond 1e308, every residual is zero.
             let infinite = |c: &Channel| c.weighting().sigma(0).is_some_and(|s| !s.is_finite());
             if problem.is_some_and(|p| p.channels().any(infinite)) {
                 return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
-            // Squares of samples below 1e-154 are zero.
+            // Squares of samples below 1e-154 underflow.
             return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
                 true => converged(Reason::ZeroReadings),
                 false => converged(Reason::ExactStart),
@@ -354,7 +352,7 @@ impl SearchDriver<'_, '_> {
     fn finish(mut self, counts: SolveCounts) -> Result<Fit, SimulationError> {
         match &self.outcome {
             _ if self.progress.is_none() => self.watch.nothing(),
-            // It goes on from where it was kept to stand.
+            // Saved, so that the search can continue from here.
             Some(outcome) if outcome.status == Status::Interrupted => {}
             outcome => self.stand(counts, outcome.clone()),
         }

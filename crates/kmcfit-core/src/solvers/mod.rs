@@ -1,7 +1,7 @@
-//! Fits: methods, each a direction and a step rule, their common loop, starting points, and what is built on fits.
+//! Fits: methods, each a search direction and a step rule, their common loop, starting points, and analyses based on fits.
 //!
-//! Imports run one way: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations; methods;
-//! executor (the loop); starts; start strategy; and on that noise estimation, weight path and validation.
+//! Order of imports: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations;
+//! methods; executor (the loop); starts; start strategy; noise estimation, weight path and validation.
 
 mod active_set;
 mod checkpoint;
@@ -56,10 +56,10 @@ use crate::problem::Problem;
 use crate::simulate::SimulationError;
 
 impl Problem {
-    /// Fits from the problem's start with the usual settings.
+    /// Fits from the problem's start with default settings.
     ///
     /// # Errors
-    /// A [`SimulationError`] if the start itself has no response.
+    /// A [`SimulationError`] if the simulation at the start fails.
     pub fn fit(&self) -> Result<Fit, SimulationError> {
         self.fit_with(&FitSettings::default())
     }

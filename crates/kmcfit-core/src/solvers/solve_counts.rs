@@ -1,10 +1,9 @@
-//! SolveCounts of the work of a fit.
+//! Numbers of solves of a fit.
 
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
-/// How often the equations were solved; one count is one pass over all experiments, or over the part of them that a
-/// start is estimated in.
+/// Numbers of solves; one count is one pass over all experiments, or over the part of them used for a starting point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SolveCounts {
     /// Forward solves.

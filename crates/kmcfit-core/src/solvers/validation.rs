@@ -1,4 +1,4 @@
-//! Experiments that took no part in the fit.
+//! Prediction of validation records, which take no part in the fit.
 
 use super::executor::search_unobserved;
 use super::settings::{FitSettings, Solver};
@@ -9,12 +9,11 @@ use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::simulate::SimulationError;
 
-/// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
-/// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own samples.
-/// Returns the problem of that experiment alone and the point found.
+/// Predicts `experiment` with the functions of `evaluation`. Its initial state and sensor parameters, if unknown, are
+/// estimated from its own samples (`scalars`). Returns the problem of that experiment alone and the evaluated point.
 ///
 /// # Errors
-/// A [`SimulationError`] if there is no response.
+/// A [`SimulationError`] if the simulation fails.
 pub fn predict_validation(
     problem: &Problem,
     evaluation: &Evaluation,

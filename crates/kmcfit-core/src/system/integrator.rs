@@ -1,11 +1,11 @@
-//! Explicit Runge–Kutta tableaux whose stages sit on nodes or half-way between them.
+//! Explicit Runge–Kutta methods whose stages are at nodes or half-way between them.
 
-/// Which explicit Runge–Kutta method steps the response.
+/// Explicit Runge–Kutta method of the forward solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// Explicit midpoint rule, order 2: the paper's.
+    /// Explicit midpoint rule, second order: that of the paper.
     Midpoint,
-    /// Classical Runge–Kutta method, order 4.
+    /// Classical Runge–Kutta method, fourth order.
     Rk4,
 }
 
@@ -18,7 +18,7 @@ impl Method {
         }
     }
 
-    /// Order of the error in the step.
+    /// Order of accuracy.
     pub fn order(self) -> u32 {
         match self {
             Method::Midpoint => 2,
@@ -27,7 +27,7 @@ impl Method {
     }
 }
 
-/// Where in a step a stage sits. Coefficients there: a node's value, or the mean of two.
+/// Position of a stage in a step; coefficients there are a nodal value, or the mean of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StagePosition {
     Left,
@@ -36,7 +36,7 @@ pub(crate) enum StagePosition {
 }
 
 impl StagePosition {
-    /// The piecewise linear function `f` at this position of step `i`.
+    /// Value of the piecewise linear function `f` at this position of step `i`.
     #[inline(always)]
     pub fn of(self, f: &[f64], i: usize) -> f64 {
         match self {
@@ -46,7 +46,7 @@ impl StagePosition {
         }
     }
 
-    /// How much of a node's value, at either end of a step, is seen at this position.
+    /// Weight of the value at the node `node`, an end of the step, at this position.
     #[inline(always)]
     pub fn share(self, node: StagePosition) -> f64 {
         match (self, node) {
@@ -56,7 +56,7 @@ impl StagePosition {
         }
     }
 
-    /// Transpose of [`StagePosition::of`]: adds `value` to the nodes that the position reads.
+    /// Transpose of [`StagePosition::of`]: adds `value` to the nodes of the position.
     #[inline(always)]
     pub fn spread(self, f: &mut [f64], i: usize, value: f64) {
         match self {

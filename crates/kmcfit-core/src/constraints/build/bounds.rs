@@ -1,4 +1,4 @@
-//! Smallest and largest values.
+//! Bounds of function values.
 
 use super::linear_form::group;
 use super::sampling::{nodal, value};

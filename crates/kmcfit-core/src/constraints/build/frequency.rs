@@ -1,4 +1,4 @@
-//! Natural frequencies in a band.
+//! Bounds of the natural frequency.
 
 use super::linear_form::group;
 use super::sampling::value;

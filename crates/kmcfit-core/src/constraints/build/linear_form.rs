@@ -1,15 +1,15 @@
-//! Affine forms of the parameters, and groups of them.
+//! Affine forms of the parameters, and groups of rows built from them.
 
 use super::ConstraintError;
 use crate::constraints::{RowGroup, TOLERANCE};
 use std::collections::HashMap;
 
-/// `sum entries theta + constant` about a span of time.
+/// Affine form `sum entries theta + constant`, valid on an interval of time.
 #[derive(Debug, Clone)]
 pub(super) struct LinearForm {
     pub entries: Vec<(usize, f64)>,
     pub constant: f64,
-    /// The time at which limits that change with time are read, s.
+    /// Time at which time-dependent bounds are evaluated, s.
     pub time: f64,
     pub span: [f64; 2],
 }
@@ -28,15 +28,15 @@ impl LinearForm {
     }
 }
 
-/// A row in the making: its bounds are those of all forms that are the same.
+/// A row to be created, with the tightest bounds of all equal forms.
 struct PendingRow {
     entries: Vec<(usize, f64)>,
     limits: [f64; 2],
     span: [f64; 2],
 }
 
-/// The group of `lower <= form <= upper` with bounds that may depend on the time. Forms without
-/// parameters are checked and left out; forms that are the same become one row.
+/// Group of rows `lower <= form <= upper` with bounds that may depend on time. Forms without parameters are checked and
+/// omitted; equal forms become one row.
 pub(super) fn group(
     name: impl Into<String>,
     forms: &[LinearForm],
@@ -82,7 +82,7 @@ pub(super) fn group(
             span,
         } = row;
         if limits[0] > limits[1] {
-            // Two samples of one equality differ by rounding, or they contradict each other.
+            // Two rows of one equality differ by rounding, or contradict each other.
             if limits[0] - limits[1] > TOLERANCE * finite(limits) {
                 return Err(broken(span[0]));
             }
@@ -98,7 +98,7 @@ fn finite(limits: [f64; 2]) -> f64 {
     sizes.fold(0.0, f64::max)
 }
 
-/// Entries by rising column, added up, without zeros.
+/// Entries sorted by column, with equal columns added and zeros removed.
 fn merged(entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
     let mut sorted = entries.to_vec();
     sorted.sort_by_key(|(j, _)| *j);

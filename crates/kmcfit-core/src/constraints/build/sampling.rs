@@ -1,4 +1,4 @@
-//! At which times a statement has to hold so that it holds everywhere, and the forms there.
+//! Times at which a constraint is imposed so that it holds at all times, and the affine forms at these times.
 
 use super::All;
 use super::linear_form::LinearForm;
@@ -6,9 +6,9 @@ use crate::functions::Basis;
 use crate::rows::Rows;
 use crate::system::Grid;
 
-/// Times nearer than this, relative to the record, are one: the same that the bases take for one.
+/// Largest distance of equal times, relative to the record; the same as in the bases.
 const SAME_TIME: f64 = 1e-12;
-/// Values this near to a line, relative to their size, are a line.
+/// Largest deviation of collinear values, relative to their size.
 const STRAIGHT: f64 = 1e-13;
 
 /// `factor * d^derivative p / dt^derivative` of one function.
@@ -19,7 +19,7 @@ pub(super) struct DerivativeTerm {
     pub factor: f64,
 }
 
-/// The value of a function.
+/// Value of a function.
 pub(super) fn value(function: usize, factor: f64) -> DerivativeTerm {
     DerivativeTerm {
         function,
@@ -28,7 +28,7 @@ pub(super) fn value(function: usize, factor: f64) -> DerivativeTerm {
     }
 }
 
-/// The slope of a function.
+/// Slope of a function.
 pub(super) fn slope(function: usize, factor: f64) -> DerivativeTerm {
     DerivativeTerm {
         function,
@@ -37,15 +37,15 @@ pub(super) fn slope(function: usize, factor: f64) -> DerivativeTerm {
     }
 }
 
-/// Where a derivative of a function is linear.
+/// Intervals on which a derivative of a function is linear.
 enum Pieces {
-    /// Between these times; it may jump at them.
+    /// Between these times, at which it may jump.
     Linear { times: Vec<f64>, jumps: bool },
-    /// Nowhere: it is looked at at every node.
+    /// None: the derivative is constrained at every node.
     Smooth,
 }
 
-/// One end of a piece: where continuous parts are read, and where those that jump are.
+/// One end of an interval: times for the evaluation of continuous parts and of parts that jump.
 #[derive(Debug, Clone, Copy)]
 struct FormSample {
     time: f64,
@@ -79,7 +79,7 @@ impl All<'_> {
         }
     }
 
-    /// The times between which nodal values are on a line: the ends, or all nodes.
+    /// Times between which nodal values are collinear: the ends, or all nodes.
     pub fn breaks(&self, nodal: &[f64]) -> Vec<f64> {
         let last = nodal.len() - 1;
         let size = nodal.iter().fold(0.0f64, |most, p| most.max(p.abs()));
@@ -94,8 +94,7 @@ impl All<'_> {
         }
     }
 
-    /// The sum of `parts` at the ends of all pieces, where it must be tested to be known everywhere;
-    /// `also` are further times at which what it is compared with bends.
+    /// Sum of `parts` at the ends of all intervals, which determine it everywhere; `also` are kinks of the bound.
     pub fn sum(&self, parts: &[DerivativeTerm], also: &[f64]) -> Vec<LinearForm> {
         let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
         let samples = self.samples(&pieces, also);
@@ -113,7 +112,7 @@ impl All<'_> {
         sums
     }
 
-    /// All `parts` on their own at the same times.
+    /// Each of `parts` at the same times.
     pub fn each(&self, parts: &[DerivativeTerm]) -> Vec<Vec<LinearForm>> {
         let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
         let samples = self.samples(&pieces, &[]);
@@ -163,7 +162,7 @@ impl All<'_> {
         times.windows(2).flat_map(ends).collect()
     }
 
-    /// A derivative of a function at `times` (s).
+    /// Derivative of a function at `times` (s).
     pub fn forms(&self, j: usize, derivative: usize, times: &[f64]) -> Vec<LinearForm> {
         let function = self.list[j];
         let first = self.functions.ranges()[j].start;
@@ -178,7 +177,7 @@ impl All<'_> {
         times.iter().enumerate().map(form).collect()
     }
 
-    /// Rows of a matrix in the parameters of function `j`, one form each at `times` (s).
+    /// Rows of a matrix in the parameters of function `j`, one form for each of `times` (s).
     pub fn matrix_forms(&self, j: usize, rows: &Rows, times: &[f64]) -> Vec<LinearForm> {
         let first = self.functions.ranges()[j].start;
         let form = |(i, t): (usize, &f64)| LinearForm {
@@ -192,7 +191,7 @@ impl All<'_> {
 }
 
 impl LinearForm {
-    /// Zero at a sample.
+    /// Zero form at a sample.
     fn at(sample: &FormSample) -> Self {
         Self {
             entries: Vec::new(),
@@ -207,10 +206,10 @@ fn entries(rows: &Rows, i: usize, first: usize) -> Vec<(usize, f64)> {
     rows.row(i).map(|(j, a)| (first + j, a)).collect()
 }
 
-/// A derivative of the piecewise linear function with these values at the nodes.
+/// Derivative of the piecewise linear function with these nodal values.
 pub(super) fn nodal(grid: &Grid, values: &[f64], derivative: usize, t: f64) -> f64 {
     let x = (t - grid.start()) / grid.step();
-    // A time that misses a node by rounding is that node.
+    // A time that differs from a node by rounding is that node.
     let near = x.round();
     let x = match (x - near).abs() <= SAME_TIME * values.len() as f64 {
         true => near,

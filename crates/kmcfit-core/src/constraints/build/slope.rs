@@ -1,4 +1,4 @@
-//! Smallest and largest slopes.
+//! Bounds of slopes.
 
 use super::linear_form::{LinearForm, group};
 use super::sampling::slope;
@@ -31,8 +31,8 @@ pub(super) fn build(
         .collect()
 }
 
-/// The slope of a function: of every cell, of every node for smooth bases, of the line between the
-/// centres of neighbouring cells for functions with jumps.
+/// Slopes of a function: of every cell, at every node for smooth bases, and between the centres of neighbouring cells for
+/// functions with jumps.
 pub(super) fn slopes(all: &All<'_>, j: usize) -> Vec<LinearForm> {
     let Some(Basis::PiecewiseConstant { knots }) = &all.list[j].basis else {
         return all.sum(&[slope(j, 1.0)], &[]);

@@ -1,10 +1,10 @@
-//! A value at a time.
+//! Fixed value of a function at one time.
 
 use super::linear_form::group;
 use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 
-/// A time so near to a knot, in steps, is meant to be it.
+/// Largest distance from a knot, in steps, of a time that is taken as the knot.
 const SAME_TIME: f64 = 1e-6;
 
 pub(super) fn build(

@@ -1,4 +1,4 @@
-//! One value per cell: functions with jumps.
+//! Piecewise constant basis: one value per cell.
 
 use super::differences;
 use super::knots::KnotSpans;
@@ -11,7 +11,7 @@ pub(super) struct PiecewiseConstant {
 }
 
 impl PiecewiseConstant {
-    /// Cells between `knots` (s).
+    /// The basis with cells between `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
             knots: KnotSpans::new(knots),

@@ -5,16 +5,16 @@ use crate::problem::Problem;
 use crate::record::Channel;
 use std::ops::Range;
 
-/// How the residuals of the samples of all channels are weighed.
+/// Weighted residuals of the samples of all channels.
 pub(super) struct Residuals {
-    /// `sqrt(w)`.
+    /// Roots of the weights, `sqrt(w)`.
     pub roots: Vec<f64>,
-    /// `sqrt(w) r`.
+    /// Weighted residuals, `sqrt(w) r`.
     pub weighted: Vec<f64>,
 }
 
 impl Residuals {
-    /// At an evaluated point.
+    /// Residuals at an evaluated point.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let mut all = Self::with_capacity(problem.sample_count());
         for (channel, predicted) in problem.predicted(evaluation) {
@@ -35,7 +35,7 @@ impl Residuals {
         self.weighted.clear();
     }
 
-    /// Adds some samples of a channel.
+    /// Appends some samples of a channel.
     pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
         let Self { roots, weighted } = self;
         let first = roots.len();
@@ -65,10 +65,10 @@ mod tests {
     use crate::record::Weighting;
     use crate::system::Grid;
 
-    /// The squares of the weighted residuals are the cost, in which the samples at both ends count half; some samples
-    /// at a time are the same.
+    /// The squares of the weighted residuals sum to the cost, in which samples at both ends have half weight; so do those of
+    /// parts of the samples.
     #[test]
-    fn weighted_residuals() {
+    fn squares_of_weighted_residuals_sum_to_the_cost() {
         let grid = Grid::new(0.0, 1.0, 11).expect("a grid");
         let spacing = grid.step();
         let samples = (0..11).map(|i| f64::from(i).sin()).collect();

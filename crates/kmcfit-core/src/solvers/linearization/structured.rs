@@ -1,5 +1,5 @@
-//! The Gauss–Newton subproblem with the states as unknowns: sparse, and of a size linear in the number
-//! of nodes, for functions with many parameters.
+//! Gauss–Newton subproblem with the states as unknowns: sparse, with a size linear in the number of nodes, for functions
+//! with many parameters.
 
 use crate::constraints::Rows;
 use crate::functions::Design;
@@ -11,10 +11,10 @@ use crate::signal::SecondOrder;
 use crate::simulate::reference::step_jacobians;
 use crate::simulate::{StepJacobian, Trajectory};
 
-/// Entries of a linearised step to make room for: three states, three functions at both ends.
+/// Capacity for a linearised step: three states, three functions at both ends.
 const ENTRIES: usize = 9;
 
-/// Every step of every experiment, linearised.
+/// Linearised steps of all experiments.
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
@@ -23,12 +23,12 @@ pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian
     each.collect()
 }
 
-/// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
-/// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
+/// Subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one trajectory per experiment; initial
+/// states are fixed or scalars in `theta`.
 ///
-/// Residuals: `sqrt(w) (r + delta z)` for the samples. Equalities: every step, linearised,
-/// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
-/// vanish where the states are a response. `steps` are those of [`steps`].
+/// Residuals: `sqrt(w) (r + delta z)` for the samples. Equalities: the linearised steps
+/// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`, whose right-hand sides vanish where the states
+/// are a response. `steps` are those of [`steps`].
 pub fn subproblem(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -79,7 +79,7 @@ fn layout(problem: &Problem) -> Option<StageLayout> {
     let mut is_initial = vec![false; functions.scalars().len()];
     let mut first = problem.parameters();
     for experiment in &problem.experiments {
-        let initial = experiment.sought;
+        let initial = experiment.initial_parameters;
         for index in initial.into_iter().flatten() {
             if std::mem::replace(&mut is_initial[index], true) {
                 return None;
@@ -100,7 +100,7 @@ fn layout(problem: &Problem) -> Option<StageLayout> {
     Some(layout)
 }
 
-/// Where the unknowns of one experiment stand.
+/// Columns of the unknowns of one experiment.
 struct UnknownColumns<'a> {
     problem: &'a Problem,
     experiment: &'a Experiment,
@@ -108,8 +108,7 @@ struct UnknownColumns<'a> {
 }
 
 impl UnknownColumns<'_> {
-    /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
-    /// first state that is known.
+    /// Column of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a fixed initial state.
     fn state(&self, i: usize, q: usize) -> Option<usize> {
         match i {
             0 => Some(self.scalar(self.experiment.initial_parameters[q]?)),
@@ -143,7 +142,7 @@ impl UnknownColumns<'_> {
         }
     }
 
-    /// What the functions' values at both ends of step `i` do, by `slope(function, side)`.
+    /// Adds the dependence on the functions' values at both ends of step `i`, with `slope(function, side)`.
     fn add_function_slopes(
         &self,
         i: usize,
@@ -223,10 +222,9 @@ impl UnknownColumns<'_> {
     }
 }
 
-/// Adds the filtered changes of the predictions as unknowns: every section is a recurrence, run
-/// forward over the record for all sections and then backward, from rest. Returns the index of each
-/// filtered prediction. Recurrences that run both ways leave the variables no order in which each
-/// follows from those before.
+/// Adds filtered changes of the predictions as unknowns and returns their columns. Each section is a recurrence, run forward
+/// over the record for all sections and then backward, from rest. With recurrences in both directions the variables have no
+/// elimination order along time.
 fn add_filter(
     filter: &[SecondOrder],
     rows: Vec<Vec<(usize, f64)>>,

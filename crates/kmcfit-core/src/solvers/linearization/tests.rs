@@ -19,9 +19,8 @@ fn fitted(problem: &Problem) -> Fit {
     fit(problem, &problem.start(), &settings, &mut |_| {}).expect("a motion")
 }
 
-/// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
-/// every one and velocities between them; its velocity at the start is estimated as well. The stiffness has so many knots,
-/// or is a constant.
+/// A driven oscillator over a long record with displacements at every seventh node, accelerations at every node and
+/// velocities between nodes; the initial velocity is estimated. The stiffness has `knots` knots, or is a constant.
 fn long_problem(knots: Option<u32>) -> Problem {
     let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
     let nodes = grid.nodes();
@@ -79,10 +78,10 @@ fn long_problem(knots: Option<u32>) -> Problem {
     Problem::new(system, functions, vec![record]).unwrap()
 }
 
-/// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
-/// leave one lane or none for the state in the middle.
+/// The joined halves agree with the reduction of the whole record and with the adjoint: for few parameters, and for numbers
+/// of parameters that leave one SIMD lane or none for the state in the middle.
 #[test]
-fn halves_of_a_long_record() {
+fn halves_of_a_long_record_agree_with_the_whole() {
     for (knots, parameters) in [(None, 4), (Some(4), 7), (Some(5), 8)] {
         let problem = long_problem(knots);
         assert_eq!(problem.parameters(), parameters);
@@ -106,10 +105,10 @@ fn halves_of_a_long_record() {
     }
 }
 
-/// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
-/// adjoint, and the linearised samples ask for no further step.
+/// After short steps adjoint solves replace tangents, with the same result: the gradient is that of an adjoint, and the
+/// linearised samples predict no further step.
 #[test]
-fn after_short_steps_the_jacobian_stays() {
+fn the_jacobian_is_reused_after_short_steps() {
     let mut problem = long_problem(None);
     let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
     let response = problem.evaluate(&truth).expect("a motion");
@@ -128,7 +127,7 @@ fn after_short_steps_the_jacobian_stays() {
     assert!(0 < adjoint && adjoint < points);
     assert_eq!(tangent, (points - adjoint) * parameters);
     let theta = &fit.best.parameters;
-    // Of two ways to the gradient one may have been gone at the end: both have the rounding of the one at the start.
+    // The gradient at the end may come from either method: both have the rounding error of the one at the start.
     let at_start = problem.evaluate(&problem.start()).expect("a motion");
     let at_start = problem.gradient(&problem.start(), &at_start, GradientKind::Discrete);
     let expected = problem.gradient(theta, &fit.best.evaluation, GradientKind::Discrete);
@@ -152,9 +151,9 @@ fn after_short_steps_the_jacobian_stays() {
     }
 }
 
-/// A step that the Jacobian of another point leads astray is made again with the one of its own.
+/// A step that fails with the Jacobian of another point is repeated with its own.
 #[test]
-fn a_jacobian_that_leads_astray_is_made_anew() {
+fn a_reused_jacobian_that_fails_is_recomputed() {
     let problem = long_problem(None);
     let settings = FitSettings::default();
     let start = problem.start();
@@ -182,9 +181,9 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
     assert_eq!(after.tangent, before.tangent + problem.parameters() as u64);
 }
 
-/// On one thread and on two the same, to the last bit.
+/// Results on one thread and on two are bit-identical.
 #[test]
-fn a_long_record_on_two_threads() {
+fn a_long_record_has_the_same_result_on_two_threads() {
     let problem = long_problem(None);
     let alone = threads::sharing(|| fitted(&problem));
     let together = fitted(&problem);
@@ -193,9 +192,9 @@ fn a_long_record_on_two_threads() {
     assert_eq!(together.best.parameters, alone.best.parameters);
 }
 
-/// By the continuous gradient, too, which needs an adjoint.
+/// The continuous gradient, which needs an adjoint, is available for long records.
 #[test]
-fn a_long_record_by_the_continuous_gradient() {
+fn a_long_record_is_fitted_by_the_continuous_gradient() {
     let mut problem = long_problem(None);
     let grid = problem.system.grid;
     let samples = grid.times().iter().map(|t| (0.9 * t).cos()).collect();

@@ -1,10 +1,8 @@
-//! A start from states and parameters together: the response near the samples and the functions are
-//! corrected at once, and the equation of motion holds only in the end.
+//! Collocation start: states near the samples and parameters are corrected together, so that the equation of motion holds
+//! only at the end.
 //!
-//! A response that runs through the record cannot slip by a period, because it begins at the samples
-//! and not at a system. So this start knows no local minima of a wrong period however long the
-//! record is. The steps are linear in the functions: if the response is right, one of them finds the
-//! functions from anywhere.
+//! States near the samples cannot be off by a period, so this starting point has no local minima of a wrong period, however
+//! long the record. The steps are linear in the functions: with correct states one step finds the functions from anywhere.
 
 use crate::constraints::TOLERANCE;
 use crate::objective::{Evaluation, SimulatedRecord};
@@ -17,22 +15,19 @@ use crate::solvers::methods::equation_error::{from_kinematics, with_initial_stat
 use crate::solvers::state_estimation::{Kinematics, by_spline};
 use crate::system::State;
 
-/// Most corrections of the parameters.
+/// Largest number of corrections.
 const ROUNDS: usize = 16;
-/// In so many of these at most, and until no function changes by more than [`NEAR`] of its size, the
-/// response is that of the samples again, as the sensors are known by then: the functions may still be
-/// far off, and a response that follows them would be led away.
+/// Number of corrections, at most, that reset the states to those of the samples with the current sensor parameters, until no
+/// function changes by more than [`NEAR`] of its size: states that follow wrong functions would drift away.
 const ANCHORED: usize = 8;
 const NEAR: f64 = 1e-3;
-/// Corrections end when no function changes by more than this share of its size: the fit that follows
-/// needs a start, not an optimum.
+/// Largest change of a function, relative to its size, at which corrections end; a starting point need not be optimal.
 const SETTLED: f64 = 1e-6;
-/// A pull towards the last parameters, relative to the misfit of no response at all: it decides what the
-/// samples leave open.
+/// Weight of the proximal term towards the last parameters, relative to the zero-response misfit; it determines the
+/// directions that the samples leave undetermined.
 const PULL: f64 = 1e-9;
 
-/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a response.
-/// Ends early where `interrupted` says so.
+/// Corrected parameters of lowest cost; `None` if none can be simulated. Ends early if `interrupted` returns true.
 pub(in crate::solvers) fn collocation_start(
     problem: &Problem,
     start: &[f64],
@@ -80,7 +75,7 @@ pub(in crate::solvers) fn collocation_start(
     best.map(|(_, theta)| theta)
 }
 
-/// The response of each experiment near its samples; that of the parameters where there are too few.
+/// States of each experiment near its samples; those of a simulation where there are too few samples.
 fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     let scalars = problem.scalars(theta);
     let mut own = None;
@@ -104,7 +99,7 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     each.collect()
 }
 
-/// [`first_states`] as sensors and initial states are now seen; `first` as they were seen at first.
+/// [`first_states`] for the current sensor parameters and initial states; `first` are those of the first round.
 fn response_of_samples(
     problem: &Problem,
     theta: &[f64],
@@ -126,7 +121,7 @@ fn begin(initial: State, response: &mut Trajectory) {
     response.velocity[0] = initial.velocity;
 }
 
-/// Fills `evaluation` with the system at `theta`, the response `states` and what the channels see of it.
+/// Sets `evaluation` to the coefficients at `theta`, the states `states` and the resulting predictions.
 fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
     problem.set_parameters(theta, evaluation);
     evaluation.trajectories.clone_from_slice(states);
@@ -145,7 +140,7 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
     evaluation.predictions = each.collect();
 }
 
-/// Whether every system has a mass that an equation of motion can be solved for.
+/// True if the mass of every coefficient set is positive.
 fn has_mass(evaluation: &Evaluation) -> bool {
     let mut nodal_sets = std::iter::once(&evaluation.nodal).chain(&evaluation.own_nodal);
     nodal_sets.all(|nodal| nodal.mass.iter().all(|m| *m > 0.0))

@@ -1,4 +1,4 @@
-//! A start fitted to growing parts of the record.
+//! Starting point fitted to growing parts of the record.
 
 use crate::problem::Problem;
 use crate::solvers::checkpoint::Observer;
@@ -7,12 +7,12 @@ use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 
-/// Parts of the record that are fitted in turn, before all of it.
+/// Parts of the record fitted before the whole record.
 const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
-/// Most iterations on each part.
+/// Iteration limit on each part.
 const HORIZON_ITERATIONS: u64 = 20;
 
-/// The parameters `from`, fitted to growing parts of the record; and the work that took.
+/// Parameters `from` fitted to growing parts of the record, and the work.
 pub(in crate::solvers) fn growing_horizon_start(
     problem: &Problem,
     from: Vec<f64>,

@@ -1,5 +1,5 @@
-//! Displacement, velocity and acceleration from the samples of one experiment, for a start that
-//! needs no model of the system.
+//! State estimation: displacement, velocity and acceleration from the samples of one experiment, without a model of the
+//! system.
 
 mod band_limited;
 mod spline;
@@ -13,26 +13,25 @@ use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
 use crate::system::State;
 
-/// A smooth response near the samples, at some nodes of the grid.
+/// Smooth states near the samples, at some nodes of the grid.
 pub(super) struct Kinematics {
-    /// The nodes.
+    /// Nodes.
     pub nodes: Vec<usize>,
-    /// Displacement there, m.
+    /// Displacement, m.
     pub y: Vec<f64>,
     /// Velocity, m/s.
     pub v: Vec<f64>,
     /// Acceleration, m/s^2.
     pub a: Vec<f64>,
-    /// State at the first node, where the samples reach there.
+    /// State at the first node, if the samples reach it.
     pub initial: Option<State>,
-    /// Size of the samples that are weighed, in their unit.
+    /// Size of the weighted samples, in their unit.
     pub size: f64,
-    /// Weight of a squared residual of theirs.
+    /// Weight of a squared residual.
     pub weight: f64,
 }
 
-/// The states at the beginning of each experiment as its samples suggest them; `None` where they are
-/// too few or begin later.
+/// Initial state of each experiment, estimated from its samples; `None` if they are too few or start later.
 pub fn estimate_states(problem: &Problem) -> Vec<Option<State>> {
     let start = problem.start();
     let scalars = problem.scalars(&start);
@@ -42,8 +41,7 @@ pub fn estimate_states(problem: &Problem) -> Vec<Option<State>> {
 }
 
 impl Kinematics {
-    /// From all channels of an experiment, with the sensors at the values `scalars`; `None` for too
-    /// few samples.
+    /// Estimates the states from all channels of an experiment, for the sensor parameters `scalars`; `None` for too few samples.
     pub fn of(problem: &Problem, experiment: &Experiment, scalars: &[f64]) -> Option<Self> {
         match experiment.channels.as_slice() {
             [] => None,
@@ -56,8 +54,8 @@ impl Kinematics {
     }
 }
 
-/// Standard deviation of the noise from fourth differences, which a smooth response hardly has: their
-/// variance is 70 times that of white noise.
+/// Standard deviation of the noise from fourth differences, in which a smooth response is negligible; their variance is 70
+/// times that of white noise.
 fn noise_level(observed: &[f64]) -> f64 {
     let fourth = observed
         .windows(5)
@@ -66,14 +64,13 @@ fn noise_level(observed: &[f64]) -> f64 {
     (squares / (70.0 * observed.len().saturating_sub(4).max(1) as f64)).sqrt()
 }
 
-/// Samples as a perfect sensor that moves with the base would give them, and the sensor's gain, with
-/// the sensors at the values `scalars`.
+/// Samples corrected for the sensor parameters `scalars`, as from an ideal sensor on the base, and the gain.
 pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
     let [gain, offset, drift] = channel.sensor().values(scalars);
     let gain = if gain == 0.0 { 1.0 } else { gain };
     let filtered = !channel.filter().is_empty();
     let plain = |(i, sample): (usize, &f64)| match filtered {
-        // The filter has taken the offset.
+        // The filter has removed the offset.
         true => sample / gain,
         false => (sample - offset - drift * channel.age(i)) / gain - channel.base_at(i),
     };

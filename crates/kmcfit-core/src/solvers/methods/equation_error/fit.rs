@@ -1,4 +1,4 @@
-//! The equation error as a method of its own: one convex problem, solved once.
+//! Equation-error method: minimises the residual of the equation of motion, one convex problem.
 
 use super::measured::{Measured, Measurements};
 use super::{Accuracy, ConvexMinimum, add_rows, minimise, nodal};
@@ -18,11 +18,11 @@ use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use crate::system::NodalCoefficients;
 
-/// A function that is smaller than its start by this factor is solved for again, up to so many times.
+/// Factor between a function and its start beyond which the problem is solved again, and the number of repetitions.
 const FAR: f64 = 1e4;
 const AGAIN: usize = 3;
-/// Relative rounding of a term of the equation of motion: of derivatives of smoothed samples, and of parameters that are known to
-/// the accuracy of a factorisation.
+/// Relative rounding error of a term of the equation of motion, with derivatives of smoothed samples and parameters of the
+/// accuracy of a factorisation.
 const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
 /// Minimises over the samples of all experiments
@@ -31,9 +31,8 @@ const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 /// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
 /// ```
 ///
-/// with `y`, `y'`, `y''` from the samples ([`Measurements`]) and every sample of the same weight.
-/// Nothing is simulated: the trajectories of the fit are the measured responses, the predictions what
-/// the equation of motion says of the samples there. Scalars keep their values at the start.
+/// with `y`, `y'`, `y''` from the samples ([`Measurements`]) and equal weights. Nothing is simulated: the trajectories of
+/// the fit are the measured responses, the predictions those of the equation of motion. Scalars keep their start values.
 pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationRecord)) -> Fit {
     let clock = Instant::now();
     let mut timings = Timings::default();
@@ -111,7 +110,7 @@ fn reason(problem: &Problem, minimum: &ConvexMinimum, has_mass: bool) -> Reason 
     }
 }
 
-/// The only row of the history.
+/// Single row of the history.
 fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     IterationRecord {
         iteration: 1,
@@ -126,7 +125,7 @@ fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     }
 }
 
-/// The end of a fit whose samples tell no response: the start, without a cost.
+/// Result of a fit whose samples do not provide a response: the start, without a cost.
 fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
     evaluation.nodal = problem.functions.nodal(start);
@@ -159,7 +158,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     }
 }
 
-/// J of the equation error.
+/// Cost of the equation error.
 struct Cost<'a> {
     problem: &'a Problem,
     measurements: &'a Measurements,
@@ -172,9 +171,8 @@ impl<'a> Cost<'a> {
         pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
     }
 
-    /// The minimum; where it is far below the start in the size of a function, once more from there: what is solved for
-    /// is the step, and beside a step of 1e12 the digits of a 1 are rounding.
-    /// Also how many quadratic programs that took.
+    /// Minimum of the cost and the number of quadratic programs. Where a function is far smaller than its start, the problem
+    /// is solved again from the minimum: the unknown is the step, whose rounding error otherwise exceeds the function.
     fn minimise(
         &self,
         start: &[f64],
@@ -199,9 +197,9 @@ impl<'a> Cost<'a> {
         Ok((minimum, programs))
     }
 
-    /// The first-order condition at `point`, the `minimum`: the problem is convex, so solving it again from there tells by how
-    /// much its cost is above the minimum; of J and of the pull towards where the step began, which decides what
-    /// the equation leaves open. `None` if it cannot be solved again.
+    /// First-order condition at `point`, the `minimum`. The problem is convex, so solving it again from there gives the excess
+    /// of its cost over the minimum, of J and of the proximal term that determines the remaining directions. `None` if it cannot
+    /// be solved again.
     fn optimality(
         &self,
         point: &Iterate,
@@ -209,7 +207,7 @@ impl<'a> Cost<'a> {
         timings: &mut Timings,
     ) -> Option<Optimality> {
         let problem = self.problem;
-        // Not counted, so not timed as a program either: it is no part of the fit.
+        // Not counted, so not timed as a program.
         let mut own = Timings::default();
         let again = self.minimise_from(&point.parameters, &mut own);
         timings.linear_algebra += own.sum();
@@ -228,8 +226,8 @@ impl<'a> Cost<'a> {
         })
     }
 
-    /// The rounding of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With twice the
-    /// parameters its error is the sum of those that they stand in.
+    /// Rounding error of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With doubled
+    /// parameters the error is the sum of their terms.
     fn rounding(&self, point: &Iterate) -> f64 {
         let twice: Vec<f64> = point.parameters.iter().map(|p| 2.0 * p).collect();
         let terms = self.point(twice).evaluation.misfit;
@@ -250,7 +248,7 @@ impl<'a> Cost<'a> {
         minimise(problem, sub, start, &sizes, optimum, &excess, timings)
     }
 
-    /// The squares of J in steps from `start`, without the constraints.
+    /// Squares of J in steps from `start`, without constraints.
     fn assembled(&self, start: &[f64]) -> Subproblem {
         let problem = self.problem;
         let mut sub = Subproblem::new(problem.parameters());
@@ -265,8 +263,8 @@ impl<'a> Cost<'a> {
         sub
     }
 
-    /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`
-    /// at the price `weight excess^2`.
+    /// Adds soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`, penalty
+    /// `weight excess^2`.
     fn add_soft(&self, start: &[f64], sub: &mut Subproblem) {
         for group in &self.problem.soft {
             let excess = sub.add_variables(group.rows.len());
@@ -288,7 +286,7 @@ impl<'a> Cost<'a> {
             .collect()
     }
 
-    /// Everything about the parameters `theta`.
+    /// Iterate at the parameters `theta`.
     fn point(&self, theta: Vec<f64>) -> Iterate {
         let problem = self.problem;
         let mut evaluation = problem.workspace();
@@ -307,7 +305,7 @@ impl<'a> Cost<'a> {
         Iterate::new(theta, evaluation, gradient)
     }
 
-    /// The measured responses, and what the model says of the samples there.
+    /// Sets the measured responses and the predictions of the equation of motion.
     fn report_responses(&self, evaluation: &mut Evaluation) {
         let problem = self.problem;
         for (e, measured) in self.measurements.experiments.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! States and inputs of records as measured, without a simulation.
+//! States and inputs of records, estimated from the samples without a simulation.
 
 use crate::functions::Parameterization;
 use crate::objective::SimulatedRecord;
@@ -11,17 +11,16 @@ use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
 use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
-/// Dominant periods at either end that are left out where a force or the base is known to drive the
-/// response: there the filter's transients, which begin as large as the response and fall to a tenth in
-/// a period, are the largest errors there are. Without a known drive the unknown one is larger.
+/// Dominant periods omitted at either end of a record with known force or base motion: transients of the filter there are as
+/// large as the response and decay to a tenth in one period. Without a known input, the unknown input is the larger error.
 const SETTLING: f64 = 2.0;
-/// Most of a record that may be left out at either end.
+/// Smallest fraction of a record (1 / n) that may be omitted at either end.
 const MOST_LEFT_OUT: usize = 4;
 
-/// The state of an experiment at some times, and what drives it there.
+/// State of an experiment at some times, with force and base acceleration.
 pub(super) struct Measured {
     pub places: Vec<TimePoint>,
-    /// Index of the first time among the samples of the channel, where it is one channel's.
+    /// Index of the first time among the samples, if the times are those of one channel.
     first: usize,
     /// Displacement, m.
     pub y: Vec<f64>,
@@ -37,15 +36,15 @@ pub(super) struct Measured {
     pub weight: f64,
     /// Dominant frequency, rad/s.
     pub frequency: f64,
-    /// Where all of this has passed the filter of a band: its corner, rad/s.
+    /// Corner of the filter that all series have passed, rad/s, if any.
     pub corner: Option<f64>,
 }
 
 impl Measured {
-    /// From the channels of an experiment, with the sensors at the values `scalars`.
+    /// Estimates the state from the channels of an experiment, for the sensor parameters `scalars`.
     ///
     /// # Errors
-    /// What is missing.
+    /// The missing measurement.
     fn of(
         problem: &Problem,
         experiment: &Experiment,
@@ -80,7 +79,7 @@ impl Measured {
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
 
-    /// From accelerations alone: response, force and base through the same filter.
+    /// From accelerations alone: response, force and base pass the same filter.
     fn in_band(
         experiment: &Experiment,
         channel: &Channel,
@@ -124,7 +123,7 @@ impl Measured {
         })
     }
 
-    /// At the nodes at which a response is known.
+    /// From the nodes with a known response.
     pub fn at_nodes(problem: &Problem, experiment: &Experiment, kinematics: &Kinematics) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
@@ -152,7 +151,7 @@ impl Measured {
         }
     }
 
-    /// What function `f` of a system multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
+    /// Factor of function `f` at time `i`: `y'' + b''` for the mass, `phi` for a term.
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
@@ -160,7 +159,7 @@ impl Measured {
         }
     }
 
-    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a system at all times, N.
+    /// Residual `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of the equation of motion at all times, N.
     pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
         let error = |(i, place): (usize, &TimePoint)| {
             let forces = nodal.functions().enumerate();
@@ -173,13 +172,12 @@ impl Measured {
         self.places.iter().enumerate().map(error).collect()
     }
 
-    /// `integral error^2 dt`.
+    /// Integral `integral error^2 dt`.
     pub fn misfit(&self, errors: &[f64]) -> f64 {
         self.weight * errors.iter().map(|e| e * e).sum::<f64>()
     }
 
-    /// The response on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
-    /// where nothing was measured.
+    /// Response on `nodes` nodes: cubic between times, extended harmonically with the dominant frequency beyond them.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
         let mut response = Trajectory::zeros(nodes);
         let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
@@ -220,11 +218,11 @@ impl Measured {
         (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
     }
 
-    /// What the model says of the samples at this state.
+    /// Predictions at this state.
     ///
-    /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
-    /// the filter took from the sample, so that model less sample is minus the equation's error
-    /// over the mass; the samples at the ends, which are left out, stand for themselves.
+    /// For an acceleration in a band, `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus the part of the sample that the
+    /// filter removed; the residual is then minus the equation error over the mass. Omitted samples at the ends are their own
+    /// predictions.
     pub fn predict(&self, problem: &Problem, channel: &Channel, view: SimulatedRecord) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
@@ -238,7 +236,7 @@ impl Measured {
     }
 }
 
-/// The value at a place of a function that is linear between nodes.
+/// Value of a function that is linear between nodes.
 fn blend(values: &[f64], place: TimePoint) -> f64 {
     let [left, right] = [values[place.step], values[place.step + 1]];
     match place.fraction {
@@ -248,7 +246,7 @@ fn blend(values: &[f64], place: TimePoint) -> f64 {
     }
 }
 
-/// The spacing of times that are equally spaced.
+/// Spacing of equally spaced times; `None` for other times.
 fn equal_spacing(times: &[f64]) -> Option<f64> {
     let steps = times.len().checked_sub(1).filter(|steps| *steps > 0)?;
     let spacing = (times[steps] - times[0]) / steps as f64;
@@ -259,21 +257,20 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
 
-/// The responses of all experiments as their samples tell them.
+/// Responses of all experiments, estimated from their samples.
 ///
-/// From one channel of equally spaced accelerations the response is integrated in a band around its
-/// dominant frequency, and force and base pass the same filter. From any other channels a smooth
-/// curve through all of them is differentiated, as for the start from the data.
+/// For a single channel of equally spaced accelerations the response is integrated in a band around its dominant frequency,
+/// and force and base pass the same filter. For other channels a smooth curve through all samples is differentiated.
 pub struct Measurements {
-    /// `None` for an experiment without samples.
+    /// One entry per experiment; `None` for an experiment without samples.
     pub(super) experiments: Vec<Option<Measured>>,
 }
 
 impl Measurements {
-    /// From the samples of a problem, with the scalars at their start.
+    /// Estimates from the samples of a problem, with scalars at their start.
     ///
     /// # Errors
-    /// The first experiment whose samples do not tell a response.
+    /// The first experiment whose samples do not provide a response.
     pub fn of(problem: &Problem) -> Result<Self, UnsupportedRecord> {
         Self::with_scalars(problem, problem.scalars(&problem.start()))
     }
@@ -299,8 +296,8 @@ impl Measurements {
         })
     }
 
-    /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
-    /// only forces proportional to the response do without.
+    /// Notes on lost information: the filter that integrates an acceleration removes slow components, which biases forces not
+    /// proportional to the response.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
         let terms = problem.system.terms.iter();
         if terms.clone().all(|term| term.is_linear()) {
@@ -319,13 +316,11 @@ impl Measurements {
         in_bands.filter_map(one).collect()
     }
 
-    /// The weight of a penalty on derivative `order` of function `index` of the list with which the
-    /// smoother's time constant is one dominant period T where the response has its mean amplitude:
-    /// `mean(phi^2) T^(2 order)`, summed over the experiments that have the function. T is the mean
-    /// of theirs.
+    /// Weight of a penalty on derivative `order` of function `index` for which the time constant of the smoother is one dominant
+    /// period T at the mean amplitude of the response: `mean(phi^2) T^(2 order)`, summed over the experiments with the function.
+    /// T is the mean of their periods.
     ///
-    /// Where nothing else changes, `integral (phi p - g)^2 + weight p'^2 dt` smooths `p` by
-    /// `exp(-|t|/T)/(2T)`.
+    /// For fixed other functions, minimising `integral (phi p - g)^2 + weight p'^2 dt` smooths `p` by `exp(-|t|/T)/(2T)`.
     pub fn period_weight(&self, problem: &Problem, index: usize, order: usize) -> f64 {
         let mut squares = 0.0;
         let mut periods = Vec::new();
@@ -337,15 +332,15 @@ impl Measurements {
         squares * period.powi(2 * order as i32)
     }
 
-    /// The largest value at `start` of each function of the list.
+    /// Largest value at `start` of each function of the list.
     pub(super) fn own_sizes(problem: &Problem, start: &[f64]) -> Vec<f64> {
         let values = problem.functions.values(start);
         let largest = |f: &Vec<f64>| f.iter().fold(0.0f64, |m, p| m.max(p.abs()));
         values.iter().map(largest).collect()
     }
 
-    /// The larger of a function's own largest value at `start` and of the value at which its force
-    /// would be as large as the mass's, for each function of the list.
+    /// For each function of the list, the larger of its largest value at `start` and of the value whose force equals the inertia
+    /// force.
     pub(super) fn sizes(&self, problem: &Problem, start: &[f64]) -> Vec<f64> {
         let sizes = Self::own_sizes(problem, start);
         let own = |index: usize| sizes[index];
@@ -366,7 +361,7 @@ impl Measurements {
             .collect()
     }
 
-    /// The experiments that have function `index` of the list, and which of their system it is.
+    /// Experiments with function `index` of the list, and its position in their coefficient set.
     fn with_function<'a>(
         &'a self,
         problem: &'a Problem,
@@ -383,7 +378,7 @@ impl Measurements {
     }
 }
 
-/// The mass of the first system that has function `index` of the list.
+/// Mass of the first coefficient set with function `index`.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
     let mut nodal_sets = functions.coefficient_sets().iter();
     let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
@@ -391,7 +386,7 @@ fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
 }
 
 impl Measured {
-    /// Mean of the squared response of function `f` of the system.
+    /// Mean square of the factor of function `f`.
     fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
         let n = self.places.len();
         let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
@@ -410,7 +405,7 @@ mod tests {
         Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
     }
 
-    /// Samples at some nodes and between some, of the response that `state` tells: `y`, `y'`, `y''`.
+    /// Measured states at some nodes and between some, of the response `state`: `y`, `y'`, `y''`.
     fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
         let between = |step| TimePoint {
             step,
@@ -435,7 +430,7 @@ mod tests {
         }
     }
 
-    /// The largest distance of a response from what `state` tells of displacement and velocity.
+    /// Largest difference of a response from the displacement and velocity of `state`.
     fn distance(
         response: &Trajectory,
         nodes: impl Iterator<Item = usize>,
@@ -446,13 +441,13 @@ mod tests {
             let [of_y, of_v] = [response.displacement[i] - y, response.velocity[i] - v];
             of_y.abs() + of_v.abs()
         };
-        // What is no number is the largest.
+        // NaN counts as the largest.
         nodes.map(one).max_by(f64::total_cmp).unwrap()
     }
 
-    /// Polynomials of degree 3 through values and slopes give back one, at the places and between.
+    /// Cubic polynomials through values and slopes are exact for cubics, at the times and between.
     #[test]
-    fn a_cubic_motion_is_exact_between_its_readings() {
+    fn a_cubic_response_is_interpolated_exactly() {
         let cubic = |t: f64| {
             [
                 0.3 + t - 2.0 * t * t + 0.7 * t * t * t,
@@ -466,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn a_harmonic_motion_swings_on_beyond_its_readings() {
+    fn a_harmonic_response_is_extended_exactly() {
         let w = 1.7;
         let harmonic = |t: f64| {
             let (sine, cosine) = (w * t + 0.4).sin_cos();
@@ -477,9 +472,9 @@ mod tests {
         assert!(off < 1e-12, "{off}");
     }
 
-    /// Whether times are equally spaced is no matter of how long a second is.
+    /// Equal spacing is recognised in every unit of time.
     #[test]
-    fn equal_spacing_knows_no_unit() {
+    fn equal_spacing_does_not_depend_on_the_unit() {
         for spacing in [1e-6, 1.0, 1e6] {
             let times = |off: f64| -> Vec<f64> {
                 let late = |i: usize| if i == 3 { off } else { 0.0 };

@@ -1,10 +1,9 @@
-//! The equation error: smoothed samples put into the equation of motion.
+//! Equation error: residual of the equation of motion with states estimated from the samples.
 //!
-//! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so
-//! penalties and constraints make it one convex problem. It needs no start and knows no local minima
-//! of a wrong period; noise biases it. It is a start ([`equation_error`]) for a fit that removes the
-//! bias, and a method of its own ([`fit`]) for records that no response from known states and forces
-//! explains.
+//! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so with penalties and
+//! constraints its least-squares minimum is a convex problem. It needs no starting point and has no local minima of a wrong
+//! period, but noise biases it. It serves as a starting point ([`equation_error`]) for a fit that removes the bias, and as a
+//! method of its own ([`fit`]) for records that no response from known states and forces reproduces.
 
 mod fit;
 mod measured;
@@ -23,22 +22,22 @@ use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, Term, TimePoint};
 use measured::Measured;
 
-/// A pull towards the start, relative to the equation's own weight: it decides what the equation
-/// leaves open and nothing else.
+/// Weight of the proximal term towards the start, relative to the equation error; it determines the directions that the
+/// equation leaves undetermined.
 const PULL: f64 = 1e-9;
 
-/// What a minimum is for.
+/// Purpose of a minimum.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Accuracy {
-    /// To start a fit.
+    /// Starting point of a fit.
     Start,
-    /// For its own sake.
+    /// Result.
     Optimum,
 }
 
 impl Accuracy {
-    /// A plain minimum moved into the constraints is used if it keeps this share of its decrease: a
-    /// fit that follows needs no optimum, and an optimum has the accuracy to which programs are solved.
+    /// Share of its decrease that a plain minimum must keep when moved into the constraints. A starting point need not be
+    /// optimal; a result has the accuracy of a quadratic program.
     fn kept(self) -> f64 {
         match self {
             Accuracy::Start => 0.999,
@@ -47,10 +46,10 @@ impl Accuracy {
     }
 }
 
-/// Parameters from the equation error, under the problem's penalties and constraints.
+/// Parameters that minimise the equation error, under the penalties and constraints of the problem.
 ///
 /// # Errors
-/// How the convex problem ended, if not with a solution.
+/// Status of the convex program, if it failed.
 pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, ConicStatus> {
     let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
@@ -58,7 +57,7 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     from_kinematics(problem, start, &kinematics)
 }
 
-/// [`equation_error`] with the response of each experiment.
+/// [`equation_error`] with given kinematics of each experiment.
 pub(in crate::solvers) fn from_kinematics(
     problem: &Problem,
     start: &[f64],
@@ -78,7 +77,7 @@ pub(in crate::solvers) fn from_kinematics(
     }
     add_penalties(problem, start, &mut sub);
     add_variations(problem, start, &mut sub);
-    // The size of a function is that of its start, or where that is zero the one that it would need.
+    // The size of a function is that of its start or, where that is zero, the value that balances the equation.
     let own = Measurements::own_sizes(problem, start);
     let natural = Measurements { experiments }.sizes(problem, start);
     let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
@@ -95,20 +94,20 @@ pub(in crate::solvers) fn from_kinematics(
     Ok(minimum.parameters)
 }
 
-/// The minimum of a convex problem.
+/// Minimum of a convex problem.
 struct ConvexMinimum {
     parameters: Vec<f64>,
-    /// How the quadratic program ended, if one was needed.
+    /// Status of the quadratic program, if one was needed.
     program: Option<ConicStatus>,
-    /// The residuals of its optimality conditions.
+    /// Residuals of the optimality conditions.
     kkt: Option<Kkt>,
-    /// Where the step began, and the weights of the pull towards there.
+    /// Start of the step, and the weights of the proximal term.
     from: Vec<f64>,
     pull: Vec<f64>,
 }
 
 impl ConvexMinimum {
-    /// What the pull adds to the cost at `theta`.
+    /// Proximal term at `theta`.
     fn pull(&self, theta: &[f64]) -> f64 {
         let steps = theta.iter().zip(&self.from).zip(&self.pull);
         steps
@@ -117,13 +116,12 @@ impl ConvexMinimum {
     }
 }
 
-/// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
-/// `sub` may have variables after the parameters: `rest` tells them for given parameters. For an
-/// optimum a quadratic program is solved in units of the `sizes` of the functions, which it needs where
-/// these differ by many orders. What was solved adds to `timings`.
+/// Minimises `sub`, without constraints of its own, in steps from `start`, under the constraints of the problem. `sub` may
+/// have variables after the parameters, computed by `rest`. For a result the quadratic program is scaled by the `sizes` of
+/// the functions, which may differ by many orders of magnitude. Work is added to `timings`.
 ///
 /// # Errors
-/// How the convex problem ended, if not with a solution.
+/// Status of the convex program, if it failed.
 fn minimise(
     problem: &Problem,
     mut sub: Subproblem,
@@ -149,8 +147,8 @@ fn minimise(
         let steps = parameters.iter().zip(start).map(|(t, s)| t - s);
         let step: Vec<f64> = steps.chain(rest(&parameters)).collect();
         let (at_start, least) = (sub.value(&vec![0.0; z.len()]), sub.value(&z));
-        // Moved into the constraints it is used if they hold there and it is nearly as good as the
-        // plain one, which no point in them can beat.
+        // A plain minimum moved into the constraints is used if feasible and nearly as good as the plain one, which is a lower
+        // bound of all feasible points.
         let enough =
             sub.value(&step) - least <= (1.0 - accuracy.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
@@ -184,7 +182,7 @@ fn minimise(
     }
 }
 
-/// Root of the weight of a squared error of the equation, so that it counts as the samples would.
+/// Root of the weight of a squared equation error, chosen so that it is comparable with the samples' misfit.
 fn root_weight(
     problem: &Problem,
     experiment: &Experiment,
@@ -201,7 +199,7 @@ fn root_weight(
     kinematics.weight.sqrt() / force_scale
 }
 
-/// The system of an experiment for the parameters `theta`.
+/// Nodal values of an experiment's coefficients at the parameters `theta`.
 fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
     let mut nodal = problem.functions.empty_nodal();
     problem
@@ -210,7 +208,7 @@ fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoef
     nodal
 }
 
-/// The equation's errors, each times `root`, as residuals in the steps from `start`.
+/// Adds the equation errors, each times `root`, as residuals in the steps from `start`.
 fn add_rows(
     problem: &Problem,
     experiment: &Experiment,
@@ -240,8 +238,8 @@ fn add_rows(
     }
 }
 
-/// The constraints, and where nothing fixes the common scale of all functions, the mean of the mass
-/// at its start: without it the equation is solved by no system at all.
+/// Constraints of the problem, plus a fixed mean of the mass where the common scale of all functions is undetermined:
+/// otherwise zero coefficients satisfy the equation.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
     if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
@@ -263,9 +261,8 @@ fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     constraints
 }
 
-/// Whether the equation of motion tells `theta` from `s theta`. Its error is linear in `theta`, and
-/// homogeneous unless a force that acts on a record or a fixed function gives it a right-hand side;
-/// a force or a function that is zero does not.
+/// True if the equation of motion determines the scale of `theta`. Its error is linear in `theta`, and homogeneous unless a
+/// nonzero force or a nonzero fixed function contributes a right-hand side.
 fn equation_fixes_scale(problem: &Problem) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|v| *v != 0.0);
     let fixed = problem.functions.iter().any(|f| nonzero(&f.offset));
@@ -273,14 +270,13 @@ fn equation_fixes_scale(problem: &Problem) -> bool {
         .experiments
         .iter()
         .filter(|e| !e.channels.is_empty());
-    // The base pushes with `-m b''`, which grows with the mass.
+    // The inertia force `-m b''` of the base scales with the mass.
     let force = |e: &Experiment| e.excitation.as_ref().and_then(|e| e.force.clone());
     fixed || measured.any(|e| force(e).is_some_and(|f| !f.is_zero()))
 }
 
-/// Whether some equality tells `theta` from `s theta`: `a theta = b` does unless `b` is zero. An
-/// inequality does not fix the scale, it only bounds it. A `b` that is rounding beside the terms of
-/// the row at `start` counts as zero.
+/// True if some equality determines the scale of `theta`: `a theta = b` with nonzero `b`. Inequalities only bound the scale.
+/// A `b` below the rounding error of the row's terms at `start` counts as zero.
 fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     constraints.groups.iter().any(|group| {
         (0..group.rows.len()).any(|i| {
@@ -291,7 +287,7 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     })
 }
 
-/// `start` with the initial states that are estimated taken from the responses, where these begin.
+/// `start` with estimated initial states set from the kinematics, where these include the first node.
 pub(in crate::solvers) fn with_initial_states(
     problem: &Problem,
     start: &[f64],

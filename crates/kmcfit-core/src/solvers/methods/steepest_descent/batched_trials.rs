@@ -1,5 +1,4 @@
-//! All trial steps of a point at once: the costs of batches of trials, eight in the lanes of a row, and the response of
-//! the lowest one only.
+//! Trial steps of a point in batches: costs of eight trials per SIMD row, and the response of the best trial only.
 
 use super::{Best, take, trial};
 use crate::objective::Evaluation;
@@ -16,7 +15,7 @@ use crate::solvers::iterate::Iterate;
 pub(super) struct BatchedTrials([StepBatch; 2]);
 
 impl BatchedTrials {
-    /// The lowest trial, if it lowers the cost.
+    /// Best trial, if it lowers the cost.
     pub fn lowest(
         &mut self,
         work: &mut CountedEvaluator,
@@ -54,7 +53,7 @@ impl BatchedTrials {
         })
     }
 
-    /// The sums of squares of all rows.
+    /// Sums of squares of all rows.
     fn costs(&mut self, ray: SearchRay, layout: &LaneLayout) -> Vec<Row> {
         let rows = layout.rows();
         let middle = rows.div_ceil(2);
@@ -64,14 +63,15 @@ impl BatchedTrials {
         [first.costs(), second.costs()].concat()
     }
 
-    /// States of a trial along its response; not a number where there are none, which no response is made of.
+    /// States of a trial along its response; NaN where not stored, from which no response is reconstructed.
     fn states(&self, place: (usize, usize)) -> [Row; 2] {
         let states = self.0.iter().find_map(|batch| batch.states(place));
         states.unwrap_or([[f64::NAN; LANES]; 2])
     }
 }
 
-/// System, response and predictions at `parameters`, from states of the response; whether it has one.
+/// Computes coefficients, response and predictions at `parameters`, from states of the response; returns false if the
+/// simulation fails.
 fn move_to(
     problem: &Problem,
     parameters: &[f64],
@@ -90,9 +90,8 @@ fn move_to(
     true
 }
 
-/// The trials' systems as a ray, on the paper's own problem: one free record seen at every node, one
-/// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
-/// any other.
+/// Trial systems as a search ray, for the paper's problem: one free record with a sample at every node, nodal functions,
+/// linear terms, the midpoint rule and the integral cost alone; `None` for any other problem.
 pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
     let system = &problem.system;

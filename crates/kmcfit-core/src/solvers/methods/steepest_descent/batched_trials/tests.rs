@@ -9,7 +9,7 @@ use crate::system::{Grid, Method, State, System, Term};
 
 const NODES: usize = 401;
 
-/// The paper's problem, smaller.
+/// The paper's problem on a coarse grid.
 fn problem() -> Problem {
     let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
     let system = System {
@@ -39,7 +39,7 @@ fn problem() -> Problem {
     Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
-/// A search of some steps.
+/// Iterates of a search with some steps.
 fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
@@ -64,7 +64,7 @@ fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     points
 }
 
-/// Each step is the best of the trials that are evaluated one by one.
+/// Each step is the best of the trials evaluated one by one.
 #[test]
 fn steps_are_the_best_of_all_trials() {
     let problem = problem();
@@ -86,9 +86,9 @@ fn steps_are_the_best_of_all_trials() {
     }
 }
 
-/// States that are not those of the response lead to the response all the same.
+/// A response reconstructed from wrong states is recomputed.
 #[test]
-fn a_motion_does_not_depend_on_its_states() {
+fn the_response_does_not_depend_on_the_stored_states() {
     let problem = problem();
     let mut expected = problem.workspace();
     let evaluated = problem.evaluate_for(Purpose::Reproduction, &problem.start(), &mut expected);
