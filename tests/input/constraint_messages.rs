@@ -222,7 +222,7 @@ fn penalties_and_rules() {
     assert_eq!((variation.function, variation.weight), (1, 0.5));
 
     assert_snapshot!(said(&with("penalty: {kind: tikhonov, order: 2, weight: discrepancy}")), @"
-    m.yaml:9:81: functions.damping.penalty.weight: the rule `discrepancy` needs the noise of the readings
+    m.yaml:9:81: functions.damping.penalty.weight: the rule `discrepancy` needs the noise of the samples
       found: no `sigma` in experiments[0]
       expected: `sigma` in every experiment, or `l-curve` or `gcv`, which do without
     ");
@@ -523,7 +523,7 @@ fn what_the_record_cannot_feel() {
         Finding::texts(&model.warnings)
     };
     let nothing = free("[{function: stiffness, shape: non-increasing}]");
-    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness says nothing about the device here. Without a force the motion shows only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them");
+    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness says nothing about the system here. Without a force the response shows only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them");
     assert_eq!(free("[{passive: true}]").len(), 1);
     assert_eq!(
         free("[{function: mass, min: 1, max: 3}, {passive: true}]"),
